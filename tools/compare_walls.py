@@ -124,7 +124,8 @@ def figures(laid: Print, mesh: Mesh, profile: Profile, layers: int) -> Sequence[
         unfilled += band.difference(plastic).area
         band_mm2 += band.area
     stop = np.zeros(len(program.line), dtype=np.bool_)
-    times = move_times(program.changes(), program.feed / 60.0, stop, profile.machine, program.acceleration)
+    acceleration = program.remarks.acceleration[program.remark]
+    times = move_times(program.changes(), program.feed / 60.0, stop, profile.machine, acceleration)
     return (
         f"{100 * outside / band_mm2:.2f}",
         f"{100 * unfilled / band_mm2:.2f}",

@@ -85,7 +85,8 @@ def _findings(
 
 def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> Feeding:
     """Play a program's lines over a line and its blocks in the printer's planner."""
-    blocks, moving = blocks_of(program.changes(), program.feed / 60.0, standstills(program), machine, program.acceleration)
+    accelerations = program.remarks.acceleration[program.remark]
+    blocks, moving = blocks_of(program.changes(), program.feed / 60.0, standstills(program), machine, accelerations)
     own, ahead = _bytes(lines, program.line[moving])
     flags = np.zeros((2, len(own)), dtype=np.bool_)
     line = SerialLine(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)

@@ -207,18 +207,17 @@ def homes(line: str, dialect: Dialect) -> bool:
 
 def stands_still(line: str, dialect: Dialect) -> bool:
     """Whether a line is known to move nothing and to leave the rest of a program its meaning; a macro is not."""
-    rows = [command_named(name, commands_of(dialect)) for name, _ in _commands(line)]
-    stirs = [
-        row.moves or row.homes or row.probes or row.motors or row.changes or row.refused or row.heats == "any" for row in rows
-    ]
-    return NOTHING_KNOWN not in rows and not any(stirs)
+    for row in (command_named(name, commands_of(dialect)) for name, _ in _commands(line)):
+        stirs = row.moves or row.homes or row.probes or row.motors or row.changes or row.refused or row.heats == "any"
+        if stirs or row is NOTHING_KNOWN:
+            return False
+    return True
 
 
 def _commands(line: str) -> list[tuple[str, str]]:
     """Name and rest of every command in a line; a text that is shown is none.
 
-    A line that firmwares read differently is one command that nothing is known of.
-    """
+    A line that firmwares read differently is one command that nothing is known of."""
     try:
         text = read_line(line).command.upper()
     except GcodeError:
@@ -238,11 +237,7 @@ def _heat(name: str, rest: str, dialect: Dialect) -> Heat:
         return Heat.HEATS
     if not command.heats or (command.heats_with and not set(command.heats_with) & set(read_letters(rest))):
         return Heat.COLD
-    return Heat.COLD if _switches_off(rest, {"S", "R", dialect.value_word}) else Heat.HEATS
-
-
-def _switches_off(rest: str, letters: set[str]) -> bool:
-    """Whether targets of a heating command are given and none is above 0."""
-    targets_c: list[float | None] = [value for letter, value in read_words(rest) if letter in letters]
+    targets_c: list[float | None] = [value for letter, value in read_words(rest) if letter in ("S", "R", dialect.value_word)]
     targets_c += [read_number(value) for key, value in read_values(rest).items() if key == "TARGET"]
-    return bool(targets_c) and all(target_c is not None and target_c <= 0.0 for target_c in targets_c)
+    switches_off = bool(targets_c) and all(target_c is not None and target_c <= 0.0 for target_c in targets_c)
+    return Heat.COLD if switches_off else Heat.HEATS

@@ -46,8 +46,8 @@ LETTERS = {
     "°": " deg ", "–": "-", "—": "-", "‘": "'", "’": "'", "“": "'", "”": "'", "„": "'", "×": "x", "·": "-", "€": "EUR",
 }  # fmt: skip
 
-# Comments that begin layers and parts: the dry run, the sender and the journal read them alike.
-LAYER = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}")  # PrusaSlicer's word and ours, Cura's
+# Comments that begin layers and parts, their sign and the blanks around taken off: all read them alike.
+begins_layer = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}").fullmatch  # PrusaSlicer's word and ours, Cura's
 PART = re.compile(r"PART: *([0-9]{1,6})(?: of ([0-9]{1,6}))?.*")
 
 
@@ -62,8 +62,7 @@ def read_line(line: str) -> LineText:
     """Take a line apart, with or without its line end. Raises GcodeError, which does not name the line, where firmwares would not
     agree about its text: parentheses or quotes without their partner, an axis named twice, a checksum that does not fit.
 
-    A command of words comes out in capitals, one blank before each word; a text or a macro stays as it is written.
-    """
+    A command of words comes out in capitals, one blank before each word; a text or a macro stays as it is written."""
     text = line.strip()
     if text[:1] in ("", ";"):
         return LineText("", text[1:])
@@ -107,8 +106,7 @@ def macro_name(line: str) -> str:
 def plain_line(line: str) -> str:
     """A line as every firmware of a printer reads it as we do, for a file that is not sent command by command.
 
-    It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line().
-    """
+    It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line()."""
     if is_plain_move(line):
         return line
     line = line.rstrip("\r\n")
@@ -152,8 +150,7 @@ def _unframe(text: str, begin: int) -> str:
 
 def _without_remarks(text: str, name: str) -> tuple[str, str]:
     """Code without remarks in parentheses, and the comment. Parentheses between quotes, in a free text, or in a macro right
-    behind a letter (NAME=cube_(1)) are no remarks.
-    """
+    behind a letter (NAME=cube_(1)) are no remarks."""
     code, comment = "", ""
     free, macro, shown = name in FREE_TEXT, MACRO.fullmatch(name) is not None, name in SHOWN
     for piece in PIECE.findall(text):
@@ -203,12 +200,7 @@ def _joined(code: str, words: list[tuple[str, str]]) -> str:
     )
 
 
-def begins_layer(comment: str) -> bool:
-    """Whether a comment, its sign and the blanks around it taken off, begins a layer."""
-    return LAYER.fullmatch(comment) is not None
-
-
 def begun_part(comment: str) -> tuple[int, int] | None:
-    """The part that such a comment begins, from 1, and of how many, 0 where it does not tell; None for another comment."""
+    """The part that a comment begins, from 1, and of how many, 0 where it does not tell; None for another comment."""
     match = PART.fullmatch(comment)
     return (int(match[1]), int(match[2] or 0)) if match else None

@@ -94,8 +94,7 @@ class Modes:
         """Take the words of a move: `coordinates` become where it leads, F the feed; True when an axis is named.
 
         A coordinate that is None is not known: a step leaves it so. Raises GcodeError, if strict, for an F that is not above 0
-        and for a word that is no axis's; else they change nothing.
-        """
+        and for a word that is no axis's; else they change nothing."""
         axes, units, steps, offset = self.axes.words, self.units, self.steps, self.offset
         moved = False
         for letter, value in words:
@@ -128,8 +127,7 @@ class Modes:
 class ModalState:
     """take() every command in order; lines() says it all again.
 
-    at: the positions of the program (what M114 tells), rotary axes unwrapped; None where the sender cannot know them.
-    """
+    at: the positions of the program (what M114 tells), rotary axes unwrapped; None where the sender cannot know them."""
 
     axes: Axes
     at: list[float | None] = field(default_factory=lambda: [None] * 6)

@@ -97,8 +97,7 @@ def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tu
     """Factor that scales the filament of each step, in proportion to its written length, so that the sum stays; and the most
     filament for a millimetre as written. A factor of 0: nothing is redistributed.
 
-    Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed.
-    """
+    Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed."""
     whole = shared = densest = 0.0
     for k in range(first + 1, end):
         whole += filament_mm[k]
@@ -224,8 +223,7 @@ class Pen:
         """The lines of many moves, with their ends: the coordinates that change, then filament, then the F that changes.
 
         texts: m + 1 of lines between the m paths, one before each and one behind the last. A point where the tip is already gives
-        no line, its filament goes to the next one.
-        """
+        no line, its filament goes to the next one."""
         travel, letter = np.frombuffer(self.dialect.travel.encode(), np.uint8), ord(self.filament_letter)
         text = np.empty(LONGEST * int(paths.starts[-1] - paths.starts[0]) + len(texts.content), np.uint8)
         size = _write(paths, texts, travel, letter, self.dialect.filament_relative, self.known, self.pushed_mm, text)
@@ -237,10 +235,6 @@ class Pen:
         e = round(float(self.pushed_mm[0]) * 1e5)
         step, self.known[PUSHED] = e - int(self.known[PUSHED]), e
         return f" {self.filament_letter}{(step if self.dialect.filament_relative else e) / 1e5:.5f}"
-
-    def forget_speed(self) -> None:
-        """The next line gives its F."""
-        self.known[F] = 0
 
     def speed(self, units_s: float) -> str:
         """The F word where it changes."""
@@ -280,12 +274,12 @@ def turn(to: Pose, speed_deg_s: float, pen: Pen) -> Iterator[str]:
     elif pen.machine.coordinates == "workpiece" and (tilt_deg or turn_deg):
         yield from _followed(to, hypot(tilt_deg, turn_deg) / speed_deg_s, pen)
     else:
-        pen.forget_speed()
+        pen.known[F] = 0  # the line gives its F
         along = hypot(tilt_deg, turn_deg)
         share = max(abs(tilt_deg), abs(turn_deg)) / along if pen.dialect.largest_delta and along > 0 else 1.0
         yield f"{pen.dialect.travel}{_words(to, pen)}{pen.speed(speed_deg_s * share)}"
     pen.pose = to
-    pen.forget_speed()
+    pen.known[F] = 0
 
 
 def _words(pose: Pose, pen: Pen) -> str:
@@ -295,8 +289,7 @@ def _words(pose: Pose, pen: Pen) -> str:
 def _stepped(to: Pose, tilt_deg: float, turn_deg: float, speed_deg_s: float, pen: Pen) -> Iterator[str]:
     """MANUAL_STEPPER, one line an axis: both begin together, and speeds and accelerations in proportion end them together.
 
-    Only the last one is waited for; it is the one that goes farther.
-    """
+    Only the last one is waited for; it is the one that goes farther."""
     axes = [
         (abs(tilt_deg), pen.values["tilt_stepper"], to.tilt_deg, pen.machine.tilt),
         (abs(turn_deg), pen.values["turn_stepper"], to.turn_deg, pen.machine.turn),

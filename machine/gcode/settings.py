@@ -74,8 +74,7 @@ def flat(value: Any, key: str) -> Iterator[tuple[str, str]]:
 class PartTotals:
     """What a part's beads come to: (2, 3) least and greatest axis positions X Y Z, filament, the layers that have any.
 
-    line: of the comment.
-    """
+    line: of the comment."""
 
     line: int
     part: int

@@ -51,8 +51,7 @@ def arrange(
 ) -> list[Place] | Misfit:
     """The middles (workpiece x, y, mm) of boxes of these sizes, gap_mm apart about a place on the plate; or what does not fit.
 
-    is_clear: whether the head passes boxes, given the places of those that stand, by their numbers.
-    """
+    is_clear: whether the head passes boxes, given the places of those that stand, by their numbers."""
     if len(set(sizes_mm)) == 1:
         rows = places_on_plate(sizes_mm[0], gap_mm, len(sizes_mm), machine, about_mm)
         if len(rows) < len(sizes_mm):
@@ -118,8 +117,7 @@ def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine,
     """Up to `count` middles (workpiece x, y, mm) of boxes of that size, gap_mm apart, the nearest to a place first.
 
     Rows and columns may have a box or a gap at that place, or in the middle of the plate: what holds most is taken, among equals
-    what stays nearer to the place.
-    """
+    what stays nearer to the place."""
     lattices: list[list[Place]] = []
     for anchor_mm, shift in product(dict.fromkeys((about_mm, MIDDLE)), product((0.0, 0.5), (0.0, 0.5))):
         axes, reach_mm = [], machine.table.radius_mm + hypot(*anchor_mm)
@@ -137,8 +135,7 @@ class Passing:
     """The models of a plate, each about the turn axis, and whether the head passes them.
 
     together: the parts that are printed first, layer by layer; alone: those that follow one after the other. brim_mm: width of
-    the brim around what stands on the plate. With a raft all stand higher.
-    """
+    the brim around what stands on the plate. With a raft all stand higher."""
 
     def __init__(
         self, models: Sequence[Decomposition], together: Sequence[Turn], alone: Sequence[Turn], profile: Profile, brim_mm: float

@@ -24,7 +24,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import NUMBER, Kind, Layer, Path, SlicedPart
 
-WIDTH = 2.0  # of the line, in nozzles: a fat bead fills the nozzle soon and is peeled off whole
+PURGE_WIDTH = 2.0  # of the line, in nozzles: a fat bead fills the nozzle soon and is peeled off whole
 EDGE_MM, GAP_MM = 1.0, 3.0  # kept to the plate's edge and to what is printed near the plate
 LOW_MM = 2.0  # what is printed higher above the plate passes over the line
 MOST_LANES, SHORTEST_MM = 4, 10.0
@@ -38,8 +38,7 @@ def plan(
 
     stops: where the print waits for a person. After the last part the table goes back to level, so that the next print's homing
     finds it level, and the tip aside. Raises SliceError for a stop at a layer that is not there; MoveError: a point outside the
-    axis limits, or no safe place for the head while the table turns.
-    """
+    axis limits, or no safe place for the head while the table turns."""
     parts = {part.index: part for part in decomposition.parts}
     pieces = [piece for piece in sliced if any(len(layer) for layer in piece.layers)]
     machine = profile.machine
@@ -87,8 +86,7 @@ def plan(
 def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> None:
     """To the first part, over the purge line; lanes: (n, 3) machine points of it.
 
-    Where the start block leaves the tip is not known: the first two travels stand for going up, then across.
-    """
+    Where the start block leaves the tip is not known: the first two travels stand for going up, then across."""
     machine, near = tip.profile.machine, target if lanes is None else lanes[0]
     most = machine.z.limits_mm[1]
     tip.at_mm = np.array([*near[:2], min(obstacle_top_mm(machine, None, tip.pose) + machine.lift_mm, most)])
@@ -100,19 +98,16 @@ def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> N
     across_mm = way.across_z_mm
     if lanes is not None:
         _go_down(tip, lanes[0], across_mm)
-        _purge(tip, lanes)
+        process, flow, none = tip.profile.process, tip.profile.material.flow, np.zeros((0, 2))
+        path = Path(
+            Kind.PURGE, lanes[:, :2], PURGE_WIDTH * machine.head.nozzle_mm, process.first_layer_speed_mm_s, flow, none, False
+        )
+        line = Layer.of(0.0, process.first_layer_height_mm, [path], 0.0)
+        print_layer(tip, line, lanes, np.zeros(3), on_plate=True)
         retract(tip)
         across_mm = min(float(lanes[0, 2]) + machine.clearance_mm, most)
     tip.mark(part)
     _go_down(tip, target, across_mm)
-
-
-def _purge(tip: Tip, lanes: Floats) -> None:
-    """The line on the plate, from where the tip stands."""
-    process, flow, width_mm = tip.profile.process, tip.profile.material.flow, purge_width_mm(tip.profile)
-    path = Path(Kind.PURGE, lanes[:, :2], width_mm, process.first_layer_speed_mm_s, flow, np.zeros((0, 2)), False)
-    line = Layer.of(0.0, process.first_layer_height_mm, [path], 0.0)
-    print_layer(tip, line, lanes, np.zeros(3), on_plate=True)
 
 
 def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, standing: Printed | None) -> None:
@@ -151,8 +146,7 @@ def _turn(tip: Tip, pose: Pose) -> None:
 def _stop(tip: Tip, pause: Pause, standing: Printed | None) -> None:
     """Retract and go straight up, above all of table and cradle as far as Z allows: a firmware may then move the head aside.
 
-    standing: what may be higher than the tip, which rises above all of it.
-    """
+    standing: what may be higher than the tip, which rises above all of it."""
     machine = tip.profile.machine
     retract(tip)
     z = max(float(tip.at_mm[2]), obstacle_top_mm(machine, None, tip.pose)) + machine.lift_mm
@@ -165,8 +159,7 @@ def _stop(tip: Tip, pause: Pause, standing: Printed | None) -> None:
 def _finish(tip: Tip, part: int, printed: Printed, standing: Printed | None) -> None:
     """Retract, bring the table back to level, and go aside: a hot tip drips where it stands, and the print is to be taken off.
 
-    standing: what may be higher than the tip.
-    """
+    standing: what may be higher than the tip."""
     machine = tip.profile.machine
     retract(tip)
     home = level(machine)
@@ -180,20 +173,18 @@ def _finish(tip: Tip, part: int, printed: Printed, standing: Printed | None) -> 
         go(tip, park.lift_mm, park.stand_mm)
 
 
-def purge_width_mm(profile: Profile) -> float:
-    """Width of the line."""
-    return WIDTH * profile.machine.head.nozzle_mm
-
-
 def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Floats | None:
     """(n, 3) machine points of the line, in one lane or folded into up to four, along the plate's edge; None: there is no room.
 
-    It keeps off everything that any part prints near the plate, and the head off the cradle.
-    """
+    It keeps off everything that any part prints near the plate, and the head off the cradle."""
     machine, length_mm = profile.machine, profile.machine.purge_mm
     if length_mm <= 0.0:
         return None
-    low, width_mm, z_mm = _low_strokes(parts, sliced, machine), purge_width_mm(profile), profile.process.first_layer_height_mm
+    low, width_mm, z_mm = (
+        _low_strokes(parts, sliced, machine),
+        PURGE_WIDTH * machine.head.nozzle_mm,
+        profile.process.first_layer_height_mm,
+    )
     pose, (least, most) = level(machine), np.array(list(axis_limits(machine).values())[:3]).T
     for count, outward in product(range(1, MOST_LANES + 1), OUTWARD):
         lanes = _lanes(machine, outward, count, length_mm / count, width_mm)

@@ -31,16 +31,15 @@ class Stop:
 
 def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ...]:
     """The stops of the options --pause and --filament-change. Raises SliceError where one has another form."""
-    return tuple(_parse(text, change) for texts, change in ((pauses, False), (changes, True)) for text in texts)
-
-
-def _parse(text: str, change: bool) -> Stop:
-    match = WRITTEN.fullmatch(text.strip())
-    if match is None or 0 in (int(match[1]), int(match[2] or 1)):
-        option = "--filament-change" if change else "--pause"
-        raise SliceError(f"{option} {text}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
-    layer, height = match[2], match[3]
-    return Stop(int(match[1]), None if layer is None else int(layer), None if height is None else float(height), change)
+    stops = []
+    for text, change in (*((text, False) for text in pauses), *((text, True) for text in changes)):
+        match = WRITTEN.fullmatch(text.strip())
+        if match is None or 0 in (int(match[1]), int(match[2] or 1)):
+            option = "--filament-change" if change else "--pause"
+            raise SliceError(f"{option} {text}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
+        part, layer, height = match.groups()
+        stops.append(Stop(int(part), int(layer) if layer else None, float(height) if height else None, change))
+    return tuple(stops)
 
 
 def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
@@ -53,8 +52,7 @@ def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
 def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:
     """(part, layer) before which the print stops -> whether for another filament.
 
-    Raises SliceError for a part or a layer that is not there.
-    """
+    Raises SliceError for a part or a layer that is not there."""
     return {(stop.part, _layer_of(stop, sliced)): stop.change for stop in stops}
 
 

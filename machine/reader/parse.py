@@ -37,8 +37,7 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     """Read G-code lines (with or without line ends) as the machine's firmware would.
 
     Raises GcodeError, with the line, for what is not G-code and for motion codes that are not supported; M codes and
-    macros that are not known are counted in `ignored`: code -> (first line, how often).
-    """
+    macros that are not known are counted in `ignored`: code -> (first line, how often)."""
     lines = Lines.of(lines)
     reader, at = reader_of(machine, len(lines)), 0
     while at < len(lines):
@@ -131,8 +130,7 @@ def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
     """Letters and numbers: one command, or as CNC firmwares have it several, their words shared, the one that moves last.
 
     A firmware on a serial line wants a command in front and one command in a line: Marlin and Klipper take a second one for a
-    parameter, RepRapFirmware does it.
-    """
+    parameter, RepRapFirmware does it."""
     named = [_name(*word) for word in words if word[0] in "GMT"]
     others = {letter: value for letter, value in words if letter not in "GMT"}
     goes_on = reader.motion != "" and not reader.dialect.serial and not reader.letters.keys().isdisjoint(others)
@@ -239,8 +237,7 @@ def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader
 def _feed_length(change: Floats, largest: bool = False) -> Floats:
     """(n,) what F counts along (n, 6) changes, by the rule of NIST RS274.
 
-    largest: of a pure turn only the axis that goes farthest (Klipper).
-    """
+    largest: of a pure turn only the axis that goes farthest (Klipper)."""
     length, measure = lengths(change)
     return np.where(measure == 1, np.abs(change[:, 3:5]).max(axis=1, initial=0.0), length) if largest else length
 

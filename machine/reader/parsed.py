@@ -54,7 +54,8 @@ class Unheld:
 
 
 class Remarks(NamedTuple):
-    """What comments and M204 tell of the rows that follow, (k,) each: part, layer, type, width and height of a bead, mm/s2."""
+    """What comments and M204 tell of the rows that follow, (k,) each: part, layer, type, width and height of a bead, mm/s2, inf
+    where the axes decide."""
 
     part: Indices32
     layer: Indices32
@@ -73,8 +74,7 @@ class ParsedProgram:
     units per minute. kind: MoveKind. remark: which of remarks holds for the row. types: the ;TYPE: names. layers: number of layer
     changes. parts: numbers of the parts in order. replaced: line number and command of every text with characters that a serial
     line does not carry. unsupported: the places that no support could be given. announced: how many parts `;PART:1 of 3` tells, 0
-    where none does; part_totals: what comments tell of the parts' beads.
-    """
+    where none does; part_totals: what comments tell of the parts' beads."""
 
     line: Indices32
     start: Floats
@@ -123,11 +123,6 @@ class ParsedProgram:
     def height_mm(self) -> Floats:
         """(n,) from ;HEIGHT:, 0 when not told."""
         return self.remarks.height_mm[self.remark]
-
-    @property
-    def acceleration(self) -> Floats:
-        """(n,) mm/s2 told by M204, inf where the axes decide."""
-        return self.remarks.acceleration[self.remark]
 
     @property
     def filament_mm(self) -> Floats:

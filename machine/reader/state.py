@@ -23,8 +23,7 @@ Words = Mapping[str, float]  # of one command: no letter stands there twice
 
 class Columns(NamedTuple):
     """Room for rows, one an entry. places: (room + 1, 5), row k ends at k + 1; starts: (room, 5) begins of rows, (0, 5) as long
-    as each begins at the end of the one before it, as nearly always; remark_rows: (k, REMARK_COLUMNS) room for remarks.
-    """
+    as each begins at the end of the one before it, as nearly always; remark_rows: (k, REMARK_COLUMNS) room for remarks."""
 
     line: NDArray[np.int32]
     e_mm: Floats
@@ -40,8 +39,7 @@ class Reader:
     """Position X Y Z tilt turn E, modes, what the comments said, and the rows so far.
 
     at: X Y Z tilt turn as the program counts them, all filament pushed so far. A row's feed below 0 is one over its minutes
-    (G93), inf: as fast as the axes can. Rows that follow each other often share a remark: what comments and M204 say of them.
-    """
+    (G93), inf: as fast as the axes can. Rows that follow each other often share a remark: what comments and M204 say of them."""
 
     machine: Machine
     dialect: Dialect
