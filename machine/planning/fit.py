@@ -1,26 +1,47 @@
-"""Fit: whether a machine has room for parts, known before slicing: every axis reaches them, they stand on the plate; and a model
-moved to its place there.
+"""Fit: whether a machine has room for parts, known before slicing: every axis reaches them, they stand on the plate; where models
+stand there, and whether the head passes those that stand while it prints another.
+
+Models of one size stand in rows and columns, others one by one, the largest first, each as near as possible to the place that the
+plate has for them. The finished parts of other models stand beside a part as a print stands beside a limb; all are taken as their
+convex hulls.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
+from math import ceil, dist, hypot
+from typing import NamedTuple
 
 import numpy as np
 
 from machine.kinematics.table import machine_points
 from machine.planning.limits import ROUNDING, axis_limits, over_edge_mm
+from mdp.clearance import find_obstacle, passes_clear
+from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.plane import Plane
+from mdp.pose import Pose, least_rotation, level, poses
 from profiles.errors import MoveError
+from profiles.machine import Machine
 from profiles.profile import Profile
 from profiles.settings.plate import MIDDLE
+from slicer.interface.interface import AROUND_MM
 from slicer.paths import SlicedPart
-from slicer.raft import lift_mm
+from slicer.raft import lift_mm, reach_mm
 
 Place = tuple[float, float]
 STILL = np.eye(3)  # turns nothing
+EDGE_MM = 2.0  # kept to the plate's edge
+STEP_MM = 2.5  # between places that are tried beside those where boxes touch
+ROUNDING_MM = 1e-6
+
+ROUNDING_DIGITS = 6
+CELLS_MM = (2.0, 0.6)  # finer ones would bring models nearer to each other by 2 mm at most, and take many times as long
+SIDES = 8  # sides of the polygon that stands for the round corner of a brim
+_ROUND = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)])
+Turn = tuple[int, int]  # a model of the plate and one of its parts, both by their places in the lists, from 0
 
 
 def check_parts(parts: Sequence[Part], profile: Profile) -> None:
@@ -112,3 +133,168 @@ def _part_moved(part: Part, shift: Floats) -> Part:
 def _plane_moved(plane: Plane, shift: Floats) -> Plane:
     limbs_mm = None if plane.limbs_mm is None else plane.limbs_mm + shift
     return Plane(plane.normal, plane.offset_mm + float(plane.normal @ shift), limbs_mm)
+
+
+class Misfit(NamedTuple):
+    """The box, by its number, that finds no place; how many stand already; whether it has room and only the head does not."""
+
+    number: int
+    standing: int
+    is_met: bool
+
+
+def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine, about_mm: Place = MIDDLE) -> list[Place]:
+    """Up to `count` middles (workpiece x, y, mm) of boxes of that size, gap_mm apart, the nearest to a place first.
+
+    Rows and columns may have a box or a gap at that place, or in the middle of the plate: what holds most is taken, among equals
+    what stays nearer to the place."""
+    lattices: list[list[Place]] = []
+    for anchor_mm, shift in product(dict.fromkeys((about_mm, MIDDLE)), product((0.0, 0.5), (0.0, 0.5))):
+        axes, reach_mm = [], machine.table.radius_mm + hypot(*anchor_mm)
+        for side, part in zip(size_mm, shift, strict=True):
+            most = ceil(2.0 * reach_mm / (side + gap_mm)) + 1
+            axes.append([(k + part) * (side + gap_mm) for k in range(-most, most + 1)])
+        middles = np.array(list(product(*axes))) + np.array(anchor_mm)
+        over_mm, _ = over_edge_mm(np.abs(middles) + 0.5 * np.array(size_mm) + EDGE_MM, machine.table)
+        inside = ((x, y) for x, y in middles[over_mm <= 0.0].tolist())
+        lattices.append(sorted(inside, key=lambda place: (round(dist(place, about_mm), 6), place[1], place[0]))[:count])
+    return max(lattices, key=lambda places: (len(places), -max((dist(place, about_mm) for place in places), default=0.0)))
+
+
+class Plate:
+    """The models of a plate, each about the turn axis: where they stand, and whether the head passes them.
+
+    together: the parts that are printed first, layer by layer; alone: those that follow one after the other. brim_mm: width of
+    the brim around what stands on the plate. With a raft all stand higher. sizes_mm: the models' boxes, gap_mm apart."""
+
+    def __init__(
+        self, models: Sequence[Decomposition], together: Sequence[Turn], alone: Sequence[Turn], profile: Profile, brim_mm: float,
+        sizes_mm: Sequence[Place], gap_mm: float,
+    ) -> None:  # fmt: skip
+        self.models, self.together, self.alone, self.brim_mm = models, together, alone, brim_mm
+        self._sizes_mm, self._gap_mm = sizes_mm, gap_mm
+        self._profile, self._machine, self._up_mm = profile, profile.machine, lift_mm(profile)
+        lifted = {model: standing_at(model, MIDDLE, self._up_mm) for model in dict.fromkeys(models)}
+        self._parts = [lifted[model].parts for model in models]
+        self._around_mm = {lifted[model].parts[0]: self._width_around(model) for model in lifted}
+        self._hulls: dict[Part, Floats] = {}
+        self._known: dict[tuple[object, ...], bool] = {}
+
+    def arrange(self) -> list[Place] | Misfit:
+        """The middles (workpiece x, y, mm) of the models' boxes about their place on the plate; or what does not fit."""
+        sizes_mm, about_mm = self._sizes_mm, self._profile.process.place_mm
+        if len(set(sizes_mm)) == 1:
+            rows = places_on_plate(sizes_mm[0], self._gap_mm, len(sizes_mm), self._machine, about_mm)
+            if len(rows) < len(sizes_mm):
+                return Misfit(len(rows), len(rows), False)
+            if self.is_clear(dict(enumerate(rows))):
+                return rows
+        found = self._one_by_one(about_mm)
+        if isinstance(found, Misfit):  # two that fit side by side do not where the first one has the middle
+            from_corner = self._one_by_one((-self._machine.table.radius_mm, -self._machine.table.radius_mm))
+            if isinstance(from_corner, Misfit):
+                return max(found, from_corner, key=lambda misfit: misfit.standing)
+            found = from_corner
+        # all are moved together so that the middle of what they cover is at their place, where that keeps them on the plate
+        middles, halves = np.array(found), 0.5 * np.array(sizes_mm)
+        moved = middles + np.array(about_mm) - 0.5 * ((middles - halves).min(axis=0) + (middles + halves).max(axis=0))
+        if (over_edge_mm(np.abs(moved) + halves + EDGE_MM, self._machine.table)[0] > ROUNDING_MM).any():
+            return found
+        together: list[Place] = [(x, y) for x, y in moved.tolist()]
+        return together if self.is_clear(dict(enumerate(together))) else found
+
+    def _one_by_one(self, near_mm: Place) -> list[Place] | Misfit:
+        """The largest first, each as near to a place as it may stand."""
+        standing, sizes_mm = dict[int, Place](), self._sizes_mm
+        for k in sorted(range(len(sizes_mm)), key=lambda k: (-sizes_mm[k][0] * sizes_mm[k][1], k)):
+            places = self._free_places(k, standing, near_mm)
+            place = next((place for place in places if self.is_clear({**standing, k: place})), None)
+            if place is None:
+                return Misfit(k, len(standing), bool(places))
+            standing[k] = place
+        return [standing[k] for k in range(len(sizes_mm))]
+
+    def _free_places(self, number: int, standing: Mapping[int, Place], near_mm: Place) -> list[Place]:
+        """Where a box has room, the nearest to a place first: beside and in line with those that stand, and on a lattice."""
+        size, reach_mm = np.array(self._sizes_mm[number]), self._machine.table.radius_mm
+        boxes = np.array([[standing[k], self._sizes_mm[k]] for k in standing]).reshape(-1, 2, 2)
+        apart, aligned = 0.5 * (boxes[:, 1] + size) + self._gap_mm, 0.5 * (boxes[:, 1] - size)
+        beside = np.concatenate([boxes[:, 0] + sign * way for sign in (-1.0, 0.0, 1.0) for way in (apart, aligned)])
+        lattice = np.arange(-ceil(reach_mm / STEP_MM), ceil(reach_mm / STEP_MM) + 1) * STEP_MM
+        columns, rows = (np.unique(np.concatenate([beside[:, axis], lattice, [near_mm[axis]]])) for axis in (0, 1))
+        places = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        places = places[over_edge_mm(np.abs(places) + 0.5 * size + EDGE_MM, self._machine.table)[0] <= ROUNDING_MM]
+        for (middle, _), least in zip(boxes, apart, strict=True):
+            places = places[(np.abs(places - middle) >= least - ROUNDING_MM).any(axis=1)]
+        away = np.round(np.hypot(*(places - np.array(near_mm)).T), 6)
+        return [(x, y) for x, y in places[np.lexsort((places[:, 0], places[:, 1], away))].tolist()]
+
+    def is_clear(self, places: Mapping[int, Place]) -> bool:
+        """Whether the parts of the models that have places can be printed there."""
+        return all(self._allowed(number, places) for number, (k, _) in enumerate(self.alone) if k in places)
+
+    def poses(self, places: Mapping[int, Place]) -> list[Pose]:
+        """For every part that is printed alone its pose, so that the table turns little; each part must have one."""
+        options = [self._allowed(number, places) for number in range(len(self.alone))]
+        begins = [[level(self._machine)]] if self.together else []
+
+        def fits(position: int, pose: Pose) -> bool:
+            return bool(self._allowed(position - len(begins), places, [pose]))
+
+        return least_rotation(self._machine, [*begins, *options], fits)[len(begins) :]
+
+    def _width_around(self, model: Decomposition) -> float:
+        """How far brim or raft and support reach around a model on the plate, mm; both run round the support."""
+        has_support = self._profile.process.support != "none" and any(part.risky_area_mm2 > 0.0 for part in model.parts)
+        around_mm = reach_mm(self._profile.process) if self._up_mm else self.brim_mm
+        return around_mm + (AROUND_MM if has_support else 0.0)
+
+    def _allowed(self, number: int, places: Mapping[int, Place], tried: Sequence[Pose] | None = None) -> list[Pose]:
+        """The poses at which a part can be printed while all that comes before it stands."""
+        model, machine = self.alone[number][0], self._machine
+        part = self._parts[model][self.alone[number][1]]
+        if tried is None:
+            others = poses(machine, part.direction, part.pose.turn_deg) if part.base.limbs_mm is None else []
+            tried = [part.pose, *(pose for pose in others if pose != part.pose)]
+        if not self._profile.search.clearance:
+            return list(tried[:1])
+        before = [turn for turn in (*self.together, *self.alone[:number]) if turn[0] != model and turn[0] in places]
+        return [
+            pose
+            for pose in tried
+            if self._is_reached(part, pose, places[model])
+            and all(self._passes(part, pose, self._parts[k][n], _away(places[model], places[k])) for k, n in before)
+        ]
+
+    def _is_reached(self, part: Part, pose: Pose, place: Place) -> bool:
+        """Whether a part at a place is within the axes' limits, and clear of the table."""
+        key = part, pose, place
+        if key not in self._known:
+            points = self._hull(part).reshape(-1, 3) + np.array([*place, 0.0])
+            self._known[key] = find_obstacle(self._machine, pose, points) is None
+        return self._known[key]
+
+    def _passes(self, part: Part, pose: Pose, standing: Part, away_mm: Place) -> bool:
+        """Whether the head passes a part of another model that stands away_mm from the part's own."""
+        key = part, pose, standing, away_mm
+        if key not in self._known:
+            beside = self._hull(standing) + np.array([*away_mm, 0.0])
+            base_mm = part.base.offset_mm - part.lifted_mm  # with its raft
+            self._known[key] = passes_clear(self._machine, pose, self._hull(part), beside, base_mm, CELLS_MM)
+        return self._known[key]
+
+    def _hull(self, part: Part) -> Floats:
+        """(m, 3, 3) corners of the faces of a part's hull, of one on the plate with what is around its base."""
+        if part not in self._hulls:
+            hull = convex_hull(part.mesh.vertices)
+            if self._around_mm.get(part, 0.0) > 0.0:
+                low = hull.vertices[hull.vertices[:, 2] <= part.lifted_mm + PLATFORM_TOLERANCE_MM]
+                brims = (low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND).reshape(-1, 3)
+                plate = brims - [0.0, 0.0, part.lifted_mm]  # where a raft is as high as the part is lifted
+                hull = convex_hull(np.vstack([hull.vertices, brims, plate]))
+            self._hulls[part] = hull.vertices[hull.faces]
+        return self._hulls[part]
+
+
+def _away(here: Place, there: Place) -> Place:
+    return round(there[0] - here[0], ROUNDING_DIGITS), round(there[1] - here[1], ROUNDING_DIGITS)

@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from machine.planning.arrange import Misfit, Passing, arrange
-from machine.planning.fit import Place, check_parts, standing_at
+from machine.planning.fit import Misfit, Place, Plate, check_parts, standing_at
 from mdp.cost.footing import tips_over
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh, together
@@ -44,29 +43,29 @@ def on_one_plate(
     """
     if len(models) == 1:
         return models[0], profile
-    places, passing = places_of(models, profile)
+    places, plate = places_of(models, profile)
     x, y = profile.process.place_mm  # all are moved to that place together
-    moved = [standing_at(model, (at_x - x, at_y - y)) for model, (at_x, at_y) in zip(passing.models, places, strict=True)]
+    moved = [standing_at(model, (at_x - x, at_y - y)) for model, (at_x, at_y) in zip(plate.models, places, strict=True)]
     for model in dict.fromkeys(moved):
         with naming(model.name):
             check_parts(model.parts[:1], profile)
     own = [profile.parts if settings is None else settings[model] for model in models]
     confined = [[_within(_room(model.mesh), part) for part in model.parts] for model in moved]
     first = [given for given in own[0] if given.part == 1]
-    if passing.together and any([given for given in each if given.part == 1] != first for each in own):
+    if plate.together and any([given for given in each if given.part == 1] != first for each in own):
         first = []
         for model, each, of_model in zip(moved, own, confined, strict=True):
             of_model[0] = _with_place_settings(of_model[0], model, each)
-    parts = [_first_of_all([confined[k][n] for k, n in passing.together])] if passing.together else []
-    for (k, n), pose in zip(passing.alone, passing.poses(dict(enumerate(places))), strict=True):
+    parts = [_first_of_all([confined[k][n] for k, n in plate.together])] if plate.together else []
+    for (k, n), pose in zip(plate.alone, plate.poses(dict(enumerate(places))), strict=True):
         part = _beside(confined[k][n], len(parts) + 1, pose, profile.machine)
         parts.append(replace(part, of=f"part {n + 1} of {models[k].name}"))
-    plated = first if passing.together else []
-    for number, (k, n) in enumerate(passing.alone, start=1 + len(passing.together[:1])):
+    plated = first if plate.together else []
+    for number, (k, n) in enumerate(plate.alone, start=1 + len(plate.together[:1])):
         plated += [given.model_copy(update={"part": number}) for given in own[k] if given.part == n + 1]
     process = profile.process
-    if passing.together:
-        process = process.model_copy(update={"brim_mm": passing.brim_mm})  # judged alone: together they stand wider
+    if plate.together:
+        process = process.model_copy(update={"brim_mm": plate.brim_mm})  # judged alone: together they stand wider
     return _one_print(moved, parts), profile.model_copy(update={"process": process, "parts": plated})
 
 
@@ -94,19 +93,19 @@ def naming_parts(parts: Sequence[Part]) -> Iterator[None]:
         raise
 
 
-def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[Place], Passing]:
+def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[Place], Plate]:
     """Where the middles of models stand on the plate, and in which order the head prints their parts there. Raises PlanError."""
     about_axis = {model: _about_axis(model) for model in dict.fromkeys(models)}
     lowest_first = sorted(range(len(models)), key=lambda k: (float(models[k].mesh.bounds_mm[1, 2]), k))
     together = [] if profile.process.complete_objects else [(k, 0) for k in range(len(models))]
     alone = [(k, n) for k in lowest_first for n in range(1 if together else 0, len(models[k].parts))]
-    passing = Passing([about_axis[model] for model in models], together, alone, profile, _brim_mm(models, profile))
-    gap_mm = _gap_mm(profile.process, passing.brim_mm)
-    sizes = [_size_mm(model.mesh) for model in models]
-    found = arrange(sizes, gap_mm, profile.machine, profile.process.place_mm, passing.is_clear)
+    brim_mm, sizes = _brim_mm(models, profile), [_size_mm(model.mesh) for model in models]
+    gap_mm = _gap_mm(profile.process, brim_mm)
+    plate = Plate([about_axis[model] for model in models], together, alone, profile, brim_mm, sizes, gap_mm)
+    found = plate.arrange()
     if isinstance(found, Misfit):
         raise PlanError(_reason(found, models, sizes, gap_mm, profile))
-    return found, passing
+    return found, plate
 
 
 def _about_axis(model: Decomposition) -> Decomposition:

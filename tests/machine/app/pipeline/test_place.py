@@ -10,8 +10,7 @@ from machine.app.pipeline.comparison import compare_with_one_part
 from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.plate import on_one_plate
 from machine.dryrun.conformity.agreement import agreement
-from machine.planning.arrange import places_on_plate
-from machine.planning.fit import standing_at
+from machine.planning.fit import places_on_plate, standing_at
 from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.plans.plan_file import PlanFile, PlannedPart

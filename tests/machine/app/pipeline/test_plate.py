@@ -16,7 +16,7 @@ from machine.app.pipeline.plate import naming_parts, on_one_plate
 from machine.app.requests import Cuts, ModelRequest
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
-from machine.planning.arrange import places_on_plate
+from machine.planning.fit import places_on_plate
 from machine.program import Program
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh, together
