@@ -28,18 +28,13 @@ EXPRESSION = frozenset("#[<%")  # of CNC programs, which are not read here
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
-def placeholder_names(profile: Profile, block: str) -> list[str]:
-    """The placeholders of a block, in the order of docs/profiles.md."""
-    return list(_values(profile, block))
-
-
 def block_problems(profile: Profile, *blocks: str) -> list[str]:
     """What cannot be filled in of blocks, of all where none is named, each by itself; and what the firmware refuses of them."""
     machine, dialect = profile.machine, dialect_of(profile.machine)
     problems, refused = list[str](), dict[str, list[str]]()
     for block in blocks or tuple(Blocks.model_fields):
         try:
-            lines = fill_block(getattr(machine.gcode, block), f"machine.gcode.{block}", _values(profile, block), dialect)
+            lines = fill_block(getattr(machine.gcode, block), f"machine.gcode.{block}", block_values(profile, block), dialect)
             refused[block] = list(refused_lines(lines, dialect))
             problems += _moving(lines, dialect) if block == BEFORE_LAYER else ()
         except ProfileError as error:
@@ -79,7 +74,8 @@ def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator
     )
 
 
-def _values(profile: Profile, block: str) -> dict[str, object]:
+def block_values(profile: Profile, block: str) -> dict[str, object]:
+    """What a block may name, in the order of docs/profiles.md, each with a value to try it with."""
     if block == RESUME:
         return resume_placeholders(profile.machine, (0.0, 0.0, 0.0), level(profile.machine), 0.0)
     values = placeholders("check", profile, [], 0.0, 0.0)
@@ -89,7 +85,7 @@ def _values(profile: Profile, block: str) -> dict[str, object]:
 def filled_start(profile: Profile) -> list[str]:
     """The lines of the start block with its placeholders filled in, comments left out. Raises ProfileError."""
     machine = profile.machine
-    lines = fill_block(machine.gcode.start, "start", _values(profile, "start"), dialect_of(machine))
+    lines = fill_block(machine.gcode.start, "start", block_values(profile, "start"), dialect_of(machine))
     return [command for line in lines if (command := read_line(line).command)]
 
 

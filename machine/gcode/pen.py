@@ -74,7 +74,10 @@ def _write(
             if pushing:
                 pushed += _step_mm(paths.points_mm, paths.filament_mm, k, more)
                 filament_mm[0] = base + pushed
-            if _stands(paths.points_mm, k, known):
+            stands = True
+            for axis in range(3):
+                stands = stands and _thousandths(paths.points_mm[k, axis]) == known[axis]
+            if stands:
                 continue
             command = STROKE if pushing else travel
             at = _copy(command, 0, len(command), text, at)
@@ -123,13 +126,6 @@ def _step_mm(points_mm: Floats, filament_mm: Floats, k: int, more: float) -> flo
 @no_nrt
 def _thousandths(value_mm: float) -> int:
     return int(np.rint(value_mm * 1000.0))
-
-
-@no_nrt
-def _stands(points_mm: Floats, k: int, known: Whole) -> bool:
-    """Whether the tip is at point k already, as it is written."""
-    x, y, z = _thousandths(points_mm[k, 0]), _thousandths(points_mm[k, 1]), _thousandths(points_mm[k, 2])
-    return bool(x == known[X] and y == known[Y] and z == known[Z])
 
 
 @no_nrt

@@ -19,7 +19,7 @@ from machine.planning.limits import path_speed, path_speeds, stroke_filament_mm_
 from machine.planning.moves import MARK, POINTS, REORIENT, RETRACT, SPEED, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
 from mdp.clearance import Standing, highest_in_cells
 from mdp.decomposition import Part
-from mdp.kernels.arrays import floats, longs, table
+from mdp.kernels.arrays import longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
@@ -134,25 +134,23 @@ def go(tip: Tip, *goals_mm: Sequence[float] | Floats) -> None:
 def _straight(at_mm: Floats, goal_mm: Floats, speeds: Speeds) -> Moves:
     out, done = Moves(table(3, 4), table(1, 6)), longs(2, 0)
     add_point(out, done, at_mm[0], at_mm[1], at_mm[2], 0.0)
-    add_travel(out, done, table(0, 2), goal_mm, speeds)
+    add_travel(out, done, table(0, 2), goal_mm[0], goal_mm[1], goal_mm[2], speeds)
     return Moves(out.ways[1 : done[0]], out.rows[: done[1]])
 
 
 @no_nrt
-def add_travel(out: Moves, done: Indices, between_mm: Floats, goal_mm: Floats, speeds: Speeds) -> None:
+def add_travel(out: Moves, done: Indices, between_mm: Floats, x_mm: float, y_mm: float, z_mm: float, speeds: Speeds) -> None:
     """Write a travel from the last point past (k, 2) places at the goal's height to the goal; it leaves out points where the tip
     stands already, and is left out where it leads nowhere. done: as in add_point."""
     first, upright = done[0], True
     x, y, z = out.ways[first - 1, 0], out.ways[first - 1, 1], out.ways[first - 1, 2]
     add_point(out, done, x, y, z, 0.0)
     for k in range(len(between_mm) + 1):
-        to_x, to_y, to_z = goal_mm[0], goal_mm[1], goal_mm[2]
-        if k < len(between_mm):
-            to_x, to_y = between_mm[k, 0], between_mm[k, 1]
-        if np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2 + (to_z - z) ** 2) > STANDING_MM:
-            add_point(out, done, to_x, to_y, to_z, 0.0)
+        to_x, to_y = (between_mm[k, 0], between_mm[k, 1]) if k < len(between_mm) else (x_mm, y_mm)
+        if np.sqrt((to_x - x) ** 2 + (to_y - y) ** 2 + (z_mm - z) ** 2) > STANDING_MM:
+            add_point(out, done, to_x, to_y, z_mm, 0.0)
             upright = upright and abs(to_x - x) <= STANDING_MM and abs(to_y - y) <= STANDING_MM
-        x, y, z = to_x, to_y, to_z
+        x, y, z = to_x, to_y, z_mm
     if done[0] == first + 1:
         done[0] = first
         return
@@ -394,7 +392,7 @@ def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices
 
     begin: (5,) X Y Z of the tip, Z over which it crosses to the first stroke, and what is to be pushed before that."""
     most = len(strokes.ways) + approach_starts[-1] - approach_starts[0] + 7 * len(apart) + 1  # three travels and a push
-    out, done, goal = Moves(table(most, 4), table(5 * len(apart), 6)), longs(2, 0), floats(3, 0.0)
+    out, done = Moves(table(most, 4), table(5 * len(apart), 6)), longs(2, 0)
     add_point(out, done, begin[0], begin[1], begin[2], 0.0)
     first = 0
     for k in range(len(strokes.rows)):
@@ -403,12 +401,9 @@ def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices
             over = begin[3] if k == 0 else start[2]
             at = out.ways[done[0] - 1]
             if abs(over - at[2]) > STANDING_MM:
-                goal[0], goal[1], goal[2] = at[0], at[1], over
-                add_travel(out, done, approach[:0], goal, speeds)
-            goal[0], goal[1], goal[2] = start[0], start[1], over
-            add_travel(out, done, approach[approach_starts[k] : approach_starts[k + 1]], goal, speeds)
-            goal[2] = start[2]
-            add_travel(out, done, approach[:0], goal, speeds)
+                add_travel(out, done, approach[:0], at[0], at[1], over, speeds)
+            add_travel(out, done, approach[approach_starts[k] : approach_starts[k + 1]], start[0], start[1], over, speeds)
+            add_travel(out, done, approach[:0], start[0], start[1], start[2], speeds)
         if k == 0 and begin[4] > 0.0:
             add_point(out, done, start[0], start[1], start[2], begin[4])
             add_row(out, done, RETRACT, 1, speeds.filament_mm_s, np.inf)

@@ -7,7 +7,7 @@ from typing import Any
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.part_settings import own_values
-from machine.gcode.blocks import block_problems, placeholder_names
+from machine.gcode.blocks import block_problems, block_values
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen, may_be_left_out
 from profiles.labels.labels import group_title, label_of, unit_of
@@ -197,7 +197,7 @@ def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
 
 def _placeholders(key: str, profile: Profile) -> list[str]:
     """What a G-code block may name in braces; of any other key nothing."""
-    return placeholder_names(profile, key.removeprefix(BLOCKS_OF)) if key.startswith(BLOCKS_OF) else []
+    return list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
 
 
 def _sentence(model: type[Frozen]) -> str:
