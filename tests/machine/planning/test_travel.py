@@ -104,7 +104,7 @@ def test_accelerations_are_written_where_they_change_and_read_back() -> None:
     assert {line for line in lines if line.startswith("M204")} == {"M204 P500 T1200", "M204 P1500 T1200"}
     parsed = parse_gcode(lines, profile.machine)
     outer = (parsed.type == parsed.types.index("External perimeter")) & (parsed.e_mm > 0) & (parsed.layer > 1)
-    assert set(parsed.acceleration[outer]) == {500.0}
+    assert set(parsed.remarks.acceleration[parsed.remark[outer]]) == {500.0}
 
 
 def test_no_acceleration_is_written_unless_one_is_set() -> None:
