@@ -105,7 +105,6 @@ def macro_name(line: str) -> str:
 
 def plain_line(line: str) -> str:
     """A line as every firmware of a printer reads it as we do, for a file that is not sent command by command.
-
     It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line()."""
     if is_plain_move(line):
         return line

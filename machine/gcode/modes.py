@@ -126,7 +126,6 @@ class Modes:
 @dataclass
 class ModalState:
     """take() every command in order; lines() says it all again.
-
     at: the positions of the program (what M114 tells), rotary axes unwrapped; None where the sender cannot know them."""
 
     axes: Axes

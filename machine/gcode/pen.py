@@ -284,7 +284,6 @@ def _words(pose: Pose, pen: Pen) -> str:
 
 def _stepped(to: Pose, tilt_deg: float, turn_deg: float, speed_deg_s: float, pen: Pen) -> Iterator[str]:
     """MANUAL_STEPPER, one line an axis: both begin together, and speeds and accelerations in proportion end them together.
-
     Only the last one is waited for; it is the one that goes farther."""
     axes = [
         (abs(tilt_deg), pen.values["tilt_stepper"], to.tilt_deg, pen.machine.tilt),

@@ -72,7 +72,6 @@ def _check_reach(part: Part, profile: Profile) -> None:
 
 def check_standing(mesh: Mesh, profile: Profile) -> None:
     """Raise MoveError when what stands on the platform of a model about the turn axis lies over the plate's edge at its place.
-
     Brims and supports are not known yet: the dry run looks at them."""
     machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
     standing = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM, :2] + _shift(profile)[:2]
@@ -112,7 +111,6 @@ def lifted(
     decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile
 ) -> tuple[Decomposition, list[SlicedPart]]:
     """Parts that were sliced as if they stood on the plate, and their layers, above their raft.
-
     So the layers are those that they have without a raft, and all that keeps clear of the table keeps clear of the raft."""
     up = np.array([0.0, 0.0, lift_mm(profile)])
     moved = [piece.moved(*(part.rotation @ up)[:2].tolist()) for part, piece in zip(decomposition.parts, sliced, strict=True)]

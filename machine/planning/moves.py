@@ -20,7 +20,6 @@ RICHER = 1.004  # times as much filament as planned a short stroke may get where
 @dataclass(frozen=True)
 class BeginPart:
     """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient.
-
     unsupported: the places of it that no support could be given."""
 
     index: int
@@ -123,7 +122,6 @@ class MachineProgram:
 
 def straight_moves(program: MachineProgram, start: Pose) -> tuple[Floats, Floats, Indices]:
     """(n, 6) beginning and end of each straight move, X Y Z tilt turn E, and (n,) the row of the program that it belongs to.
-
     start: how the table stands before the first one."""
     counts = np.diff(program.starts)
     move = np.repeat(np.arange(len(program)), counts)

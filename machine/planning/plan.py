@@ -85,7 +85,6 @@ def plan(
 
 def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> None:
     """To the first part, over the purge line; lanes: (n, 3) machine points of it.
-
     Where the start block leaves the tip is not known: the first two travels stand for going up, then across."""
     machine, near = tip.profile.machine, target if lanes is None else lanes[0]
     most = machine.z.limits_mm[1]
@@ -145,7 +144,6 @@ def _turn(tip: Tip, pose: Pose) -> None:
 
 def _stop(tip: Tip, pause: Pause, standing: Printed | None) -> None:
     """Retract and go straight up, above all of table and cradle as far as Z allows: a firmware may then move the head aside.
-
     standing: what may be higher than the tip, which rises above all of it."""
     machine = tip.profile.machine
     retract(tip)
@@ -158,7 +156,6 @@ def _stop(tip: Tip, pause: Pause, standing: Printed | None) -> None:
 
 def _finish(tip: Tip, part: int, printed: Printed, standing: Printed | None) -> None:
     """Retract, bring the table back to level, and go aside: a hot tip drips where it stands, and the print is to be taken off.
-
     standing: what may be higher than the tip."""
     machine = tip.profile.machine
     retract(tip)
@@ -175,7 +172,6 @@ def _finish(tip: Tip, part: int, printed: Printed, standing: Printed | None) -> 
 
 def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Floats | None:
     """(n, 3) machine points of the line, in one lane or folded into up to four, along the plate's edge; None: there is no room.
-
     It keeps off everything that any part prints near the plate, and the head off the cradle."""
     machine, length_mm = profile.machine, profile.machine.purge_mm
     if length_mm <= 0.0:

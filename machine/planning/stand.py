@@ -47,7 +47,6 @@ def find_park_position(
     machine: Machine, printed: Printed, at_mm: Floats, pose: Pose, stands: Sequence[tuple[float, float]] = ()
 ) -> Park | None:
     """Where to wait when the tip stands at at_mm (axis positions X Y Z); None when no way up is proved clear.
-
     stands: X, Y of the places that may be chosen besides the corners of the axes; the nearest is."""
     x, y, z = (float(value) for value in at_mm)
     most = machine.z.limits_mm[1]
@@ -98,7 +97,6 @@ def is_way_clear(
     machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None, parts: int = 1
 ) -> bool:
     """True when each body keeps what it must from table, cradle and print while the tip goes from start to end.
-
     The way is checked in `parts` pieces: a direction that separates body and solid is easier to find for a short piece."""
     tried = directions(rotation(machine, pose) @ UP)
     shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
@@ -114,7 +112,6 @@ def is_way_clear(
 @dataclass(frozen=True, eq=False)
 class Turn:
     """A turn of the table on the way of the tip from one place to another, machine X Y Z; target_mm None: the turn is its end.
-
     least_z_mm: least Z of the ways across before and after the turn, where something printed may be higher than both places."""
 
     start: Pose
@@ -127,7 +124,6 @@ class Turn:
 @dataclass(frozen=True)
 class Route:
     """The tip stands at X, Y of over_mm and at z_mm while the table turns, and crosses to the next part at across_z_mm.
-
     seconds: for all moves of the way, the turn itself left out."""
 
     over_mm: tuple[float, float]
@@ -193,7 +189,6 @@ def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> tuple[F
 
 def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Speeds) -> Route:
     """The quickest safe route of a turn; part: that comes after it.
-
     Raises MoveError when no stand is safe inside the axis limits."""
     tried, reach = sweep(machine, printed, turn.start, turn.end)
     best: Route | None = None

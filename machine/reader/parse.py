@@ -236,7 +236,6 @@ def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader
 
 def _feed_length(change: Floats, largest: bool = False) -> Floats:
     """(n,) what F counts along (n, 6) changes, by the rule of NIST RS274.
-
     largest: of a pure turn only the axis that goes farthest (Klipper)."""
     length, measure = lengths(change)
     return np.where(measure == 1, np.abs(change[:, 3:5]).max(axis=1, initial=0.0), length) if largest else length

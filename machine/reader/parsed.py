@@ -69,12 +69,11 @@ class Remarks(NamedTuple):
 class ParsedProgram:
     """A G-code text as arrays with one row per move (n rows).
 
-    line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row
-    before where G28 or G92 set a position. e_mm: filament pushed by the move. feed: F in
-    units per minute. kind: MoveKind. remark: which of remarks holds for the row. types: the ;TYPE: names. layers: number of layer
-    changes. parts: numbers of the parts in order. replaced: line number and command of every text with characters that a serial
-    line does not carry. unsupported: the places that no support could be given. announced: how many parts `;PART:1 of 3` tells, 0
-    where none does; part_totals: what comments tell of the parts' beads."""
+    line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row before
+    where G28 or G92 set a position. e_mm: filament pushed by the move. feed: F in units per minute. remark: which of remarks
+    holds for the row. types: the ;TYPE: names. layers: number of layer changes. parts: their numbers in order. replaced: line
+    number and command of every text with characters that a serial line does not carry. announced: how many parts `;PART:1 of 3`
+    tells, 0 where none does; part_totals: what comments tell of the parts' beads."""
 
     line: Indices32
     start: Floats

@@ -51,7 +51,6 @@ class Meaning(NamedTuple):
 
 def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
     """Rows of the plain lines from line `first`, counted from 0; returns the first line that is not plain.
-
     Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row."""
     modes = reader.modes
     begin = lines.content[lines.start[first] : lines.start[first] + 2].tobytes()
@@ -187,7 +186,6 @@ def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Flo
 @no_nrt
 def _read_number(text: Bytes, at: int, end: int) -> tuple[int, float, int, int]:
     """Where a number without sign ends, at a blank or the end; its value, digits before its point and after it, -1 without one.
-
     An end of -1: it is none, or has more digits than are read exactly."""
     whole, digits, decimals = 0, 0, -1
     while at < end and text[at] != 32:
