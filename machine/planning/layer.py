@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from machine.kinematics.collision import Printed
 from machine.planning.limits import path_speed, path_speeds, stroke_filament_mm_s, wipe_filament_mm_s
 from machine.planning.moves import MARK, POINTS, REORIENT, RETRACT, SPEED, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
 from mdp.clearance import Standing, highest_in_cells
@@ -46,14 +47,17 @@ SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN)
 
 @dataclass
 class Tip:
-    """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back, and all moves so far.
+    """Where the tip is (machine X Y Z), how the table stands, what is printed before the part at hand, and all moves so far.
 
     trail: (n, 3) the way of a wipe over what has been printed since the last retraction. run_in_mm: filament that the next
-    strokes inside are to push beyond their own. limb: while a limb is printed, its part number and what stands beside it."""
+    strokes inside are to push beyond their own. limb: while a limb is printed, its part number and what stands beside it.
+    has_limbs: from the first limb on, what is printed may be higher than the tip."""
 
     profile: Profile
     at_mm: Floats
     pose: Pose
+    printed: Printed
+    has_limbs: bool = False
     retracted_mm: float = 0.0
     prime_extra_mm: float = 0.0
     run_in_mm: float = 0.0

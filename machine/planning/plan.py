@@ -15,7 +15,7 @@ from machine.planning import limits
 from machine.planning.layer import Tip, go, print_layer, retract, standing_beads
 from machine.planning.limits import axis_limits
 from machine.planning.moves import TRAVEL, BeginLayer, BeginPart, MachineProgram, Pause, Reorient
-from machine.planning.stand import Route, Turn, beside, find_park_position, is_way_clear, obstacle_top_mm, over_print_mm, route
+from machine.planning.stand import Turn, beside, find_park_position, is_way_clear, obstacle_top_mm, over_print_mm, route
 from machine.planning.stops import Stop, stops_by_layer
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
@@ -42,10 +42,9 @@ def plan(
     parts = {part.index: part for part in decomposition.parts}
     pieces = [piece for piece in sliced if any(len(layer) for layer in piece.layers)]
     machine = profile.machine
-    tip = Tip(profile, np.zeros(3), level(machine))
+    tip = Tip(profile, np.zeros(3), level(machine), join_hulls([]))
     printed: list[Printed] = []
     done: list[tuple[Part, SlicedPart]] = []
-    has_limbs = False  # from the first limb on, earlier parts may stand higher than the tip
     begins_level = bool(pieces) and parts[pieces[0].index].pose == tip.pose  # the line is on the plate as it was homed
     lanes = purge_lanes(decomposition.parts, pieces, profile) if begins_level else None
     stopped = stops_by_layer(stops, pieces)
@@ -57,16 +56,14 @@ def plan(
         first = next(layer for layer in piece.layers if len(layer))
         target = np.array([*first.points[0], first.z_mm]) + shift
         is_limb = part.base.limbs_mm is not None
-        has_limbs, earlier = has_limbs or is_limb, join_hulls(printed)
-        standing = earlier if has_limbs else None
-        if printed:
-            _reach(tip, begin, target, earlier, standing)
-        else:
-            _begin(tip, begin, target, lanes)
+        tip.has_limbs = tip.has_limbs or is_limb
+        across_mm = _turned(tip, part.pose, target, part.index) if printed else _begin(tip, begin, target, lanes)
+        tip.mark(begin)
+        _go_down(tip, target, across_mm)
         tip.limb = (part.index, standing_beads(part, done, machine)) if is_limb else None
         for number, (layer, at) in enumerate(zip(piece.layers, points, strict=True), start=1):
             if (part.index, number) in stopped:
-                _stop(tip, Pause(part.index, number, stopped[part.index, number]), standing)
+                _stop(tip, Pause(part.index, number, stopped[part.index, number]))
             if len(layer):
                 z_mm = layer.z_mm + part.lifted_mm
                 tip.mark(BeginLayer(part.index, number, z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c))
@@ -74,22 +71,22 @@ def plan(
         widest_mm = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
         corners = hull(np.concatenate(points), 0.0).points_mm + shift
         printed.append(hull(workpiece_points(machine, part.pose, corners), 0.5 * widest_mm))
+        tip.printed = join_hulls(printed)
         done.append((part, piece))
     if pieces:
-        earlier = join_hulls(printed)
-        _finish(tip, pieces[-1].index, earlier, earlier if has_limbs else None)
+        _finish(tip, pieces[-1].index)
     program = MachineProgram.of(decomposition.name, tip.moves, tip.marks)
     limits.check(program, machine)
     return program
 
 
-def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> None:
-    """To the first part, over the purge line; lanes: (n, 3) machine points of it.
+def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> float:
+    """Z of the way across to the first part, over the purge line; lanes: (n, 3) machine points of it.
     Where the start block leaves the tip is not known: the first two travels stand for going up, then across."""
     machine, near = tip.profile.machine, target if lanes is None else lanes[0]
     most = machine.z.limits_mm[1]
     tip.at_mm = np.array([*near[:2], min(obstacle_top_mm(machine, None, tip.pose) + machine.lift_mm, most)])
-    way = route(Turn(tip.pose, part.pose, tip.at_mm, near), part.index, join_hulls([]), machine, tip.speeds)
+    way = route(Turn(tip.pose, part.pose, tip.at_mm, near), part.index, tip.printed, machine, tip.speeds)
     stand = np.array([*way.over_mm, way.z_mm])
     for speed in (tip.speeds.lift_mm_s, tip.speeds.travel_mm_s):
         tip.move(TRAVEL, np.array([stand, stand]), 0.0, speed)
@@ -105,19 +102,7 @@ def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> N
         print_layer(tip, line, lanes, np.zeros(3), on_plate=True)
         retract(tip)
         across_mm = min(float(lanes[0, 2]) + machine.clearance_mm, most)
-    tip.mark(part)
-    _go_down(tip, target, across_mm)
-
-
-def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, standing: Printed | None) -> None:
-    """Retract, lift, turn the table, cross over to above the target, go down; standing: what may be higher than both places."""
-    retract(tip)
-    way = _route(tip, part.pose, target, part.index, printed, standing)
-    if tip.pose != part.pose:
-        _turn(tip, part.pose)
-        tip.run_in_mm = tip.profile.material.prime_extra_mm
-    tip.mark(part)
-    _go_down(tip, target, way.across_z_mm)
+    return across_mm
 
 
 def _go_down(tip: Tip, target: Floats, across_z_mm: float) -> None:
@@ -125,15 +110,19 @@ def _go_down(tip: Tip, target: Floats, across_z_mm: float) -> None:
     go(tip, [*tip.at_mm[:2], across_z_mm], [*target[:2], across_z_mm], target)
 
 
-def _route(tip: Tip, pose: Pose, target: Floats | None, part: int, printed: Printed, standing: Printed | None) -> Route:
-    """The way of a turn that leads over all that may stand, gone to where the tip stands while the table turns."""
+def _turned(tip: Tip, pose: Pose, target: Floats | None, part: int) -> float:
+    """Retract, go to a stand over all that may be higher, and turn the table; Z of the way across to the target from there."""
+    retract(tip)
     machine, turn = tip.profile.machine, Turn(tip.pose, pose, tip.at_mm, target)
-    if standing is not None:
-        least_z_mm = over_print_mm(machine, standing, turn.start), over_print_mm(machine, standing, turn.end)
+    if tip.has_limbs:
+        least_z_mm = over_print_mm(machine, tip.printed, turn.start), over_print_mm(machine, tip.printed, turn.end)
         turn = replace(turn, least_z_mm=least_z_mm)
-    way = route(turn, part, printed, machine, tip.speeds)
+    way = route(turn, part, tip.printed, machine, tip.speeds)
     go(tip, [*tip.at_mm[:2], way.z_mm], [*way.over_mm, way.z_mm])
-    return way
+    if tip.pose != pose:
+        _turn(tip, pose)
+        tip.run_in_mm = tip.profile.material.prime_extra_mm
+    return way.across_z_mm
 
 
 def _turn(tip: Tip, pose: Pose) -> None:
@@ -142,27 +131,25 @@ def _turn(tip: Tip, pose: Pose) -> None:
     tip.mark(Reorient(pose, speed))
 
 
-def _stop(tip: Tip, pause: Pause, standing: Printed | None) -> None:
+def _stop(tip: Tip, pause: Pause) -> None:
     """Retract and go straight up, above all of table and cradle as far as Z allows: a firmware may then move the head aside.
-    standing: what may be higher than the tip, which rises above all of it."""
+    The tip rises above all that may be higher."""
     machine = tip.profile.machine
     retract(tip)
     z = max(float(tip.at_mm[2]), obstacle_top_mm(machine, None, tip.pose)) + machine.lift_mm
-    if standing is not None:
-        z = max(z, over_print_mm(machine, standing, tip.pose))  # Z reaches it: the way to the part led over it
+    if tip.has_limbs:
+        z = max(z, over_print_mm(machine, tip.printed, tip.pose))  # Z reaches it: the way to the part led over it
     go(tip, [*tip.at_mm[:2], min(z, machine.z.limits_mm[1])])
     tip.mark(pause)
 
 
-def _finish(tip: Tip, part: int, printed: Printed, standing: Printed | None) -> None:
-    """Retract, bring the table back to level, and go aside: a hot tip drips where it stands, and the print is to be taken off.
-    standing: what may be higher than the tip."""
-    machine = tip.profile.machine
+def _finish(tip: Tip, part: int) -> None:
+    """Retract, bring the table back to level, and go aside: a hot tip drips where it stands, and the print is to be taken off."""
+    machine, printed = tip.profile.machine, tip.printed
     retract(tip)
     home = level(machine)
     if tip.pose != home:
-        _route(tip, home, None, part, printed, standing)
-        _turn(tip, home)
+        _turned(tip, home, None, part)
     park = find_park_position(machine, printed, tip.at_mm, home, beside(machine, printed, tip.at_mm, home))
     if park is None:
         go(tip, [*tip.at_mm[:2], min(float(tip.at_mm[2]) + machine.lift_mm, machine.z.limits_mm[1])])
