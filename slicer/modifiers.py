@@ -19,7 +19,7 @@ from mdp.zone import MeshVolume, Volume
 from profiles.errors import SliceError
 from profiles.part_settings import process_of_part
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, clean, closing, offset, union, unite_layers
+from slicer.geometry.polygons import Polygons, clean, closing, offset, rectangle, union, unite_layers
 from slicer.heights import SHELL_KEYS, shell_layers
 
 AROUND_MM = 5.0  # beside a part, which is more than its outlines may reach beyond its mesh
@@ -45,7 +45,7 @@ def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -
     process's own."""
     places = []
     (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
-    window = Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
+    window = rectangle(x0, y0, x1, y1)
     for own, modifiers in groupby(part.modifiers, key=lambda modifier: modifier.process):
         settings = process_of_part(process, own).model_dump(include=set(own))
         if process.spiral_vase:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
-from slicer.geometry.polyline import length_mm, lengths_mm
+from slicer.geometry.polyline import along_mm, length_mm, lengths_mm
 
 ON_PLATE_MM = 0.35  # so high above the plate a bead still sags onto it
 
@@ -141,7 +141,7 @@ class Layer:
         placed[:, :2], placed[:, 2] = self.points, self.z_mm
         for k in np.flatnonzero(self.below_mm.any(axis=1)).tolist():
             a, b = self.starts[k], self.starts[k + 1]
-            done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points[a:b], axis=0).T))])
+            done = along_mm(self.points[a:b])
             begin, end = self.below_mm[k]
             placed[a:b, 2] += -begin + (begin - end) * done / max(float(done[-1]), 1e-12)
         return placed

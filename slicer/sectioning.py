@@ -28,16 +28,15 @@ from slicer.geometry.polygons import (
     Polygons,
     area_mm2,
     clean,
-    close_loop,
     closing,
     contours,
     half_plane,
     islands,
     offset,
     opening,
+    perimeter_mm,
     union,
 )
-from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights, part_heights
 from slicer.interface.interface import (
     AROUND_MM,
@@ -208,8 +207,7 @@ def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Poly
     least_mm = FEATURE * least_width_mm(nozzle_mm, process.layer_height_mm) + HAIR_MM
     pieces, solid = [] if section.is_empty() else islands(section), list[Polygons]()
     for piece in pieces:
-        around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
-        if 2.0 * piece.area() >= least_mm * around_mm or not offset(piece, -0.5 * least_mm).is_empty():
+        if 2.0 * piece.area() >= least_mm * perimeter_mm(piece) or not offset(piece, -0.5 * least_mm).is_empty():
             solid.append(piece)
     return section if len(solid) == len(pieces) else Polygons.compose(solid) if solid else Polygons()
 

@@ -42,7 +42,7 @@ from slicer.strokes.strokes import Strokes, split, split_overhangs
 from slicer.strokes.vase import vase_layers
 from slicer.support.handed_down import plan_supports
 from slicer.support.support import Supports, explain, own_supports
-from slicer.walls.fuzzy import fuzzy_walls
+from slicer.walls.walls import fuzzy_walls
 
 FEWEST_IN_ALL = 250  # fewer are sliced sooner than processes are forked and their paths brought back
 LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it

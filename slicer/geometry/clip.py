@@ -36,10 +36,8 @@ def rotation_2d(angle_deg: float) -> Floats:
 
 
 def clip_lines(points: Floats, starts: Indices, border: EdgeIndex) -> Pieces:
-    """The pieces of open lines (n, 2) inside the polygons of a border, by the even-odd rule.
-
-    Every line must begin and end outside.
-    """
+    """The pieces of open lines (n, 2) inside the polygons of a border, by the even-odd rule. Every line must begin and end
+    outside."""
     if not len(border.edges) or not len(starts):
         return NO_PIECES
     bounds = np.append(starts, len(points))
@@ -83,11 +81,9 @@ def _clip(points: Floats, bounds: Indices, border: EdgeIndex, out: Pieces) -> tu
 
 def merge_pieces(several: list[Pieces]) -> Pieces:
     """Pieces of several bundles of lines as one bundle."""
-    if len(several) < 2:
-        return several[0] if several else NO_PIECES
-    sizes = np.concatenate([np.diff(pieces.starts) for pieces in several])
-    starts = np.concatenate([[0], np.cumsum(sizes)])
-    return Pieces(np.concatenate([p.points for p in several]), starts, np.concatenate([p.ends for p in several]))
+    points, starts, ends = zip(NO_PIECES, *several, strict=True)
+    sizes = np.concatenate([np.diff(of_bundle) for of_bundle in starts])
+    return Pieces(np.concatenate(points), np.cumsum([0, *sizes]), np.concatenate(ends))
 
 
 def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
@@ -118,9 +114,7 @@ def runs_within(points: Floats, area: Polygons) -> list[Floats]:
 @kernel
 def cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
     """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
-
-    points, out: (n, 2 or more), further columns are interpolated.
-    """
+    points, out: (n, 2 or more), further columns are interpolated."""
     shares, crossed = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0)
     columns, n = points.shape[1], 1
     for axis in range(columns):

@@ -34,9 +34,7 @@ class Grid(NamedTuple):
 
 class EdgeIndex(NamedTuple):
     """edges: (n, 4) x0 y0 x1 y1, loop after loop; loop: (n,) number of an edge's loop; begins: where each loop begins, and n.
-
-    Cell c of row r of the grid holds the edges items[first[r * columns + c] : first[r * columns + c + 1]].
-    """
+    Cell c of row r of the grid holds the edges items[first[r * columns + c] : first[r * columns + c + 1]]."""
 
     edges: Floats
     loop: Indices
@@ -73,9 +71,10 @@ def _index(edges: Floats, loop: Indices, begins: Indices) -> EdgeIndex:
 
 
 @helper
-def _columns(grid: Grid, segment: Segment, low: float, high: float) -> tuple[int, int]:
-    """First and last column that a segment touches between the heights low and high; the last below the first: none."""
+def _cells(grid: Grid, r: int, segment: Segment) -> tuple[int, int]:
+    """First and last cell that a segment touches in a row; the last below the first: none."""
     x0, y0, x1, y1 = segment
+    low, high = grid.y + r * grid.size_mm - MARGIN_MM, grid.y + r * grid.size_mm + grid.size_mm + MARGIN_MM
     bottom, top = min(y0, y1), max(y0, y1)
     if bottom > high or top < low:
         return 1, 0
@@ -85,7 +84,7 @@ def _columns(grid: Grid, segment: Segment, low: float, high: float) -> tuple[int
         a, b = x0 + (max(low, bottom) - y0) * slope, x0 + (min(high, top) - y0) * slope
         left, right = max(left, min(a, b)), min(right, max(a, b))
     first, last = int((left - MARGIN_MM - grid.x) / grid.size_mm), int((right + MARGIN_MM - grid.x) / grid.size_mm)
-    return max(first, 0), min(last, grid.columns - 1)
+    return r * grid.columns + max(first, 0), r * grid.columns + min(last, grid.columns - 1)
 
 
 @helper
@@ -107,9 +106,8 @@ def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
     for e in range(len(edges)):
         low, high = _rows(grid, edges[e, 1], edges[e, 3])
         for r in range(low, high + 1):
-            bottom = grid.y + r * grid.size_mm
-            a, b = _columns(grid, edge(edges, e), bottom - MARGIN_MM, bottom + grid.size_mm + MARGIN_MM)
-            begin[n], end[n], owner[n] = r * grid.columns + a, r * grid.columns + b, e
+            begin[n], end[n] = _cells(grid, r, edge(edges, e))
+            owner[n] = e
             n += 1
     first, items = sort_into_bins(begin, end, grid.columns * grid.rows)
     for k in range(len(items)):
@@ -120,10 +118,8 @@ def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
 @helper
 def _near(index: EdgeIndex, r: int, segment: Segment) -> tuple[int, int]:
     """Which of the items lie in the cells that a segment touches in a row: from and to."""
-    grid = index.grid
-    bottom = grid.y + r * grid.size_mm
-    a, b = _columns(grid, segment, bottom - MARGIN_MM, bottom + grid.size_mm + MARGIN_MM)
-    return (index.first[r * grid.columns + a], index.first[r * grid.columns + b + 1]) if a <= b else (0, 0)
+    a, b = _cells(index.grid, r, segment)
+    return (index.first[a], index.first[b + 1]) if a <= b else (0, 0)
 
 
 @helper

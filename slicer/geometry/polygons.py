@@ -13,6 +13,7 @@ from manifold3d import CrossSection, FillRule, JoinType, OpType
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from mdp.topology.cross_section import loop_edges
+from slicer.geometry.polyline import length_mm
 
 Polygons: TypeAlias = CrossSection
 
@@ -26,10 +27,8 @@ NEAR_MM, LEAST_MM2 = 1e-6, 1e-6  # a contour that is higher by more than this, a
 
 
 def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
-    """Loops of a section, (n, 2) mm each, as overlap-free polygons without detail too fine to print.
-
-    Slits narrower than twice closing_mm are closed.
-    """
+    """Loops of a section, (n, 2) mm each, as overlap-free polygons without detail too fine to print. Slits narrower than twice
+    closing_mm are closed."""
     if not loops:
         return Polygons()
     whole = of_contours(loops).simplify(RESOLUTION_MM)
@@ -103,11 +102,8 @@ def unite_layers(some: Sequence[Polygons], others: Sequence[Polygons]) -> list[P
 
 
 def islands(polygons: Polygons) -> list[Polygons]:
-    """The connected pieces, each with its holes.
-
-    A hole that touches the contour round it in some points is a piece of its own for manifold3d, of negative area: it belongs to
-    the piece that it lies in.
-    """
+    """The connected pieces, each with its holes. A hole that touches the contour round it in some points is a piece of its own
+    for manifold3d, of negative area: it belongs to the piece that it lies in."""
     pieces = polygons.decompose() if not polygons.is_empty() else []
     whole = [piece for piece in pieces if piece.area() > 0.0]
     for hole in pieces if len(whole) < len(pieces) else []:
@@ -137,7 +133,12 @@ def strips_beside(area: Polygons, whole: Polygons, least_mm: float) -> list[Poly
 def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
     """The upright rectangle round polygons, farther out by the reach."""
     x0, y0, x1, y1 = polygons.bounds()
-    return Polygons.square((x1 - x0 + 2.0 * reach_mm, y1 - y0 + 2.0 * reach_mm)).translate((x0 - reach_mm, y0 - reach_mm))
+    return rectangle(x0 - reach_mm, y0 - reach_mm, x1 + reach_mm, y1 + reach_mm)
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> Polygons:
+    """The upright rectangle between two corners."""
+    return Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
 
 
 def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
@@ -185,6 +186,11 @@ def start_at(loop: Floats, at: int) -> Floats:
 def close_loop(loop: Floats) -> Floats:
     """The loop with its first point repeated at the end."""
     return np.concatenate([loop, loop[:1]])
+
+
+def perimeter_mm(polygons: Polygons) -> float:
+    """Length of all contours."""
+    return float(sum(length_mm(close_loop(loop)) for loop in contours(polygons)))
 
 
 def edges(polygons: Polygons) -> Floats:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import manifold3d
 import numpy as np
 
-from mdp.kernels.arrays import flags, ints, longs, table
+from mdp.kernels.arrays import flags, ints, longs
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices, Ints
 from mdp.topology.linked_faces import opposites
@@ -29,21 +29,26 @@ class Triangulation(NamedTuple):
     piece: Indices
 
 
+@no_nrt
+def after(h: int) -> int:
+    """The next half-edge of the same triangle."""
+    return h - 2 if h % 3 == 2 else h + 1
+
+
+@no_nrt
+def before(h: int) -> int:
+    """The half-edge before in the same triangle."""
+    return h + 2 if h % 3 == 0 else h - 1
+
+
 def triangulate(pieces: Sequence[Sequence[Floats]], step_mm: float = np.inf) -> Triangulation | None:
     """The Delaunay triangulation of several polygons given by their contours (k, 2), each by itself; None where none has an area.
-
-    step_mm: sides get points so that none is longer. They are put in after the polygons have been triangulated without them,
-    which takes a fraction of the time. The result is a Delaunay triangulation; where four points lie on a circle there are two.
-    """
+    step_mm: sides get points so that none is longer, put in after the polygons have been triangulated, a fraction of the time."""
     loops = [loop for piece in pieces for loop in piece]
-    if not loops:
-        return None
     sizes = [sum(map(len, piece)) for piece in pieces]
-    begins = np.cumsum([0, *sizes])
-    apart = [
-        np.asarray(manifold3d.triangulate(list(piece))) + begin for piece, begin in zip(pieces, begins, strict=False) if piece
-    ]
-    triangles = np.concatenate(apart).astype(np.int32).reshape(-1, 3)
+    rows = zip(pieces, np.cumsum([0, *sizes]), strict=False)
+    apart = [np.asarray(manifold3d.triangulate(list(piece))) + begin for piece, begin in rows if piece]
+    triangles = np.concatenate([np.zeros((0, 3)), *apart]).astype(np.int32)
     if not len(triangles):
         return None
     points, first, between = resample(np.concatenate(loops), np.cumsum([0, *map(len, loops)]), step_mm)
@@ -53,30 +58,20 @@ def triangulate(pieces: Sequence[Sequence[Floats]], step_mm: float = np.inf) -> 
     return triangulation
 
 
-@kernel
 def resample(points: Floats, starts: Indices, step_mm: float) -> tuple[Floats, Indices, Indices]:
     """The points of loops one after the other with samples added so that no side is longer than the step.
 
     points: (n, 2); starts: (k + 1,). Returns all points (m, 2), the number of each of the loops' own points among them, and how
     many samples follow each.
     """
-    first, between = longs(len(points), 0), longs(len(points), 0)
-    size = 0
-    for loop in range(len(starts) - 1):
-        for k in range(starts[loop], starts[loop + 1]):
-            after = k + 1 if k + 1 < starts[loop + 1] else starts[loop]
-            length = np.hypot(points[after, 0] - points[k, 0], points[after, 1] - points[k, 1])
-            first[k], between[k] = size, max(int(np.ceil(length / step_mm)), 1) - 1
-            size += between[k] + 1
-    out = table(size, 2)
-    for loop in range(len(starts) - 1):
-        for k in range(starts[loop], starts[loop + 1]):
-            after = k + 1 if k + 1 < starts[loop + 1] else starts[loop]
-            for s in range(between[k] + 1):
-                share = s / (between[k] + 1)
-                for axis in range(2):
-                    out[first[k] + s, axis] = points[k, axis] + share * (points[after, axis] - points[k, axis])
-    return out, first, between
+    following = np.arange(1, len(points) + 1)
+    following[starts[1:] - 1] = starts[:-1]
+    sides = points[following] - points
+    between = np.maximum(np.ceil(np.hypot(*sides.T) / step_mm).astype(np.int64), 1) - 1
+    first = np.cumsum(between + 1) - between - 1
+    at = np.repeat(np.arange(len(points)), between + 1)
+    share = (np.arange(len(at)) - first[at]) / (between[at] + 1)
+    return points[at] + share[:, None] * sides[at], first, between
 
 
 @kernel
@@ -100,8 +95,7 @@ def _with_samples(corners: Ints, across: Ints, first: Indices, between: Indices)
     for point in range(len(first)):
         h = on_side[point]
         for k in range(between[point] if h >= 0 else 0):
-            onward = h - 2 if h % 3 == 2 else h + 1
-            back = h + 2 if h % 3 == 0 else h - 1
+            onward, back = after(h), before(h)
             tails[size], tails[size + 1], tails[size + 2] = first[point] + 1 + k, tails[onward], tails[back]
             twins[size + 1], twins[size + 2] = twins[onward], onward
             if twins[onward] >= 0:
@@ -130,9 +124,8 @@ def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
     cx, cy = points[c, 0] - x, points[c, 1] - y
     a2, b2, c2 = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
     bc, ca, ab = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
-    size = (
-        a2 * (abs(bx * cy) + abs(by * cx)) + b2 * (abs(cx * ay) + abs(cy * ax)) + c2 * (abs(ax * by) + abs(ay * bx))
-    )  # what rounding goes by (Shewchuk 1997, section 4.4): of four points on one circle no side must flip for ever
+    # what rounding goes by (Shewchuk 1997, section 4.4): of four points on one circle no side must flip for ever
+    size = a2 * (abs(bx * cy) + abs(by * cx)) + b2 * (abs(cx * ay) + abs(cy * ax)) + c2 * (abs(ax * by) + abs(ay * bx))
     return bool(a2 * bc + b2 * ca + c2 * ab > ROUNDING * size)
 
 
@@ -151,7 +144,7 @@ def _flip(triangulation: Triangulation) -> int:
         b = across[a]
         if b < 0:
             continue
-        a_prev, b_prev = a - a % 3 + (a + 2) % 3, b - b % 3 + (b + 2) % 3
+        a_prev, b_prev = before(a), before(b)
         p, q, r, s = tails[a], tails[b], tails[a_prev], tails[b_prev]
         if not _inside_circle(points, p, q, r, s):
             continue

@@ -12,14 +12,14 @@ wide, for the round sides of beads lie over each other. One count changes where 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import flags, floats, ints, longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Indices, Ints
+from mdp.overhang import Mask
 from slicer.geometry.polyline import Segment, nearest_share, orientation
-from slicer.geometry.triangulation import Triangulation
+from slicer.geometry.triangulation import Triangulation, after
 
 SLOPE = 0.2164  # sine of 12.5 deg: sides that meet at less than 25 deg enclose a place that narrows, others a corner
 OPPOSITE = -0.8  # cosine of the angle between the ways to opposite sides, at most
@@ -39,67 +39,62 @@ SAME_MM = 1e-6  # radii that differ by less are equal
 MOST_HOPS = 8  # from node to node; two that lead to each other would go on for ever
 
 
-class Skeleton(NamedTuple):
-    """m nodes. centres: (m, 2); radii: (m,) distance to the boundary; feet: (3 m, 2) the points of the boundary nearest to each.
+class Rule(NamedTuple):
+    """walls: loops from a boundary inward at most. outer, inner: nominal spacings; round: width less spacing. least, most: widths
+    of beads. All mm."""
 
-    central: (3 m,) inner sides across which the axis runs between two opposite sides of the polygon, not into a corner of it.
+    walls: int
+    outer: float
+    inner: float
+    round: float
+    least: float
+    most: float
+
+
+class Skeleton(NamedTuple):
+    """m nodes. across: (3 m,) of the triangulation; centres: (m, 2); radii: (m,) distance to the boundary.
+
+    feet: (3 m, 2) points of the boundary nearest to each; central: (3 m,) inner sides across which the axis runs between two
+    opposite sides of the polygon, not into a corner of it; beads: (m,) across each node; thick: (m,) the half thickness by which
+    these are laid, its own or that of its axis; dots: (m,) middles of round places with room for a single bead.
     """
 
+    across: Ints
     centres: Floats
     radii: Floats
     feet: Floats
-    central: NDArray[np.bool_]
-
-
-@no_nrt
-def after(h: int) -> int:
-    """The next half-edge of the same triangle."""
-    return h - 2 if h % 3 == 2 else h + 1
-
-
-@no_nrt
-def before(h: int) -> int:
-    """The half-edge before in the same triangle."""
-    return h + 2 if h % 3 == 0 else h - 1
+    central: Mask
+    beads: Ints
+    thick: Floats
+    dots: Mask
 
 
 @kernel
-def skeleton_of(triangulation: Triangulation) -> Skeleton:
-    """The skeleton of a triangulated polygon."""
+def skeleton_of(triangulation: Triangulation, rule: Rule) -> Skeleton:
+    """The skeleton of a triangulated polygon, with the beads that lie across each of its nodes."""
     points, tails, across, _ = triangulation
     following, preceding = ints(len(points), 0), ints(len(points), 0)
     for h in range(len(tails)):
         if across[h] < 0:
             following[tails[h]], preceding[tails[after(h)]] = tails[after(h)], tails[h]
     count = len(tails) // 3
-    out = Skeleton(table(count, 2), floats(count, 0.0), table(len(tails), 2), flags(len(tails)))
+    centres, radii, feet, central = table(count, 2), floats(count, 0.0), table(len(tails), 2), flags(len(tails))
+    out = Skeleton(across, centres, radii, feet, central, ints(count, 0), floats(count, 0.0), flags(count))
     for t in range(count):
         _put_at_circumcentre(triangulation, t, out)
-        centred = in_middle = False
-        while True:
-            near, far, least, most = 3 * t, 3 * t, np.inf, -1.0
-            for h in range(3 * t, 3 * t + 3):
-                away = _foot(points, (preceding[tails[h]], tails[h], following[tails[h]]), h, out)
-                if away < least:
-                    near, least = h, away
-                if away > most:
-                    far, most = h, away
-            out.radii[t] = 0.0 if in_middle else least
-            if in_middle:
-                break
-            if not centred:
-                centred = True
-                if _centre(out, (near, far), least, most):
-                    continue
-            if not _leaves(triangulation, t, out.centres[t, 0], out.centres[t, 1]):
-                break
+        near, far, least, most = _put_feet(points, tails, preceding, following, t, out)
+        if _centre(out, (near, far), least, most):
+            near, far, least, most = _put_feet(points, tails, preceding, following, t, out)
+        radii[t] = least
+        if _leaves(triangulation, t, centres[t, 0], centres[t, 1]):
             _put_in_middle(triangulation, t, out)
-            in_middle = True
+            _put_feet(points, tails, preceding, following, t, out)
+            radii[t] = 0.0
     for h in range(len(tails)):
         twin = across[h]
         if twin > h:
-            out.central[h] = 0.5 * (_slope2(out, h) + _slope2(out, twin)) < SLOPE * SLOPE
-            out.central[twin] = out.central[h]
+            central[h] = central[twin] = 0.5 * (_slope2(out, h) + _slope2(out, twin)) < SLOPE * SLOPE
+    _count_beads(out, rule)
     return out
 
 
@@ -148,28 +143,33 @@ def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
 
 
 @no_nrt
-def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -> float:
-    """Fills in the foot of a corner, on the two sides that meet there; returns how far it is from its node."""
-    x, y = out.centres[h // 3, 0], out.centres[h // 3, 1]
-    least = np.inf
-    for k in range(2):
-        a, b = around[k], around[k + 1]
-        side = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
-        share = nearest_share(side, x, y)
-        fx, fy = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
-        away = np.hypot(fx - x, fy - y)
-        if away < least - TIE_MM:
-            least = away
-            out.feet[h, 0], out.feet[h, 1] = fx, fy
-    return least
+def _put_feet(
+    points: Floats, tails: Ints, preceding: Ints, following: Ints, t: int, out: Skeleton
+) -> tuple[int, int, float, float]:
+    """Fills in the feet of a node, each on the two sides that meet in a corner of its triangle. Returns the corners with the
+    nearest and the farthest foot, and how far these are."""
+    x, y = out.centres[t, 0], out.centres[t, 1]
+    near, far, least, most = 3 * t, 3 * t, np.inf, -1.0
+    for h in range(3 * t, 3 * t + 3):
+        corner, away = tails[h], np.inf
+        for a, b in ((preceding[corner], corner), (corner, following[corner])):
+            side = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
+            share = nearest_share(side, x, y)
+            fx, fy = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
+            distance = np.hypot(fx - x, fy - y)
+            if distance < away - TIE_MM:
+                away, out.feet[h, 0], out.feet[h, 1] = distance, fx, fy
+        if away < least:
+            near, least = h, away
+        if away > most:
+            far, most = h, away
+    return near, far, least, most
 
 
 @no_nrt
 def _centre(out: Skeleton, ends: tuple[int, int], short: float, long: float) -> bool:
-    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other.
-
-    ends: the corners with the nearest and the farthest foot; short, long: how far these are. Returns whether it moved.
-    """
+    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other. ends: the
+    corners with the nearest and the farthest foot; short, long: how far these are. Returns whether it moved."""
     near, far = ends
     t = near // 3
     ax, ay = out.feet[near, 0] - out.centres[t, 0], out.feet[near, 1] - out.centres[t, 1]
@@ -189,20 +189,6 @@ def _slope2(out: Skeleton, h: int) -> float:
     bx, by = out.feet[next_side, 0] - out.centres[t, 0], out.feet[next_side, 1] - out.centres[t, 1]
     long = np.hypot(ax, ay) * np.hypot(bx, by)
     return 0.5 * (1.0 + (ax * bx + ay * by) / long) if long > 1e-12 else 1.0
-
-
-class Rule(NamedTuple):
-    """walls: loops from a boundary inward at most. outer, inner: nominal spacings; round: width less spacing.
-
-    least, most: widths of beads. All mm.
-    """
-
-    walls: int
-    outer: float
-    inner: float
-    round: float
-    least: float
-    most: float
 
 
 @no_nrt
@@ -256,108 +242,94 @@ def depth_of(rule: Rule, count: int, radius: float, level: int) -> float:
     return depth + 0.5 * spacing_of(rule, count, radius, level)
 
 
-@no_nrt
-def middle_width(rule: Rule, count: int, radius: float) -> float:
-    """Width of the bead in the middle of a place with an odd count."""
-    rest = 2.0 * radius
-    for k in range(loops_of(rule, count)):
-        rest -= 2.0 * spacing_of(rule, count, radius, k)
-    return min(max(rest, rule.least), rule.most)
-
-
-class Counts(NamedTuple):
-    """For every node: beads across it, and the half thickness by which they are laid, its own or that of its axis.
-
-    dots: the middles of round places with room for a single bead.
-    """
-
-    beads: Ints
-    radii: Floats
-    dots: NDArray[np.bool_]
+@kernel
+def middle_widths(skeleton: Skeleton, rule: Rule) -> Floats:
+    """(m,) widths of beads in the middle of places with an odd count."""
+    widths = floats(len(skeleton.radii), 0.0)
+    for t in range(len(widths)):
+        rest = 2.0 * skeleton.radii[t]
+        for k in range(loops_of(rule, skeleton.beads[t])):
+            rest -= 2.0 * spacing_of(rule, skeleton.beads[t], skeleton.radii[t], k)
+        widths[t] = min(max(rest, rule.least), rule.most)
+    return widths
 
 
 class _Pieces(NamedTuple):
-    """Connected nodes. of: (m,) piece of each node, -1: none; many: pieces; length: (p,) mm; low, high: (p,) radii."""
+    """Connected nodes. of: (m,) piece of each node, -1: none; length: (p,) mm; low, high: (p,) least and largest radius."""
 
     of: Indices
-    many: int
     length: Floats
     low: Floats
     high: Floats
 
 
-@kernel
-def count_beads(across: Ints, skeleton: Skeleton, rule: Rule) -> Counts:
-    """The counts of a skeleton; clears `central` where a limb of the axis is too short to have a count of its own."""
-    size = len(skeleton.radii)
-    beads, uniform = ints(size, 0), ints(size, 1)
-    _drop_stubs(across, skeleton, _pieces(across, skeleton, uniform), STUB * rule.inner)
-    for t in range(size):
-        beads[t] = bead_count(rule, skeleton.radii[t])
+@helper
+def _count_beads(skeleton: Skeleton, rule: Rule) -> None:
+    """Fills in the beads across each node; clears `central` where a limb of the axis is too short to have a count of its own."""
+    _drop_stubs(skeleton, _pieces(skeleton, ints(len(skeleton.radii), 1)), STUB * rule.inner)
+    for t in range(len(skeleton.radii)):
+        skeleton.beads[t] = bead_count(rule, skeleton.radii[t])
     for _ in range(ROUNDS):
-        if not _smooth(across, skeleton, rule, beads):
+        if not _smooth(skeleton, rule):
             break
-    return _spread(across, skeleton, rule, beads)
+    _spread(skeleton, rule)
 
 
 @helper
-def _pieces(across: Ints, skeleton: Skeleton, value: Ints) -> _Pieces:
+def _pieces(skeleton: Skeleton, value: Ints) -> _Pieces:
     """The pieces of the central axis with one value."""
-    size = len(skeleton.radii)
+    across, centres, radii = skeleton.across, skeleton.centres, skeleton.radii
+    size = len(radii)
     of, stack = longs(size, -1), longs(size, 0)
     length, low, high = floats(size, 0.0), floats(size, np.inf), floats(size, 0.0)
-    many = 0
+    count = 0
     for seed in range(size):
         if of[seed] >= 0 or not _on_axis(skeleton, seed):
             continue
-        of[seed], stack[0], waiting = many, seed, 1
+        of[seed], stack[0], waiting = count, seed, 1
         while waiting > 0:
             waiting -= 1
             t = stack[waiting]
-            low[many], high[many] = min(low[many], skeleton.radii[t]), max(high[many], skeleton.radii[t])
+            low[count], high[count] = min(low[count], radii[t]), max(high[count], radii[t])
             for h in range(3 * t, 3 * t + 3):
                 beyond = across[h] // 3
                 if skeleton.central[h]:
-                    step = 0.5 * np.hypot(
-                        skeleton.centres[t, 0] - skeleton.centres[beyond, 0], skeleton.centres[t, 1] - skeleton.centres[beyond, 1]
-                    )
-                    length[many] += step
+                    length[count] += 0.5 * np.hypot(centres[t, 0] - centres[beyond, 0], centres[t, 1] - centres[beyond, 1])
                     if value[beyond] == value[t] and of[beyond] < 0:
-                        of[beyond], stack[waiting] = many, beyond
+                        of[beyond], stack[waiting] = count, beyond
                         waiting += 1
-        many += 1
-    return _Pieces(of, many, length, low, high)
+        count += 1
+    return _Pieces(of, length[:count], low[:count], high[:count])
 
 
 @helper
-def _drop_stubs(across: Ints, skeleton: Skeleton, pieces: _Pieces, shortest: float) -> None:
+def _drop_stubs(skeleton: Skeleton, pieces: _Pieces, shortest: float) -> None:
     """Short pieces from which a thicker place goes on are none, nor is a mere point, the middle of something round."""
-    rises = flags(pieces.many)
-    for h in range(len(across)):
-        piece = pieces.of[h // 3]
-        if across[h] >= 0 and piece >= 0 and pieces.of[across[h] // 3] < 0:
-            rises[piece] = rises[piece] or skeleton.radii[across[h] // 3] > pieces.high[piece]
-    for h in range(len(across)):
+    rises = flags(len(pieces.length))
+    for h in range(len(skeleton.across)):
+        piece, beyond = pieces.of[h // 3], skeleton.across[h] // 3
+        if beyond >= 0 and piece >= 0 and pieces.of[beyond] < 0 and skeleton.radii[beyond] > pieces.high[piece]:
+            rises[piece] = True
+    for h in range(len(skeleton.across)):
         piece = pieces.of[h // 3]
         if piece >= 0 and pieces.length[piece] < (shortest if rises[piece] else POINT * pieces.high[piece]):
             skeleton.central[h] = False
 
 
 @helper
-def _smooth(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> bool:
+def _smooth(skeleton: Skeleton, rule: Rule) -> bool:
     """Short stretches take the count of the longest neighbour that suits their thickness; whether any did."""
-    pieces = _pieces(across, skeleton, beads)
-    best, longest = longs(pieces.many, -1), floats(pieces.many, 0.0)
-    for h in range(len(across)):
-        piece = pieces.of[h // 3]
-        if not skeleton.central[h] or pieces.length[piece] > FLICKER * rule.inner:
+    beads, pieces = skeleton.beads, _pieces(skeleton, skeleton.beads)
+    best, longest = longs(len(pieces.length), -1), floats(len(pieces.length), 0.0)
+    for h in range(len(skeleton.across)):
+        piece, beyond = pieces.of[h // 3], skeleton.across[h] // 3
+        if not skeleton.central[h] or pieces.length[piece] > FLICKER * rule.inner or beads[beyond] == beads[h // 3]:
             continue
-        next_piece = pieces.of[across[h] // 3]
-        count = beads[across[h] // 3]
-        if count == beads[h // 3] or pieces.length[next_piece] <= max(longest[piece], pieces.length[piece]):
-            continue
-        if _suits(rule, count, pieces.low[piece], pieces.high[piece]):
-            best[piece], longest[piece] = count, pieces.length[next_piece]
+        length = pieces.length[pieces.of[beyond]]
+        if length > max(longest[piece], pieces.length[piece]) and _suits(
+            rule, beads[beyond], pieces.low[piece], pieces.high[piece]
+        ):
+            best[piece], longest[piece] = beads[beyond], length
     changed = False
     for t in range(len(beads)):
         piece = pieces.of[t]
@@ -373,8 +345,7 @@ def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
         return False
     rest_low, rest_high = 2.0 * low - rule.round, 2.0 * high - rule.round
     for level in range((count - 1) // 2):
-        taken = 2.0 * (rule.outer if level == 0 else rule.inner)
-        rest_low, rest_high = rest_low - taken, rest_high - taken
+        rest_low, rest_high = rest_low - 2.0 * nominal(rule, level), rest_high - 2.0 * nominal(rule, level)
     share = 1.0 if count % 2 else 0.5
     if count == 2 * rule.walls + 2:
         return rest_low > rule.inner
@@ -382,21 +353,16 @@ def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
 
 
 @helper
-def _spread(across: Ints, skeleton: Skeleton, rule: Rule, beads: Ints) -> Counts:
-    """Corners and what lies between parts of the axis belong to the thickest place that they lead up to.
-
-    A round place has no axis, only a thickest point, and so no bead in the middle.
-    """
-    root, dots = _roots(across, skeleton), flags(len(beads))
+def _spread(skeleton: Skeleton, rule: Rule) -> None:
+    """Corners and what lies between parts of the axis belong to the thickest place that they lead up to. A round place has no
+    axis, only a thickest point, and so no bead in the middle."""
+    root, beads = _roots(skeleton), skeleton.beads
     for t in range(len(root)):
         if root[t] == t and beads[t] % 2 and not _on_axis(skeleton, t):
-            dots[t] = beads[t] == 1 and skeleton.radii[t] < rule.least
-            beads[t] = beads[t] - 1 if beads[t] > 1 else 2 - int(dots[t])
-    radii = floats(len(root), 0.0)
+            skeleton.dots[t] = beads[t] == 1 and skeleton.radii[t] < rule.least
+            beads[t] = beads[t] - 1 if beads[t] > 1 else 2 - int(skeleton.dots[t])
     for t in range(len(root)):
-        radii[t] = skeleton.radii[root[t]]
-        beads[t] = beads[root[t]]
-    return Counts(beads, radii, dots)
+        skeleton.thick[t], beads[t] = skeleton.radii[root[t]], beads[root[t]]
 
 
 @no_nrt
@@ -405,9 +371,9 @@ def _on_axis(skeleton: Skeleton, t: int) -> bool:
 
 
 @helper
-def _roots(across: Ints, skeleton: Skeleton) -> Indices:
+def _roots(skeleton: Skeleton) -> Indices:
     """(m,) the node on the axis, or the thickest one, to which the way up from each node leads."""
-    radii = skeleton.radii
+    across, radii = skeleton.across, skeleton.radii
     falling, root, hop = floats(len(radii), 0.0), longs(len(radii), -1), longs(len(radii), -1)
     for t in range(len(radii)):
         falling[t] = -radii[t]

@@ -13,39 +13,36 @@ take what is left, so widths change with the thickness, and where they would get
       |( 0 )( 1 )( 1 )( 0 )|      4   loops 0 and 1
 
 The boundary is sampled and triangulated, the circumcentres of the triangles are the skeleton, every node of which gets a count
-that does not flicker to and fro. Loops run round the places that have room for their level, lines along the skeleton where the
-count is odd. Widths are smoothed where counts change, and lines that lie alone are kept inside the place.
+that does not flicker to and fro. Loops run round the places that have room for their level: the triangles there make areas of the
+triangulation, and walking round an area from corner to corner, a loop lies on the rib of each, at the depth of its level. Where
+the walk turns back at the axis, the loop crosses it: it is closed whatever the shape (this takes the place of the stitching of
+section 3.4). Lines run along the skeleton where the count is odd. Widths are smoothed where counts change, and lines that lie
+alone are kept inside the place.
 """
 
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
-from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import flags, longs, table
+from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices, Ints
+from mdp.overhang import Mask
 from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
-from slicer.geometry.polygons import Polygons, contours
-from slicer.geometry.polyline import length_mm
-from slicer.geometry.triangulation import triangulate
-from slicer.walls.loops import TRANSITION, corners, lay_loops, smoothed
-from slicer.walls.skeleton import (
-    FEATURE,
-    Counts,
-    Rule,
-    Skeleton,
-    count_beads,
-    depth_of,
-    loops_of,
-    middle_width,
-    skeleton_of,
-    spacing_of,
-)
+from slicer.geometry.polygons import RESOLUTION_MM, Polygons, close_loop, contours
+from slicer.geometry.polyline import Segment, along_mm, length_mm, nearest_share
+from slicer.geometry.triangulation import Triangulation, after, before, triangulate
+from slicer.walls.skeleton import FEATURE, Rule, Skeleton, depth_of, loops_of, middle_widths, skeleton_of, spacing_of
 
+MITRE = 100.0  # deg: round a sharper corner of a hole the loop is cut off
+SMOOTH = 0.05  # radians: no mitre for less
+PER_CORNER = 3  # points that a corner of a triangle gives at most: that on its rib, and two of a mitre
+WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
+SHORTEST = 1.0  # nominal spacings: a shorter loop is none
+TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
 STEP = 0.42  # nominal spacings: sampling of the boundary
 DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
 DASH = 0.25  # of its width, and as much longer
@@ -58,10 +55,8 @@ ABUT = 0.45  # of a bead's width: a line ends so far from the middle of a bead t
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """course: (n, 3) x, y and width; level: 0 outermost; closed: it runs round, and its course ends where it begins.
-
-    free: sides on which no bead lies beside it; piece: the number of the polygons that it lies in.
-    """
+    """course: (n, 3) x, y and width; level: 0 outermost; closed: it runs round, and its course ends where it begins. free: sides
+    on which no bead lies beside it; piece: the number of the polygons that it lies in."""
 
     course: Floats
     level: int
@@ -80,18 +75,17 @@ def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
     triangulation = triangulate([contours(piece) for piece in pieces], STEP * rule.inner)
     if triangulation is None:
         return []
-    skeleton = skeleton_of(triangulation)
-    counts = count_beads(triangulation.across, skeleton, rule)
+    skeleton = skeleton_of(triangulation, rule)
     piece_of = triangulation.piece[triangulation.tails[::3]]
     walls: list[Wall] = []
     for level in range(rule.walls):
-        courses, starts, node = lay_loops(triangulation, skeleton, counts, rule, level)
+        ribs, starts, node = trace_loops(triangulation, skeleton, rule, level)
         if not len(node):
             break
-        loops = zip(pairwise(starts.tolist()), piece_of[node].tolist(), strict=True)
-        walls += [Wall(courses[a:b], level, True, int(level == 0), piece) for (a, b), piece in loops]
-    chains = trace_chains(triangulation.across, skeleton, counts, rule)
-    middle = lines_along(chains, rule, piece_of) + _dots(skeleton, counts, rule, piece_of)
+        for (a, b), piece in zip(pairwise(starts.tolist()), piece_of[node].tolist(), strict=True):
+            course = _loop(ribs[a:b], rule, level)
+            walls += [Wall(course, level, True, int(level == 0), piece)] if len(course) else []
+    middle = lines_along(skeleton, rule, piece_of) + _dots(skeleton, rule, piece_of)
     borders = {piece: index_edges(pieces[piece]) for piece in {wall.piece for wall in middle if wall.level == 0}}
     middle = [wall if wall.level else _clipped(wall, borders[wall.piece], rule) for wall in middle]
     walls += [replace(wall, course=wall.course[corners(wall.course)]) for wall in middle if len(wall.course) > 1]
@@ -99,95 +93,174 @@ def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
     return sorted(laid, key=lambda wall: wall.piece)
 
 
-class Chains(NamedTuple):
-    """courses: (n, 3) x, y and width; starts: (k + 1,) where each chain begins; levels: (k,) loops on both sides of it.
-
-    ends: (k, 2) nodes; forks: (k, 2) whether more chains meet there; taken: (k, 2) mm that a loop across that end takes of it.
-    """
-
-    courses: Floats
-    starts: Indices
-    levels: Indices
-    ends: Indices
-    forks: Indices
-    taken: Floats
+def _loop(ribs: Floats, rule: Rule, level: int) -> Floats:
+    """The course (n, 3) of a loop, its widths smoothed where counts change; empty where it is too short."""
+    feet, ways, (reach, depth, spacing) = ribs[:, :2], ribs[:, 2:4], ribs[:, 4:].T.copy()
+    line, reach_mm = feet + ways * depth[:, None], TRANSITION * rule.inner
+    if length_mm(close_loop(line)) < SHORTEST * rule.inner:
+        return np.zeros((0, 3))
+    deep = np.minimum(smoothed(line, depth, reach_mm, True), reach)
+    width = smoothed(line, spacing, reach_mm, True) + rule.round if level else 2.0 * deep
+    course: Floats = close_loop(np.column_stack([feet + ways * deep[:, None], width]))
+    return np.asarray(course[corners(course)])
 
 
 @kernel
-def trace_chains(across: Ints, skeleton: Skeleton, counts: Counts, rule: Rule) -> Chains:
-    """The chains of nodes between forks and ends, then the rings."""
-    size = len(skeleton.radii)
-    degree, done = longs(size, 0), flags(len(across))
-    for h in range(len(across)):
-        if _joined(across, skeleton, counts, h):
-            degree[h // 3] += 1
-    room = 2 * size + 2
-    ends, forks = longs(2 * room, 0).reshape(room, 2), longs(2 * room, 0).reshape(room, 2)
-    out = Chains(table(2 * room, 3), longs(room, 0), longs(room, 0), ends, forks, table(room, 2))
-    n = many = 0
-    for rings in range(2):
-        for first in range(len(across)):
-            if done[first] or (rings == 0 and degree[first // 3] == 2) or not _joined(across, skeleton, counts, first):
-                continue
-            h = first
-            n = _add(skeleton, counts, rule, h // 3, out, n)
-            while True:
-                done[h] = done[across[h]] = True
-                back, t = across[h], across[h] // 3
-                n = _add(skeleton, counts, rule, t, out, n)
-                if degree[t] != 2 or t == first // 3:
-                    break
-                for k in range(3 * t, 3 * t + 3):
-                    if k != back and _joined(across, skeleton, counts, k):
-                        h = k
-            out.levels[many] = loops_of(rule, counts.beads[t])
-            for k in range(2):
-                node = t if k else first // 3
-                out.ends[many, k], out.forks[many, k] = node, int(degree[node] > 2)
-                out.taken[many, k] = _taken(across, skeleton, counts, rule, node)
-            many += 1
-            out.starts[many] = n
-    levels, ends, forks, taken = out.levels[:many], out.ends[:many], out.forks[:many], out.taken[:many]
-    return Chains(out.courses[:n], out.starts[: many + 1], levels, ends, forks, taken)
+def trace_loops(triangulation: Triangulation, skeleton: Skeleton, rule: Rule, level: int) -> tuple[Floats, Indices, Indices]:
+    """The loops of a level, 0 outermost, as the ribs that they cross.
+
+    Returns ribs (n, 7): x and y of the foot, what is added to it for every mm of depth, half the thickness, and depth and spacing
+    of the loop there; where each loop begins (k + 1,) and the first triangle of each (k,).
+    """
+    across, radii = triangulation.across, skeleton.radii
+    depth, active, seen = floats(len(radii), 0.0), flags(len(radii)), flags(3 * len(radii))
+    room = 0
+    for t in range(len(radii)):
+        if loops_of(rule, skeleton.beads[t]) > level:
+            depth[t] = depth_of(rule, skeleton.beads[t], skeleton.thick[t], level)
+            active[t] = radii[t] > depth[t]
+            room += 3 * PER_CORNER if active[t] else 0
+    ribs, starts, node = table(room, 7), longs(room + 1, 0), longs(room, 0)
+    n = loops = 0
+    for start in range(3 * len(radii)):
+        if seen[start] or not active[start // 3]:
+            continue
+        h = start
+        while not seen[h]:
+            seen[h] = True
+            t, twin, begun = h // 3, across[h], n
+            n = _rib(triangulation, skeleton, h, ribs, n)
+            if twin >= 0 and active[twin // 3]:
+                n = _turn(triangulation, skeleton, (h, after(twin)), ribs, n)
+                h = after(twin)
+            else:
+                if twin >= 0:
+                    room_there = loops_of(rule, skeleton.beads[twin // 3]) > level
+                    n = _cross(skeleton, (t, twin // 3), depth[t], room_there, ribs, n)
+                h = after(h)
+            for k in range(begun, n):
+                ribs[k, 5], ribs[k, 6] = depth[t], spacing_of(rule, skeleton.beads[t], skeleton.thick[t], level)
+        node[loops] = start // 3
+        loops += 1
+        starts[loops] = n
+    return ribs[:n], starts[: loops + 1], node[:loops]
 
 
 @no_nrt
-def _joined(across: Ints, skeleton: Skeleton, counts: Counts, h: int) -> bool:
-    """Whether a line runs across an inner side."""
-    if across[h] < 0 or not skeleton.central[h]:
-        return False
-    count = counts.beads[h // 3]
-    return bool(count % 2 == 1 and counts.beads[across[h] // 3] == count)
-
-
-@no_nrt
-def _add(skeleton: Skeleton, counts: Counts, rule: Rule, t: int, out: Chains, n: int) -> int:
-    out.courses[n, 0], out.courses[n, 1] = skeleton.centres[t, 0], skeleton.centres[t, 1]
-    out.courses[n, 2] = middle_width(rule, counts.beads[t], skeleton.radii[t])
+def _add(ribs: Floats, n: int, foot: tuple[float, float], way: tuple[float, float], reach: float) -> int:
+    ribs[n, 0], ribs[n, 1] = foot
+    ribs[n, 2], ribs[n, 3] = way
+    ribs[n, 4] = reach
     return n + 1
 
 
 @no_nrt
-def _taken(across: Ints, skeleton: Skeleton, counts: Counts, rule: Rule, t: int) -> float:
-    """How much of a line the loop takes that runs across its end, where more beads lie side by side beyond it."""
-    taken, level = 0.0, loops_of(rule, counts.beads[t])
-    for h in range(3 * t, 3 * t + 3):
-        next_node = across[h] // 3
-        if across[h] >= 0 and loops_of(rule, counts.beads[next_node]) > level:
-            width = spacing_of(rule, counts.beads[next_node], counts.radii[next_node], level) + rule.round
-            depth = depth_of(rule, counts.beads[next_node], counts.radii[next_node], level)
-            beyond = np.sqrt(max(depth * depth - skeleton.radii[t] * skeleton.radii[t], 0.0))
-            taken = max(taken, ABUT * width - beyond)
+def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, ribs: Floats, n: int) -> int:
+    """Adds the place on the rib of a corner; in the tip of a triangle in a corner of the polygon, that on its bisector."""
+    points, tails, across, _ = triangulation
+    x, y = skeleton.centres[h // 3, 0], skeleton.centres[h // 3, 1]
+    fx, fy, reach = skeleton.feet[h, 0], skeleton.feet[h, 1], skeleton.radii[h // 3]
+    if across[h] < 0 and across[before(h)] < 0:
+        fx, fy = points[tails[h], 0], points[tails[h], 1]
+        return _add(ribs, n, (fx, fy), ((x - fx) / reach, (y - fy) / reach), reach)
+    long = np.hypot(x - fx, y - fy)
+    return _add(ribs, n, (fx, fy), ((x - fx) / long, (y - fy) / long), long)
+
+
+@no_nrt
+def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], ribs: Floats, n: int) -> int:
+    """Adds the mitre between two ribs from one point, where the polygon's outline turns into it."""
+    points, tails, _, _ = triangulation
+    a, b = corners
+    p = tails[b]
+    ax, ay = skeleton.centres[a // 3, 0] - skeleton.feet[a, 0], skeleton.centres[a // 3, 1] - skeleton.feet[a, 1]
+    bx, by = skeleton.centres[b // 3, 0] - skeleton.feet[b, 0], skeleton.centres[b // 3, 1] - skeleton.feet[b, 1]
+    cross, along = ax * by - ay * bx, ax * bx + ay * by
+    if cross > 0.0 or np.arctan2(cross, along) > -SMOOTH:
+        return n
+    turn = np.arctan2(cross, along)
+    reach = min(np.hypot(ax, ay), np.hypot(bx, by))
+    begin = np.arctan2(ay, ax)
+    many = int(np.ceil(abs(np.degrees(turn)) / MITRE))
+    for k in range(many):
+        angle = begin + turn * (k + 0.5) / many
+        stretch = 1.0 / np.cos(0.5 * turn / many)
+        n = _add(ribs, n, (points[p, 0], points[p, 1]), (stretch * np.cos(angle), stretch * np.sin(angle)), reach / stretch)
+    return n
+
+
+@no_nrt
+def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, ribs: Floats, n: int) -> int:
+    """Adds the place where the loop crosses the axis on the way to a node beyond it."""
+    t, beyond = nodes
+    here, there = skeleton.radii[t], skeleton.radii[beyond]
+    x, y = skeleton.centres[beyond, 0], skeleton.centres[beyond, 1]
+    back_x, back_y = skeleton.centres[t, 0] - x, skeleton.centres[t, 1] - y
+    share = 0.0 if there >= depth else (depth - there) / (here - there)
+    if not room_there:  # halfway, but no farther than the loop is deep: a node may lie on the other side of a hall
+        away = np.hypot(back_x, back_y)
+        share = max(share, 0.5 if away <= 2.0 * depth else depth / away)
+    return _add(ribs, n, (x + share * back_x, y + share * back_y), (0.0, 0.0), there + share * (here - there))
+
+
+@kernel
+def _trace_chains(across: Ints, joined: Mask, degree: Indices) -> tuple[Indices, Indices]:
+    """The nodes of all chains between forks and ends, then of the rings, and where each chain begins (k + 1,). joined: (3 m,)
+    inner sides that a line runs across; degree: (m,) how many of them a node has."""
+    done, nodes, starts = flags(len(across)), longs(2 * len(across) + 2, 0), longs(len(across) + 1, 0)
+    n = count = 0
+    for rings in range(2):
+        for first in range(len(across)):
+            if done[first] or (rings == 0 and degree[first // 3] == 2) or not joined[first]:
+                continue
+            h, nodes[n] = first, first // 3
+            n += 1
+            while True:
+                done[h] = done[across[h]] = True
+                back, t = across[h], across[h] // 3
+                nodes[n] = t
+                n += 1
+                if degree[t] != 2 or t == first // 3:
+                    break
+                for k in range(3 * t, 3 * t + 3):
+                    if k != back and joined[k]:
+                        h = k
+            count += 1
+            starts[count] = n
+    return nodes[:n], starts[: count + 1]
+
+
+@kernel
+def _taken(skeleton: Skeleton, rule: Rule, nodes: Indices) -> Floats:
+    """(k,) mm that the loop takes of a line across whose end, a node, it runs, where more beads lie side by side beyond."""
+    taken: Floats = floats(len(nodes), 0.0)
+    for k in range(len(nodes)):
+        t = nodes[k]
+        level = loops_of(rule, skeleton.beads[t])
+        for h in range(3 * t, 3 * t + 3):
+            beyond = skeleton.across[h] // 3
+            if beyond >= 0 and loops_of(rule, skeleton.beads[beyond]) > level:
+                width = spacing_of(rule, skeleton.beads[beyond], skeleton.thick[beyond], level) + rule.round
+                depth = depth_of(rule, skeleton.beads[beyond], skeleton.thick[beyond], level)
+                aside = np.sqrt(max(depth * depth - skeleton.radii[t] * skeleton.radii[t], 0.0))
+                taken[k] = max(taken[k], ABUT * width - aside)
     return taken
 
 
-def lines_along(chains: Chains, rule: Rule, piece_of: Indices) -> list[Wall]:
-    """The beads along chains: at every fork the two joined that go on most straightly, the ends cut back where a bead runs across
-    them."""
-    courses = {k: chains.courses[a:b] for k, (a, b) in enumerate(pairwise(chains.starts))}
-    ends, taken = chains.ends.copy(), chains.taken.copy()
+def lines_along(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]:
+    """The beads along the skeleton where the count is odd: at every fork the two lines joined that go on most straightly, the
+    ends cut back where a bead runs across them."""
+    count, beyond = np.repeat(skeleton.beads, 3), skeleton.across // 3
+    joined = (beyond >= 0) & skeleton.central & (count % 2 == 1) & (skeleton.beads[beyond] == count)
+    degree = np.bincount(np.flatnonzero(joined) // 3, minlength=len(skeleton.beads))
+    nodes, starts = _trace_chains(skeleton.across, joined, degree)
+    points = np.column_stack([skeleton.centres, middle_widths(skeleton, rule)])
+    courses = {k: points[nodes[a:b]] for k, (a, b) in enumerate(pairwise(starts))}
+    ends = np.column_stack([nodes[starts[:-1]], nodes[starts[1:] - 1]])
+    levels = np.minimum(skeleton.beads[ends[:, 1]] // 2, rule.walls)
+    taken = _taken(skeleton, rule, ends.ravel()).reshape(-1, 2)
     at: defaultdict[int, list[int]] = defaultdict(list)
-    for k, side in np.argwhere(chains.forks).tolist():
+    for k, side in np.argwhere(degree[ends] > 2).tolist():
         at[ends[k, side]].append(k)
     for node in sorted(at):
         members = at[node]
@@ -200,7 +273,7 @@ def lines_along(chains: Chains, rule: Rule, piece_of: Indices) -> list[Wall]:
         closed = bool(ends[k, 0] == ends[k, 1])
         course = course if closed else _cut_back(_cut_back(course, taken[k, 0])[::-1], taken[k, 1])[::-1]
         if len(course) > 1:
-            walls.append(_along(course, int(chains.levels[k]), closed, rule, int(piece_of[ends[k, 0]])))
+            walls.append(_along(course, int(levels[k]), closed, rule, int(piece_of[ends[k, 0]])))
     return walls
 
 
@@ -232,7 +305,7 @@ def _cut_back(course: Floats, taken_mm: float) -> Floats:
     """A line without what is taken of its beginning."""
     if taken_mm <= 0.0 or not len(course):
         return course
-    done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(course[:, :2], axis=0).T))])
+    done = along_mm(course)
     if done[-1] <= taken_mm:
         return course[:0]
     first = int(np.searchsorted(done, taken_mm, side="right")) - 1
@@ -256,10 +329,10 @@ def _along(line: Floats, level: int, closed: bool, rule: Rule, piece: int) -> Wa
     return Wall(course, level, closed, 2 * int(level == 0), piece)
 
 
-def _dots(skeleton: Skeleton, counts: Counts, rule: Rule, piece_of: Indices) -> list[Wall]:
+def _dots(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]:
     """The dashes in round places with room for a single bead."""
     dashes, last = list[Wall](), np.full(2, np.inf)
-    nodes = np.flatnonzero(counts.dots)
+    nodes = np.flatnonzero(skeleton.dots)
     for t in nodes[np.argsort(piece_of[nodes], kind="stable")].tolist():
         centre, radius = skeleton.centres[t], float(skeleton.radii[t])
         if float(np.hypot(*(centre - last))) > radius:
@@ -298,7 +371,7 @@ def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
     """The first and the last point of a line (n, 2) with that much room that has its bead; last < first: none has."""
     if room.min() > rule.least - SLACK_MM:
         return 0, len(room) - 1
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    along = along_mm(points)
     fits = np.flatnonzero(room > rule.least - SLACK_MM)
     narrow = np.flatnonzero(room <= FEATURE * rule.least - SLACK_MM)
     if not len(fits):
@@ -313,3 +386,64 @@ def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
         begin if along[first] - along[begin] > THIN * rule.least else first,
         end if along[end] - along[last] > THIN * rule.least else last,
     )
+
+
+@kernel
+def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> Floats:
+    """(n,) means of values over all of a polyline (n, 2) within the reach on both sides; closed: it goes on from its end."""
+    out, n = values.copy(), len(points)
+    low, high = values[0], values[0]
+    for k in range(n):
+        low, high = min(low, values[k]), max(high, values[k])
+    if high - low < 1e-6:
+        return out
+    steps = floats(n, 0.0)  # from each point to the next
+    for k in range(n):
+        after = (k + 1) % n
+        steps[k] = np.hypot(points[after, 0] - points[k, 0], points[after, 1] - points[k, 1])
+    for k in range(n):
+        total, weight = 0.0, 0.0
+        for sense in (-1, 1):
+            left, i = reach_mm, k
+            for _ in range(n):
+                j = i + sense
+                if j < 0 or j >= n:
+                    if not closed:
+                        break
+                    j = (j + n) % n
+                step = steps[i] if sense > 0 else steps[j]
+                part = min(step, left)
+                share = part / step if step > 0.0 else 0.0
+                total += part * (values[i] + 0.5 * share * (values[j] - values[i]))
+                weight += part
+                left -= part
+                i = j
+                if left <= 0.0:
+                    break
+        out[k] = total / weight if weight > 0.0 else values[k]
+    return out
+
+
+@kernel
+def corners(course: Floats) -> Mask:
+    """(n,) points of a course (n, 3) that a wall keeps when it is simplified in place and in width (Douglas and Peucker 1973)."""
+    keep = flags(len(course))
+    keep[0], keep[len(course) - 1] = True, True
+    stack = [(0, len(course) - 1)]
+    while len(stack):
+        a, b = stack.pop()
+        chord = Segment(course[a, 0], course[a, 1], course[b, 0], course[b, 1])
+        worst, at = 1.0, -1
+        for k in range(a + 1, b):
+            x, y = course[k, 0], course[k, 1]
+            share = nearest_share(chord, x, y)
+            dx, dy = x - chord.x0 - share * (chord.x1 - chord.x0), y - chord.y0 - share * (chord.y1 - chord.y0)
+            wider = (course[a, 2] + share * (course[b, 2] - course[a, 2]) - course[k, 2]) / WIDTH_STEP_MM
+            far = max((dx * dx + dy * dy) / (RESOLUTION_MM * RESOLUTION_MM), wider * wider)
+            if far > worst:
+                worst, at = far, k
+        if at >= 0:
+            keep[at] = True
+            stack.append((a, at))
+            stack.append((at, b))
+    return keep

@@ -14,8 +14,9 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, least_width_mm, mean_width_mm, outer_wall_width_mm, spacing_mm, varying
-from slicer.geometry.polygons import Polygons, contours, islands, larger, offset, offset_round, opening, strips
-from slicer.geometry.polyline import length_mm
+from slicer.geometry.edge_index import EdgeIndex, depths, index_edges
+from slicer.geometry.polygons import Polygons, area_mm2, contours, islands, larger, offset, offset_round, opening, strips, union
+from slicer.geometry.polyline import along_mm, length_mm
 from slicer.paths import Kind
 from slicer.walls.skeleton import ROOM, SPLIT, Rule
 from slicer.walls.variable import Wall, variable_walls
@@ -32,6 +33,8 @@ LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empt
 MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie beside each other
 LEAST_TOP = 3.0  # line widths: narrower tops keep their walls, as in OrcaSlicer
 ROUNDS = 50  # beads round a place at most: as many as walls
+SPREAD = 0.25  # share by which the distance of points of fuzzy walls varies
+FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays even, or nothing would be left of it
 SHORTEST = 0.25  # of the line width: what is shorter is no bead
 FEW = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
 MOST_WIDER = 1.3  # times as wide as its place is a bead, at most, to make up for the tips of the place that it does not reach
@@ -131,9 +134,7 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
 
 def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, behind_mm: float, least_mm: float) -> Polygons:
     """The part of the centreline of an area's outermost bead that has the core behind it: all, where no rest is at least so wide.
-
-    half: reach of the bead outward from its centreline; behind: distance from the centreline to the core.
-    """
+    half: reach of the bead outward from its centreline; behind: distance from the centreline to the core."""
     if area.is_empty():
         return line
     rest = area - offset(core, half_mm + behind_mm + SLACK_MM, BLUNT)
@@ -153,10 +154,8 @@ def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polyg
 
 
 def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> list[Bead]:
-    """Beads that fill places between other beads, which cover their round sides, with their area times height of plastic.
-
-    They are as wide as the place. What is narrower than LEAST_GAP of a line stays empty.
-    """
+    """Beads that fill places between other beads, which cover their round sides, with their area times height of plastic. They
+    are as wide as the place. What is narrower than LEAST_GAP of a line stays empty."""
     spacing, widest_mm = spacing_mm(line_width_mm, height_mm), MOST_WIDTH * line_width_mm
     rule = Rule(ROUNDS, MOST_WIDTH / SPLIT * spacing, spacing, 0.0, LEAST_GAP * line_width_mm, spacing_mm(widest_mm, height_mm))
     filled = [place for place in places if not place.is_empty()]
@@ -173,10 +172,46 @@ def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> 
 
 
 def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float, few: float = FEW) -> Polygons:
-    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it.
-
-    few: of the width squared; smaller places are left out.
-    """
+    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it. few: of the width squared;
+    smaller places are left out."""
     few_mm2 = few * width_mm**2
     rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
     return larger(opening(larger(rest, few_mm2), 0.5 * LEAST_GAP * width_mm), few_mm2)
+
+
+def fuzzy_walls(beads: Sequence[Bead], process: Process, joints: Sequence[Polygons], seed: tuple[int, int]) -> list[Bead]:
+    """The beads of a layer, begun at their seams, with fuzzy skin: walls whose points are moved at random hide the layers.
+
+    A wall is sampled anew at random distances, and every point moved across it, as PrusaSlicer does (PerimeterGenerator.cpp,
+    fuzzy_polygon). It begins and ends where it did, so seams stay hidden. joints: the areas of other parts in this layer and its
+    neighbours, beside which walls stay as they are; seed: numbers of part and layer, so that any number of cores gives the same.
+    """
+    reach_mm = process.line_width_mm + process.fuzzy_skin_thickness_mm
+    even = index_edges(offset(union(joints), reach_mm) if joints else Polygons())
+    rough = list(beads)
+    for k, bead in enumerate(beads):
+        is_outside = bead.kind is Kind.OUTER_WALL and (process.fuzzy_skin != "external" or area_mm2(bead.points) > 0.0)
+        if not bead.line and (is_outside or (bead.kind is Kind.INNER_WALL and process.fuzzy_skin == "allwalls")):
+            rough[k] = replace(bead, points=_roughened(bead.points, process, even, (*seed, k)))
+    return rough
+
+
+def _roughened(points: Floats, process: Process, even: EdgeIndex, seed: tuple[int, ...]) -> Floats:
+    """A wall (n, 2) sampled anew outside the area, given by its edges, in which it stays as it is."""
+    random, apart_mm = np.random.default_rng(seed), process.fuzzy_skin_point_distance_mm
+    steps, along = np.diff(points, axis=0), along_mm(points)
+    most = int(along[-1] / ((1.0 - SPREAD) * apart_mm)) + 1
+    sampled = np.cumsum(apart_mm * random.uniform(1.0 - SPREAD, 1.0 + SPREAD, most))
+    sampled = sampled[sampled < along[-1] - (1.0 - SPREAD) * apart_mm]
+    if len(sampled) < FEWEST:
+        return points
+    moved_mm = process.fuzzy_skin_thickness_mm * random.uniform(-1.0, 1.0, len(sampled))
+    step = np.minimum(np.searchsorted(along, sampled, side="right") - 1, len(steps) - 1)
+    lengths = np.maximum(np.diff(along), 1e-9)
+    tangent = steps[step] / lengths[step, None]
+    at = points[step] + (sampled - along[step])[:, None] * tangent
+    rough = at + moved_mm[:, None] * np.column_stack([tangent[:, 1], -tangent[:, 0]])
+    stays, goes = depths(points, even) > 0.0, depths(at, even) <= 0.0
+    stays[[0, -1]] = True
+    order = np.argsort(np.concatenate([along[stays], sampled[goes]]), kind="stable")
+    return np.ascontiguousarray(np.concatenate([points[stays], rough[goes]])[order])

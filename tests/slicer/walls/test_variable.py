@@ -20,9 +20,8 @@ from slicer.paths import Kind
 from slicer.shells import wall_beads
 from slicer.slice import slice_part
 from slicer.strokes.strokes import in_pieces, strokes_of
-from slicer.walls.loops import lay_loops
-from slicer.walls.skeleton import FEATURE, count_beads, skeleton_of
-from slicer.walls.variable import STEP, Wall, variable_walls
+from slicer.walls.skeleton import FEATURE, skeleton_of
+from slicer.walls.variable import STEP, Wall, trace_loops, variable_walls
 from slicer.walls.walls import bead_rule, layer_walls
 from tests.shapes import from_manifold
 from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, rows_of, volume_mm3, whole
@@ -247,10 +246,10 @@ def test_two_corners_that_all_but_meet_throw_no_wall_out_of_a_plate(x: float, as
     corners = np.array([(0, 0), (x, -1e-3), (x + aside, -1e-3 + away), (10, 0), (10, 5), (0, 5)])
     triangulation = triangulate([[corners]], STEP * RULE.inner)
     assert triangulation is not None
-    skeleton = skeleton_of(triangulation)
-    courses, _, _ = lay_loops(triangulation, skeleton, count_beads(triangulation.across, skeleton, RULE), RULE, 0)
-    assert (courses[:, :2].min(axis=0) >= 0.0).all()
-    assert (courses[:, :2].max(axis=0) <= (10.0, 5.0)).all()
+    ribs, _, _ = trace_loops(triangulation, skeleton_of(triangulation, RULE), RULE, 0)
+    points = ribs[:, :2] + ribs[:, 2:4] * ribs[:, 5:6]
+    assert (points.min(axis=0) >= 0.0).all()
+    assert (points.max(axis=0) <= (10.0, 5.0)).all()
 
 
 def test_a_wall_whose_points_fall_on_each_other_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
