@@ -33,6 +33,7 @@ from slicer.geometry.polygons import (
     offset,
     offset_round,
     opening,
+    start_at,
     union,
 )
 from slicer.geometry.polyline import Segment, length_mm
@@ -67,15 +68,6 @@ def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Be
     return beads
 
 
-def beads_around(sections: Sections, footprint: Polygons, base: Polygons, process: Process, height_mm: float) -> list[Bead]:
-    """Skirt and brim around a first layer on the plate; parameters as in brim()."""
-    own = (sections.part, *takewhile(lambda part: not part.on_platform, sections.later))  # until the next model begins
-    top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in own)
-    if sections.part.index > 1:  # where a skirt would go other models may stand
-        process = process.model_copy(update={"skirt_loops": 0})
-    return brim(footprint, base, sections.plate, process, top_mm=top_mm, height_mm=height_mm)
-
-
 def support_beads(
     area: Polygons, dense: Polygons, hollow: Polygons, process: Process, height_mm: float, first: bool
 ) -> list[Bead]:
@@ -104,10 +96,8 @@ def support_beads(
 
 
 def _joined(dense: Polygons, radius_mm: float, width_mm: float) -> Polygons:
-    """Dense areas with gaps closed that are narrower than twice radius_mm, the distance between sparse lines.
-
-    Lines that fill one large area lie beside each other; lines of many small areas would hang between the sparse lines.
-    """
+    """Dense areas with gaps closed that are narrower than twice radius_mm, the distance between sparse lines. Lines that fill one
+    large area lie beside each other; lines of many small areas would hang between the sparse lines."""
     if dense.num_contour() < 2:
         return dense
     joined = closing(dense, radius_mm)
@@ -127,10 +117,8 @@ def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process:
 
 
 def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: float, reach_mm: float) -> list[Floats]:
-    """Lines (n, 2) on the grid of parallel_lines that end on the border of an area.
-
-    Ends of neighbouring lines nearer than reach_mm are joined unless the fence lies between them.
-    """
+    """Lines (n, 2) on the grid of parallel_lines that end on the border of an area. Ends of neighbouring lines nearer than
+    reach_mm are joined unless the fence lies between them."""
     pieces = clip_pattern(index_edges(area), *parallel_lines(angle_deg, apart_mm))
     if not len(pieces.ends):
         return []
@@ -186,42 +174,44 @@ def pedestal_beads(outline: Polygons, layer: int, layers: int, process: Process,
     return beads + [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in sparse]
 
 
-def brim(
-    footprint: Polygons, base: Polygons, plate: Polygons, process: Process, *, top_mm: float, height_mm: float
-) -> list[Bead]:
-    """The brim, outermost bead first so that it ends at the part; without a brim the skirt's loops.
+def beads_around(sections: Sections, footprint: Polygons, base: Polygons, process: Process, height_mm: float) -> list[Bead]:
+    """The brim of a first layer on the plate, outermost bead first so that it ends at the part; without a brim the skirt's loops.
 
-    footprint: the whole area that the first layer prints; base: the area of it on which the print stands; plate: the outline
-    of the plate, which no loop leaves; top_mm: height of the print. A base that would tip over gets a brim of
-    process.small_base_brim_mm, which goes no farther from it: round support it would hold nothing.
+    footprint: the whole area that the layer prints; base: the area of it on which the print stands. A base that would tip over
+    gets a brim of process.small_base_brim_mm, which goes no farther from it: round support it would hold nothing.
     """
+    own = (sections.part, *takewhile(lambda part: not part.on_platform, sections.later))  # until the next model begins
+    top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in own)
     spacing, beads = spacing_mm(process.line_width_mm, height_mm), list[Bead]()
     holds_base = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and tips_over(base, top_mm)
     width = process.small_base_brim_mm if holds_base else process.brim_mm
     if width > 0.0:
         count, nearest = max(ceil(width / spacing - 1e-9), 1), process.brim_gap_mm + 0.5 * spacing
-        beads = _loops_around(footprint, plate, process, nearest, spacing, count)
+        beads = _loops_around(footprint, sections.plate, process, nearest, spacing, count)
     if holds_base:
         beads = _near_base(beads, offset_round(base, nearest + (count - 0.5) * spacing), count)
-    if beads:
+    if beads or sections.part.index > 1:  # where a skirt would go other models may stand
         return beads
     nearest = process.skirt_distance_mm + 0.5 * process.line_width_mm
-    return _loops_around(footprint, plate, process, nearest, spacing, process.skirt_loops)
+    return _loops_around(footprint, sections.plate, process, nearest, spacing, process.skirt_loops)
 
 
 def _loops_around(
     footprint: Polygons, plate: Polygons, process: Process, nearest_mm: float, spacing: float, count: int
 ) -> list[Bead]:
-    """Loops round an area as far as the plate has room, the first of them at a distance; outermost first."""
-    outside, half = _outside(footprint), 0.5 * process.line_width_mm
-    beads: list[Bead] = []
+    """Loops round an area as far as the plate has room, the first of them at a distance; outermost first, begun at the rear."""
+    outside = Polygons([loop for loop in contours(footprint) if area_mm2(loop) > 0])  # without its holes
+    beads, half = list[Bead](), 0.5 * process.line_width_mm
     for k in reversed(range(count)):
         # Along the plate's edge the loops lie beside each other as they do elsewhere; one that finds no room is left out.
         around = offset_round(outside, nearest_mm + k * spacing) ^ offset(plate, -half - (count - 1 - k) * spacing)
         if (offset_round(outside, min(half, nearest_mm)) - around).area() > LEAST_COVERED_MM2:
             continue
-        loops = [loop for loop in contours(around) if area_mm2(loop) > 0]
-        beads += [Bead(Kind.SKIRT, start_at_rear(loop), process.line_width_mm, BRIM_RANK - k) for loop in loops]
+        for loop in contours(around):
+            if area_mm2(loop) > 0:
+                rear = int(np.lexsort((loop[:, 0], -loop[:, 1]))[0])  # the leftmost of several
+                points = close_loop(start_at(loop, rear))
+                beads.append(Bead(Kind.SKIRT, points, process.line_width_mm, BRIM_RANK - k))
     return beads
 
 
@@ -234,15 +224,3 @@ def _near_base(loops: Sequence[Bead], near: Polygons, count: int) -> list[Bead]:
         for run in runs_within(loop.points, place)
         if length_mm(run) > loop.width_mm
     ]
-
-
-def _outside(polygons: Polygons) -> Polygons:
-    """Without holes."""
-    outer = [loop for loop in contours(polygons) if area_mm2(loop) > 0]
-    return Polygons(outer) if outer else Polygons()
-
-
-def start_at_rear(loop: Floats) -> Floats:
-    """A loop (n, 2) closed and begun at its rearmost point, the leftmost of several."""
-    at = int(np.lexsort((loop[:, 0], -loop[:, 1]))[0])
-    return np.concatenate([loop[at:], loop[: at + 1]])

@@ -15,7 +15,7 @@ import numpy as np
 
 from mdp.mesh import Floats
 from mdp.pose import shift
-from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, union, unite_layers
+from slicer.geometry.polygons import Polygons, bounding_box, closing, offset, rectangle, union, unite_layers
 from slicer.interface.interface import BasePlane, frame_change, sections_of
 from slicer.overhangs import LEAST_MM2
 from slicer.sectioning import Sections, marked_areas, no_seam_segments
@@ -65,13 +65,10 @@ def keep_off(bodies: Sequence[Polygons], patches: Sequence[Patch], plane: BasePl
 
 def upper_side(areas: Sequence[Polygons], plane: BasePlane, window: Polygons, deep_mm: float) -> Polygons:
     """The areas of an earlier part's layers that end less than deep_mm below the plane, carried onto a window of it."""
-    pieces = []
-    for layer in plane.layers_near(window, deep_mm):
-        if layer < len(areas) and not areas[layer].is_empty():
-            near = areas[layer] ^ plane.band(layer, -deep_mm, 0.0)
-            if not near.is_empty():
-                pieces.append(plane.project(near, layer))
-    return closing(offset(union(pieces), 0.5 * STEP_MM), STEP_MM) ^ window if pieces else Polygons()
+    layers = [layer for layer in plane.layers_near(window, deep_mm) if layer < len(areas) and not areas[layer].is_empty()]
+    near = [(areas[layer] ^ plane.band(layer, -deep_mm, 0.0), layer) for layer in layers]
+    pieces = [plane.project(area, layer) for area, layer in near if not area.is_empty()]
+    return closing(offset(union(pieces), 0.5 * STEP_MM), STEP_MM) ^ window
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +136,7 @@ def _extents(own: Sequence[Supports]) -> dict[int, tuple[Polygons, float]]:
             if top_mm > 0.0:
                 take(m, corners[:, :2].min(axis=0), corners[:, :2].max(axis=0), top_mm)
     some = [k for k, (x0, _, x1, _) in enumerate(boxes) if x0 < x1 and own[k].sections.process.support != "none"]
-    squares = {k: Polygons.square(tuple(boxes[k][2:] - boxes[k][:2])).translate(tuple(boxes[k][:2])) for k in some}
-    return {k: (square, tops[k]) for k, square in squares.items()}
+    return {k: (rectangle(*boxes[k]), tops[k]) for k in some}
 
 
 def up_to(sections: Sections, top_mm: float) -> Sections:
@@ -151,9 +147,8 @@ def up_to(sections: Sections, top_mm: float) -> Sections:
     if count <= 0:
         return sections
     empty = [Polygons()] * count
+    part, known, end = sections.part, len(sections.above), len(sections.beside) + count
     higher = [*sections.beside, *sections.above, *empty]  # the added layers are at the heights of `above`
-    known, end = len(sections.above), len(sections.beside) + count
-    part = sections.part
     return replace(
         sections,
         heights=heights,
@@ -172,7 +167,9 @@ def up_to(sections: Sections, top_mm: float) -> Sections:
 
 def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[HandedDown]) -> HandedDown:
     """Where support of a part may stand if that of earlier parts may."""
-    window = box ^ _within_axes(sections)
+    machine, (moved_x, moved_y, _) = sections.profile.machine, shift(sections.profile.machine, sections.part.pose)
+    (left, right), (front, back) = machine.x.limits_mm, machine.y.limits_mm
+    window = box ^ rectangle(left - moved_x, front - moved_y, right - moved_x, back - moved_y)  # as far as the axes reach
     count = max(min(int(np.searchsorted(sections.heights.bottom_mm, top_mm)), len(sections.outlines)), 1)
     x0, y0, x1, y1 = box.bounds()
     far_mm = max(support_reach_mm(sections), 2.0 * hypot(max(abs(x0), abs(x1)), max(abs(y0), abs(y1))) + AROUND_MM)
@@ -183,20 +180,12 @@ def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[Ha
     blocked = [union([layer, outside]) for layer in blocked] if outside.area() > 4.0 * AROUND_MM**2 else blocked
     near = replace(
         sections,
-        outlines=[outline if outline.is_empty() else outline ^ box for outline in sections.outlines],
+        outlines=[outline ^ box for outline in sections.outlines],
         plastic_below=None if sections.plastic_below is None else sections.plastic_below ^ box,
         plate=sections.plate ^ window,
     )
     reached = [upper_side(room.areas.reachable, room.plane_of(sections), window, SHALLOW_MM) for room in earlier]
     return HandedDown(sections, window, reachable_areas(near, blocked, union(reached)), blocked[0], far_mm)
-
-
-def _within_axes(sections: Sections) -> Polygons:
-    """The places of a part's frame that the axes reach."""
-    machine = sections.profile.machine
-    moved = shift(machine, sections.part.pose)
-    x, y = (np.array(axis.limits_mm) - moved[k] for k, axis in enumerate((machine.x, machine.y)))
-    return Polygons.square((x[1] - x[0], y[1] - y[0])).translate((x[0], y[0]))
 
 
 def _hand_down(room: HandedDown, missed: Sequence[Polygons], later: Sequence[HandedDown]) -> HandedDown:
@@ -213,27 +202,19 @@ def _hand_down(room: HandedDown, missed: Sequence[Polygons], later: Sequence[Han
     bodies, contacts = grow(wanted, begin, areas, union([seen_from_above(wanted), *begin.values()]))
     for plane, upper in zip(planes, later, strict=True):
         bodies = keep_off(bodies, upper.patches, plane, sections.process.support_distance_mm)
-    patches = () if sections.on_platform else _patches(room, bodies, wanted)
-    return replace(room, bodies=bodies, contacts=contacts, patches=patches)
-
-
-def _patches(room: HandedDown, bodies: Sequence[Polygons], wanted: Sequence[Polygons]) -> list[Patch]:
-    """The area by which a part and its support hang over its base plane."""
-    patches = [Patch(area, _gap_mm(room.areas, layer)) for layer, area in _hanging_low(room.areas, wanted)]
-    if bodies and not bodies[0].is_empty():
+    patches = [Patch(area, gap_mm) for _, area, gap_mm in _hanging_low(areas, wanted)]
+    if bodies and not sections.on_platform:
         patches.append(Patch(bodies[0] - _own_placeable(room), 0.0))
-    return [patch for patch in patches if patch.places.area() >= LEAST_MM2]
+    large = [patch for patch in patches if patch.places.area() >= LEAST_MM2]
+    return replace(room, bodies=bodies, contacts=contacts, patches=large)
 
 
-def _hanging_low(areas: ReachableAreas, wanted: Sequence[Polygons]) -> list[tuple[int, Polygons]]:
-    """The hanging places that support above the base plane has no room under, with their layers."""
-    low = enumerate(wanted[: int(np.searchsorted(areas.heights.bottom_mm, areas.process.support_gap_mm + 1.0))])
-    return [(k, area) for k, area in low if not area.is_empty() and not len(areas.carrying_layers(k))]
-
-
-def _gap_mm(areas: ReachableAreas, layer: int) -> float:
-    """How far below the base plane support under a layer ends."""
-    return max(areas.process.support_gap_mm - max(float(areas.heights.bottom_mm[layer]), 0.0), 0.0)
+def _hanging_low(areas: ReachableAreas, wanted: Sequence[Polygons]) -> list[tuple[int, Polygons, float]]:
+    """The hanging places that support above the base plane has no room under: layer, area, and how far below it support ends."""
+    gap_mm, bottom_mm = areas.process.support_gap_mm, areas.heights.bottom_mm
+    low = enumerate(wanted[: int(np.searchsorted(bottom_mm, gap_mm + 1.0))])
+    hanging = [(k, area) for k, area in low if not area.is_empty() and not len(areas.carrying_layers(k))]
+    return [(k, area, max(gap_mm - max(float(bottom_mm[k]), 0.0), 0.0)) for k, area in hanging]
 
 
 def _own_placeable(room: HandedDown) -> Polygons:
@@ -253,16 +234,13 @@ def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supp
     printed, dense = (_padded(places, count) for places in stand(room.bodies, room.contacts, areas))
     wanted, missed, unwanted = (_padded(places, count) for places in (own.wanted, own.missed, own.unwanted))
     both = unite_layers(printed, _padded(own.areas, count))
-    if sections.on_platform:
-        if not sections.on_raft:
-            foot = widen_foot(printed, whole, (room.window ^ sections.plate) - room.shut)
-            both[0] = union([both[0], foot])
-    else:
+    if sections.on_platform and not sections.on_raft:
+        both[0] = union([both[0], widen_foot(printed, whole, (room.window ^ sections.plate) - room.shut)])
+    if not sections.on_platform:
         low = _hanging_low(areas, missed)
         missed = find_missed(missed, both, whole)
-        for layer, _ in low:
-            held = _held(room, earlier, _gap_mm(areas, layer))
-            missed[layer] = missed[layer] - offset(held, 0.5 * process.line_width_mm)
+        for layer, _, gap_mm in low:
+            missed[layer] = missed[layer] - offset(_held(room, earlier, gap_mm), 0.5 * process.line_width_mm)
     dense = unite_layers(dense, _padded(own.dense, count))
     return Supports(sections, both, dense, hollow_places(both, dense, process), wanted, missed, unwanted)
 
@@ -274,8 +252,8 @@ def _padded(places: Sequence[Polygons], count: int) -> list[Polygons]:
 
 def _held(room: HandedDown, earlier: Sequence[Supports], gap_mm: float) -> Polygons:
     """The places on a part's base plane that have support of earlier parts gap_mm beneath them."""
-    later, held = room.sections.part, []
+    held = []
     for supports in earlier:
-        plane = BasePlane.of(supports.sections.part, later, supports.sections.heights, room.far_mm)
+        plane = BasePlane.of(supports.sections.part, room.sections.part, supports.sections.heights, room.far_mm)
         held.append(upper_side(supports.areas, plane, room.window, gap_mm + NEAR_MM))
     return union(held)

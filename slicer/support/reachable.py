@@ -20,9 +20,9 @@ from mdp.overhang import Mask
 from mdp.pose import UP
 from profiles.machine import Machine
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, half_plane, offset, offset_round, union, unite_layers
+from slicer.geometry.polygons import Polygons, half_plane, offset, offset_round, rectangle, union, unite_layers
 from slicer.heights import SAME_MM, Heights
-from slicer.interface.interface import LEVEL, BasePlane, in_frame_of, plane_in_frame_of, room_of
+from slicer.interface.interface import BasePlane, in_frame_of, plane_in_frame_of, room_of
 from slicer.sectioning import Sections
 
 COARSE_MM = 0.03  # sections are simplified by this before they are grown
@@ -73,11 +73,8 @@ class ReachableAreas:
         return self.sections.heights
 
     def carrying_layers(self, layer: int) -> range:
-        """The layers, from the highest down, on which the overhangs of a layer may rest.
-
-        The distance across keeps support as much lower under a slope that is just too flat, or as steep as one that a person may
-        want to be held up.
-        """
+        """The layers, from the highest down, on which the overhangs of a layer may rest. The distance across keeps support as
+        much lower under a slope that is just too flat, or as steep as one that a person may want to be held up."""
         process, drop_mm = self.process, float(self.heights.bottom_mm[layer]) - self.process.support_gap_mm
         steepest = 0.0 if self.sections.enforced else tan(radians(process.self_supporting_angle_deg))
         slack_mm = process.support_distance_mm / max(steepest, STEEPEST)
@@ -107,25 +104,22 @@ def drop_slivers(places: Polygons) -> Polygons:
 
 
 def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Polygons | None = None) -> ReachableAreas:
-    """The areas of as many layers of a part as there are `blocked`; all of the plate is placeable on the platform.
-
-    handed: places on the base plane that support of an earlier part can reach.
-    """
+    """The areas of as many layers of a part as there are `blocked`; all of the plate is placeable on the platform. handed: places
+    on the base plane that support of an earlier part can reach."""
     process, count = sections.support_process, len(blocked)
     radius, angle = process.line_width_mm, min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
     lean_mm = sections.heights.height_mm[:count] * tan(radians(angle))
     areas = ReachableAreas(sections, lean_mm, (), ())
     highest = max(areas.next_above(count - 1), count)
-    plain = [s if s.is_empty() else s.simplify(COARSE_MM) for s in sections.outlines[:highest]]
-    wide = [s if s.is_empty() else offset(s, radius + MARGIN_MM) for s in plain]
-    tall = [s if s.is_empty() else offset(s, radius + process.support_distance_mm + MARGIN_MM) for s in plain[:count]]
+    plain = [outline.simplify(COARSE_MM) for outline in sections.outlines[:highest]]
+    wide = [offset(outline, radius + MARGIN_MM) for outline in plain]
+    tall = [offset(outline, radius + process.support_distance_mm + MARGIN_MM) for outline in plain[:count]]
     root = int(np.searchsorted(np.maximum(areas.heights.bottom_mm, 0.0), process.support_bottom_gap_mm - SAME_MM))
     placeable: list[Polygons] = []
     reachable: list[Polygons] = []
     for m in range(count):
         near = areas.next_below(m)
-        shut = blocked[m] if blocked[m].is_empty() else offset(blocked[m], radius + MARGIN_MM)
-        close = (tall[m], *wide[near:m], *wide[m + 1 : areas.next_above(m)], shut)
+        close = (tall[m], *wide[near:m], *wide[m + 1 : areas.next_above(m)], offset(blocked[m], radius + MARGIN_MM))
         obstacles = union([obstacle for obstacle in close if not obstacle.is_empty()])
         stands = [offset(plain[near - 1], BEYOND * radius)] if near > 0 and process.support_on_part else []
         if sections.plastic_below is not None and m == root:
@@ -133,13 +127,10 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
         if handed is not None and m == 0:
             stands.append(handed)
         placeable.append(union(stands))
-        if m == 0 and sections.on_platform:
-            start = offset(sections.plate, -radius)
-        else:
-            start = placeable[m]
-            if m and not reachable[-1].is_empty():
-                start = dilate(reachable[-1], (1.0 - SPARE) * float(lean_mm[m])) + start
-        reachable.append(start if start.is_empty() else (start - obstacles).simplify(FINE_MM))
+        start = offset(sections.plate, -radius) if m == 0 and sections.on_platform else placeable[m]
+        if m and not reachable[-1].is_empty():
+            start = dilate(reachable[-1], (1.0 - SPARE) * float(lean_mm[m])) + start
+        reachable.append((start - obstacles).simplify(FINE_MM))
     is_limb = sections.part.base.limbs_mm is not None
     return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable), shut=blocked if is_limb else ())
 
@@ -151,10 +142,8 @@ def support_reach_mm(sections: Sections) -> float:
 
 
 def blocked_areas(sections: Sections, count: int, gap_mm: float, far_mm: float) -> list[Polygons]:
-    """For each of the lowest layers where support cannot be, or where a person wants none.
-
-    gap_mm: distance to later parts' base planes; far_mm: distance from the origin beyond which there is no support.
-    """
+    """For each of the lowest layers where support cannot be, or where a person wants none. gap_mm: distance to later parts' base
+    planes; far_mm: distance from the origin beyond which there is no support."""
     heights = sections.heights[:count]
     blocked = above_base_planes(sections.part, sections.later, heights, gap_mm, far_mm, sections.profile.machine)
     if sections.standing:
@@ -200,7 +189,7 @@ def beside_standing(sections: Sections, layers: slice, far_mm: float) -> list[Po
     low = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + SAME_MM)
     high = np.searchsorted(heights.bottom_mm, heights.tip_mm + gap_mm - SAME_MM)
     near = [union(stands[a:b]) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
-    beside = [offset(area, process.support_distance_mm) if not area.is_empty() else area for area in near]
+    beside = [offset(area, process.support_distance_mm) for area in near]
     return [union([outside, *areas]) for areas in zip(beside, reaches, strict=True)]
 
 
@@ -216,28 +205,22 @@ def _above_planes(planes: Sequence[Floats], heights: Heights, far_mm: float) -> 
     everywhere = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True)
     for x, y, z, offset_mm in planes:
         below_mm = offset_mm - np.maximum(z * heights.bottom_mm, z * heights.tip_mm)
-        level = np.hypot(x, y) < LEVEL
         for layer, rest in zip(layers, below_mm.tolist(), strict=True):
-            if rest < 0.0 or not level:
-                layer.append(half_plane(everywhere, x, y, -rest))
+            layer.append(half_plane(everywhere, x, y, -rest))
     return [union(layer) for layer in layers]
 
 
 def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, Polygons]]:
-    """Heights above a limb's base plane, each with the area in which nothing may stand higher while the limb is printed.
-
-    The tip is assumed to reach down to the base plane everywhere in the limb's room. Nothing below -gap_mm is forbidden.
-    """
+    """Heights above a limb's base plane, each with the area in which nothing may stand higher while the limb is printed. The tip
+    is assumed to reach down to the base plane everywhere in the limb's room. Nothing below -gap_mm is forbidden."""
     room, clearance_mm, profile = room_of(limb), machine.clearance_mm, machine.head.silhouette_mm
     rings = [(-gap_mm, profile[0][0])]
     rings += [(height - clearance_mm, wider) for (_, height), (wider, _) in pairwise(profile)]
     levels = [(max(low_mm, -gap_mm), offset_round(room, radius + clearance_mm)) for low_mm, radius in rings]
     x0, y0, x1, y1 = room.bounds()
     for box in machine.head.boxes:
-        low, high = (np.array(corner[:2]) for corner in (box.min_mm, box.max_mm))
-        x, y = np.array([x0, y0]) + low - clearance_mm
-        right, back = np.array([x1, y1]) + high + clearance_mm
-        levels.append((max(box.min_mm[2] - clearance_mm, -gap_mm), Polygons.square((right - x, back - y)).translate((x, y))))
+        (left, front, bottom), (right, back, _) = np.array(box.min_mm) - clearance_mm, np.array(box.max_mm) + clearance_mm
+        levels.append((max(float(bottom), -gap_mm), rectangle(x0 + left, y0 + front, x1 + right, y1 + back)))
     return levels
 
 
@@ -283,5 +266,5 @@ def _rectangles(met: Mask, x0: float, middle_mm: float, cell_mm: float) -> list[
     """Rectangles over the marked cells of a row."""
     steps = np.diff(np.concatenate([[0], met.astype(np.int8), [0]]))
     pairs = zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True)
-    low = middle_mm - 0.5 * cell_mm
-    return [Polygons.square(((end - begin) * cell_mm, cell_mm)).translate((x0 + begin * cell_mm, low)) for begin, end in pairs]
+    low, high = middle_mm - 0.5 * cell_mm, middle_mm + 0.5 * cell_mm
+    return [rectangle(x0 + begin * cell_mm, low, x0 + end * cell_mm, high) for begin, end in pairs]

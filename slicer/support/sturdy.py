@@ -7,9 +7,13 @@ thickened, so thickness never costs an overhang its support. Branches that have 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import compress
 from math import pi, radians, sqrt, tan
+from typing import NamedTuple
 
+import numpy as np
+
+from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import spacing_mm, support_cell_mm
 from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, union
@@ -20,19 +24,19 @@ LONG = 3.0  # distances between sparse lines; in a longer piece a zigzag would r
 TRIES = 5  # at most, of a distance over which a piece grows into the room beside it
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
+class Piece(NamedTuple):
     """A connected area of a layer's support, before (thin) and after (area) it grows; top_mm: z of the top of its support."""
 
     thin: Polygons
     area: Polygons
     top_mm: float
-    bounds: tuple[float, float, float, float]
 
-    def touches(self, other: Polygons, bounds: tuple[float, float, float, float]) -> bool:
-        """Whether the thin piece overlaps an area; bounds: the box of that area."""
-        (x0, y0, x1, y1), (a0, b0, a1, b1) = self.bounds, bounds
-        return x0 < a1 and x1 > a0 and y0 < b1 and y1 > b0 and not (self.thin ^ other).is_empty()
+
+def touching(piece: Polygons, others: Sequence[Polygons], boxes: Floats) -> list[int]:
+    """The numbers of the others that a piece overlaps; boxes: (n, 4) theirs."""
+    x0, y0, x1, y1 = piece.bounds()
+    near = (boxes[:, 0] < x1) & (boxes[:, 2] > x0) & (boxes[:, 1] < y1) & (boxes[:, 3] > y0)
+    return [k for k in np.flatnonzero(near).tolist() if not (others[k] ^ piece).is_empty()]
 
 
 def least_diameter_mm(above_mm: float, process: Process) -> float:
@@ -47,7 +51,9 @@ def thicken(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]
     above: list[Piece] = []
     wide: list[Polygons] = list(bodies)
     for m in range(len(bodies) - 1, -1, -1):
-        above = [_grown(piece, above, areas, m) for piece in islands(bodies[m])]
+        thin, boxes = [piece.thin for piece in above], np.array([piece.thin.bounds() for piece in above]).reshape(-1, 4)
+        pieces = islands(bodies[m])
+        above = [_grown(piece, [above[k] for k in touching(piece, thin, boxes)], areas, m) for piece in pieces]
         if any(piece.area is not piece.thin for piece in above):
             wide[m] = union([piece.area for piece in above])
     for m in range(1, len(bodies)):
@@ -58,17 +64,15 @@ def thicken(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]
     return wide
 
 
-def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int) -> Piece:
-    """Grow a piece of layer m if it is too thin for the support above it, and under the grown area of the pieces above it."""
-    bounds, heights = thin.bounds(), areas.heights
-    over = [piece for piece in above if piece.touches(thin, bounds)]
+def _grown(thin: Polygons, over: Sequence[Piece], areas: ReachableAreas, m: int) -> Piece:
+    """Grow a piece of layer m if it is too thin for the support over it, and under the grown area of the pieces over it."""
     if not over:
-        return Piece(thin, thin, float(heights.tip_mm[m]), bounds)
+        return Piece(thin, thin, float(areas.heights.tip_mm[m]))
     top_mm = max(piece.top_mm for piece in over)
-    least_mm = least_diameter_mm(top_mm - float(heights.bottom_mm[m]), areas.process)
+    least_mm = least_diameter_mm(top_mm - float(areas.heights.bottom_mm[m]), areas.process)
     lacking_mm, grown = 0.5 * (least_mm - 2.0 * sqrt(thin.area() / pi)), [piece for piece in over if piece.area is not piece.thin]
     if lacking_mm <= 0.0 and not grown:
-        return Piece(thin, thin, top_mm, bounds)
+        return Piece(thin, thin, top_mm)
     room = dilate(areas.reachable[m] ^ bounding_box(thin, least_mm + areas.radius_mm), areas.radius_mm)
     area = thin
     if grown:
@@ -79,7 +83,7 @@ def _grown(thin: Polygons, above: Sequence[Piece], areas: ReachableAreas, m: int
         area = _with_touching(thin, hung ^ near, thin)
     if lacking_mm > 0.0:
         area = _filled(area, thin, room, lacking_mm, least_mm)
-    return Piece(thin, area.simplify(COARSE_MM), top_mm, bounds)
+    return Piece(thin, area.simplify(COARSE_MM), top_mm)
 
 
 def _with_touching(area: Polygons, about: Polygons, thin: Polygons) -> Polygons:
@@ -89,10 +93,8 @@ def _with_touching(area: Polygons, about: Polygons, thin: Polygons) -> Polygons:
 
 
 def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
-    """An area united with the room around a thin piece until it is as large as a circle of diameter least_mm.
-
-    lacking_mm: the radius that the piece lacks, the first distance to try. Growth ends least_mm from the piece.
-    """
+    """An area united with the room around a thin piece until it is as large as a circle of diameter least_mm. lacking_mm: the
+    radius that the piece lacks, the first distance to try. Growth ends least_mm from the piece."""
     least_mm2, distance_mm, step_mm, before_mm2 = 0.25 * pi * least_mm**2, lacking_mm, lacking_mm, thin.area()
     filled, mm2 = area, area.area()
     for _ in range(TRIES if mm2 < least_mm2 else 0):
@@ -108,10 +110,8 @@ def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, l
 
 
 def _loose(body: Polygons, wide: Polygons, below: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """The added area of layer m that neither lies within the lean of the layer below nor stands on something.
-
-    Only pieces thinner than a branch and pieces that begin in this layer may grow onto something to stand on.
-    """
+    """The added area of layer m that neither lies within the lean of the layer below nor stands on something. Only pieces thinner
+    than a branch and pieces that begin in this layer may grow onto something to stand on."""
     lean_mm, branch_mm, added = float(areas.lean_mm[m]), areas.process.support_branch_mm, wide - below
     loose = added if below.is_empty() else drop_slivers(added - dilate(below, lean_mm))
     if loose.is_empty() or areas.placeable[m].is_empty():
@@ -137,14 +137,10 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
     spacing, cell_mm = spacing_mm(process.line_width_mm, process.layer_height_mm), support_cell_mm(process)
     walls_mm, dense_above = process.support_walls * spacing, Polygons()
     for m in range(len(printed) - 1, -1, -1):
-        filling: list[Polygons] = []
-        empty: list[Polygons] = []
-        under_lines = filled + dense_above
-        for piece in islands(printed[m]):
-            lying = piece ^ under_lines
-            has_lines = not lying.is_empty() and _has_lines(piece, lying, dense_above, walls_mm, cell_mm)
-            (filling if has_lines else empty).append(piece)
-        hollow[m], filled, dense_above = union(empty), union(filling), dense[m]
+        pieces, under_lines = islands(printed[m]), filled + dense_above
+        has_lines = [_has_lines(piece, piece ^ under_lines, dense_above, walls_mm, cell_mm) for piece in pieces]
+        hollow[m] = union([piece for piece, filling in zip(pieces, has_lines, strict=True) if not filling])
+        filled, dense_above = union(list(compress(pieces, has_lines))), dense[m]
     return hollow
 
 
@@ -152,9 +148,7 @@ def _has_lines(piece: Polygons, lying: Polygons, dense_above: Polygons, walls_mm
     """Whether lines are printed inside a piece; lying: its area under lines of the layer above."""
     x0, y0, x1, y1 = piece.bounds()
     long_mm = max(x1 - x0, y1 - y0) - 2.0 * walls_mm
-    if long_mm <= cell_mm:
+    if lying.is_empty() or long_mm <= cell_mm:
         return False
-    if long_mm > LONG * cell_mm:
-        return True
-    is_narrow = offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
-    return not is_narrow or not (lying ^ dense_above).is_empty()
+    is_wide = long_mm > LONG * cell_mm or not offset(piece, -walls_mm - 0.5 * cell_mm).is_empty()
+    return is_wide or not (lying ^ dense_above).is_empty()

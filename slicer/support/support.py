@@ -8,19 +8,7 @@ import numpy as np
 
 from mdp.clearance import least_tip_height_mm
 from mdp.mesh import Floats
-from slicer.geometry.polygons import (
-    Polygons,
-    bounding_box,
-    close_loop,
-    closing,
-    contours,
-    islands,
-    larger,
-    offset,
-    opening,
-    union,
-)
-from slicer.geometry.polyline import length_mm
+from slicer.geometry.polygons import Polygons, bounding_box, closing, islands, larger, offset, opening, perimeter_mm, union
 from slicer.heights import SAME_MM
 from slicer.overhangs import LEAST_MM2, Overhang
 from slicer.paths import Unsupported
@@ -40,14 +28,8 @@ from slicer.support.reachable import (
     reachable_areas,
     support_reach_mm,
 )
-from slicer.support.sturdy import hollow_places, thicken
-from slicer.support.tree import (
-    JOIN_MM,
-    Branch,
-    add_contact,
-    carrying_area,
-    lower_branches,
-)
+from slicer.support.sturdy import hollow_places, thicken, touching
+from slicer.support.tree import JOIN_MM, Branch, add_contact, carrying_area, lower_branches
 
 SLACK_MM = 0.01  # what rounding may add to the lean
 LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
@@ -55,17 +37,15 @@ UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
 UNDER = (0.2, 0.5)  # of a disc's radius: how far beside an overhang a disc may stand; the smaller value is tried first
 MOST = 0.5  # share of a place that one reason has to hold for
-
 HEAP = 12  # layers united at a time: a sweep over all of them at once meets many more crossings
 
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """The support of a part's sections, which go up as far as it does.
+    """The support of a part's sections, which go up as far as it does; each list has one area per layer.
 
-    Each list has one area per layer. areas: printed support; dense: its interface; hollow: printed without lines inside the
-    walls; wanted: hanging places that want support; missed: those of them that nothing holds; unwanted: hanging places that a
-    person wants no support under.
+    areas: printed support; dense: its interface; hollow: printed without lines inside the walls; wanted: hanging places that want
+    support; missed: those of them that nothing holds; unwanted: hanging places that a person wants no support under.
     """
 
     sections: Sections
@@ -99,11 +79,12 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
         return Supports(sections, nothing, nothing, nothing, nothing, nothing, unwanted)
     blocked = blocked_areas(sections, count, process.support_distance_mm, support_reach_mm(sections))
     areas = reachable_areas(sections, blocked)
-    printed, dense = stand(*grow(wanted, {}, areas), areas)
-    missed = find_missed(wanted, printed, areas)
-    if any(not area.is_empty() for area in missed):
+    missed = [Polygons()]
+    for _ in range(2):
         printed, dense = stand(*grow(wanted, {}, areas, seen_from_above(missed)), areas)
         missed = find_missed(wanted, printed, areas)
+        if all(area.is_empty() for area in missed):
+            break
     if sections.on_platform and not sections.on_raft:
         printed[0] = widen_foot(printed, areas, sections.plate - blocked[0])
     hollow, rest = hollow_places(printed, dense, process), nothing[len(printed) :]
@@ -135,10 +116,12 @@ def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Pol
 def drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
     """The hanging places without those that, seen from above, are too small to matter."""
     small = union([island for island in islands(seen_from_above(hanging)) if island.area() < least_mm2])
-    if small.is_empty():
-        return list(hanging)
-    large = [area if area.is_empty() else area - small for area in hanging]
-    return [area if area.area() >= LEAST_MM2 else Polygons() for area in large]
+    return list(hanging) if small.is_empty() else [_if_large(area - small) for area in hanging]
+
+
+def _if_large(area: Polygons) -> Polygons:
+    """The area, empty where that is mere rounding."""
+    return area if area.area() >= LEAST_MM2 else Polygons()
 
 
 def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
@@ -148,7 +131,7 @@ def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
 
 
 def grow(
-    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas, hard: Polygons | None = None
+    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas, hard: Polygons
 ) -> tuple[list[Polygons], list[Polygons]]:
     """Grow support from the top down. Returns one area per layer of all support, and one of the support that begins there.
 
@@ -170,15 +153,15 @@ def grow(
         body = _body(area, radius)
         asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
         if asked:
-            contact = _contact(union(asked), body, areas.reachable[m], radius, Polygons() if hard is None else hard)
+            contact = _contact(union(asked), body, areas.reachable[m], radius, hard)
             if is_tree:
                 branches = add_contact(branches, contact, areas.reachable[m])
             elif not contact.is_empty():
                 area = closing(area + contact, JOIN_MM).simplify(SMOOTH_MM) ^ areas.reachable[m]
             contacts[m] = _body(contact, radius)
             body = body + contacts[m]
-        left = [(hanging - body, last) for hanging, last in pending if last < m]
-        pending = [(hanging, last) for hanging, last in left if hanging.area() >= LEAST_MM2]
+        left = [(_if_large(hanging - body), last) for hanging, last in pending if last < m]
+        pending = [(hanging, last) for hanging, last in left if not hanging.is_empty()]
         if not body.is_empty():
             bodies[m] = body
             if is_tree and m:
@@ -191,7 +174,7 @@ def grow(
 
 def _body(area: Polygons, radius: float) -> Polygons:
     """Discs around all places of an area."""
-    return area if area.is_empty() else dilate(area, radius).simplify(COARSE_MM)
+    return dilate(area, radius).simplify(COARSE_MM)
 
 
 def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float, hard: Polygons) -> Polygons:
@@ -223,11 +206,8 @@ def stand(
 
 
 def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The support of every layer with roots under support that ends in the air above.
-
-    A root is at most as deep as the steepest slope that support may not slide along is high under its disc; a thin one no deeper
-    than a tip may be long.
-    """
+    """The support of every layer with roots under support that ends in the air above. A root is at most as deep as the steepest
+    slope that support may not slide along is high under its disc; a thin one no deeper than a tip may be long."""
     process = areas.process
     across = process.support_distance_mm + 2.0 * areas.radius_mm
     angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
@@ -242,7 +222,7 @@ def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygo
             blocked = _blocked_area(union([root for root, _ in roots]), areas, m)
             left = [(root - blocked, top_mm) for root, top_mm in roots if top_mm - bottom_mm[0] <= deep]
             left = [(larger(root, least_mm2) if top_mm - bottom_mm[0] > TIP_MM else root, top_mm) for root, top_mm in left]
-            roots = [(root, top_mm) for root, top_mm in left if not _only_slivers(root)]
+            roots = [(root, top_mm) for root, top_mm in left if not drop_slivers(root).is_empty()]
             grown[m] = union([bodies[m], *(root for root, _ in roots)])
     return grown
 
@@ -272,16 +252,11 @@ def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Po
     for m, body in enumerate(bodies):
         if not body.is_empty() and (m > 0 or not areas.sections.on_platform):
             rest = body - dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else body
-            loose = rest if _only_slivers(rest) else _loose(rest, areas, m)
-            if not _only_slivers(loose):
+            loose = rest if drop_slivers(rest).is_empty() else _loose(rest, areas, m)
+            if not drop_slivers(loose).is_empty():
                 body = _clip_loose(body, loose, areas)
         printed.append(body)
     return printed
-
-
-def _only_slivers(places: Polygons) -> bool:
-    """Whether the places are nothing but slivers."""
-    return bool(places.area() < SPECK_MM2 or offset(places, -SLIVER_MM).is_empty())
 
 
 def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
@@ -289,8 +264,7 @@ def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
     beside one alone."""
     placeable = areas.placeable[m] ^ bounding_box(rest, areas.radius_mm)
     beside = rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm)
-    alone = [piece for piece in islands(rest) if _only_slivers(piece ^ placeable)]
-    return union([beside, *alone])
+    return union([beside, *(piece for piece in islands(rest) if drop_slivers(piece ^ placeable).is_empty())])
 
 
 def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polygons:
@@ -309,19 +283,17 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
 
 
 def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
-    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
-
-    Each piece becomes up to twice as wide as the support on it is high, but grows by at most support_foot_mm on each side.
-    """
+    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate. Each
+    piece becomes up to twice as wide as the support on it is high, but grows by at most support_foot_mm on each side."""
     outlines, process = areas.sections.outlines, areas.process
-    widths_mm = [_width_mm(piece) for piece in islands(printed[0])]
+    widths_mm = [4.0 * piece.area() / perimeter_mm(piece) for piece in islands(printed[0])]  # of a long strip twice its width
     enough_mm = process.support_foot_mm + 0.5 * max(widths_mm, default=0.0)  # higher support gets no wider foot
     layers = range(min(int(np.searchsorted(areas.heights.tip_mm[: len(printed)], enough_mm)) + 1, len(printed)))
     over, tops_mm = list[Polygons](), np.zeros(0)
     for layer in reversed(layers):
         pieces, boxes = islands(printed[layer]), np.array([piece.bounds() for piece in over]).reshape(-1, 4)
         tip_mm = float(areas.heights.tip_mm[layer])
-        tops_mm = np.array([max([tip_mm, *tops_mm[_touched(piece, over, boxes)]]) for piece in pieces])
+        tops_mm = np.array([max([tip_mm, *tops_mm[touching(piece, over, boxes)]]) for piece in pieces])
         over = pieces
     lacking_mm = tops_mm - 0.5 * np.array(widths_mm)
     feet = [dilate(piece, min(lack, process.support_foot_mm)) for piece, lack in zip(over, lacking_mm.tolist(), strict=True)]
@@ -329,32 +301,14 @@ def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygon
     return (union(feet) - union([beside, *outlines[1 : areas.next_above(0)]])) ^ free
 
 
-def _touched(piece: Polygons, others: Sequence[Polygons], boxes: Floats) -> list[int]:
-    """The numbers of the others that a piece overlaps; boxes: (n, 4) theirs."""
-    x0, y0, x1, y1 = piece.bounds()
-    near = (boxes[:, 0] < x1) & (boxes[:, 2] > x0) & (boxes[:, 1] < y1) & (boxes[:, 3] > y0)
-    return [k for k in np.flatnonzero(near).tolist() if not (others[k] ^ piece).is_empty()]
-
-
-def _width_mm(piece: Polygons) -> float:
-    """Four times the area over the perimeter: the diameter of a disc, twice the width of a long strip."""
-    return float(4.0 * piece.area() / sum(length_mm(close_loop(loop)) for loop in contours(piece)))
-
-
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
     """Where printed support is next to the part: under the overhangs that it holds and over the surface that it stands on."""
     process = areas.process
     roofs, floors = process.support_interface_layers, process.support_bottom_interface_layers
-    reach_mm, dense = (1.0 - BEYOND) * areas.radius_mm, []
-    feet = [foot if foot.is_empty() else dilate(foot, reach_mm) for foot in areas.placeable]
-    for m, area in enumerate(printed):
-        if area.is_empty():
-            dense.append(area)
-            continue
-        over = [contact for contact in contacts[m : m + roofs] if not contact.is_empty()]
-        near = union([*over, *(foot for foot in feet[max(m - floors + 1, 0) : m + 1] if not foot.is_empty())])
-        dense.append(opening(area ^ near, 0.45 * process.line_width_mm))
-    return dense
+    feet = [dilate(foot, (1.0 - BEYOND) * areas.radius_mm) for foot in areas.placeable]
+    near = [[*contacts[m : m + roofs], *feet[max(m - floors + 1, 0) : m + 1]] for m in range(len(printed))]
+    beside = [union([area for area in of_layer if not area.is_empty()]) for of_layer in near]
+    return [opening(area ^ close, 0.45 * process.line_width_mm) for area, close in zip(printed, beside, strict=True)]
 
 
 def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
@@ -363,10 +317,21 @@ def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: 
     A place is held over printed support and half a bead beyond its edge, where it spans from there to the part, where the part or
     the platform is a layer's height below where support would end, and on a mere ledge.
     """
-    missed = []
+    process, heights, outlines = areas.process, areas.heights, areas.sections.outlines
+    distance_mm, missed = process.support_distance_mm, [Polygons()] * len(wanted)
     for k, hanging in enumerate(wanted):
-        bare = hanging if hanging.is_empty() else _bare(k, hanging, printed, areas)
-        missed.append(bare if bare.is_empty() or not k else _without_near(k, bare, areas))
+        if hanging.is_empty():
+            continue
+        held = _held(k, printed, areas)
+        bare = _if_large(hanging - held)
+        if k and not held.is_empty() and not bare.is_empty():
+            around = (held + outlines[k - 1]) ^ bounding_box(bare, 2.0 * distance_mm + 1.0)
+            bare = bare - closing(around, 0.5 * distance_mm + RIM_MM)
+        lowest = float(heights.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
+        if k and lowest <= SAME_MM and areas.sections.on_platform:
+            continue
+        near = list(outlines[int(np.searchsorted(heights.tip_mm, lowest - SAME_MM)) : k - 1]) if k else []
+        missed[k] = _if_large(bare - union(near) if near else bare)
     return _drop_ledges(missed, printed, areas)
 
 
@@ -379,63 +344,33 @@ def _drop_ledges(missed: Sequence[Polygons], printed: Sequence[Polygons], areas:
             carrying = (outlines[k - 1] ^ bounding_box(bare, 2.0 * reach)) - above
             bare = bare - offset(carrying + _held(k, printed, areas), reach)
         beyond.append(bare)
-    large = [area for area in drop_small(beyond, process.support_least_mm2) if not area.is_empty()]
-    if not large:
-        return [Polygons()] * len(missed)
-    seen = offset(union(large), RIM_MM)
+    seen = offset(union([area for area in drop_small(beyond, process.support_least_mm2) if not area.is_empty()]), RIM_MM)
     wide = union([island for island in islands(above) if not (island ^ seen).is_empty()])
-    return [area if area.is_empty() else area ^ wide for area in missed]
+    return [area ^ wide for area in missed]
 
 
 def _held(k: int, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygons:
     """The places of a layer that lie over printed support."""
-    held = union([printed[m] for m in areas.carrying_layers(k) if m < len(printed)])
-    return held if held.is_empty() else offset(held, 0.5 * areas.process.line_width_mm)
-
-
-def _bare(k: int, hanging: Polygons, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygons:
-    """The part of a hanging place that lies over no support and does not span from there to the part."""
-    held, distance_mm = _held(k, printed, areas), areas.process.support_distance_mm
-    bare = hanging - held
-    if k and not held.is_empty() and bare.area() >= LEAST_MM2:
-        around = (held + areas.sections.outlines[k - 1]) ^ bounding_box(bare, 2.0 * distance_mm + 1.0)
-        bare = bare - closing(around, 0.5 * distance_mm + RIM_MM)
-    return bare if bare.area() >= LEAST_MM2 else Polygons()
-
-
-def _without_near(k: int, bare: Polygons, areas: ReachableAreas) -> Polygons:
-    """An unsupported place less what has plastic or the platform so near below that no layer of support fits between."""
-    process = areas.process
-    lowest = float(areas.heights.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
-    if lowest <= SAME_MM and areas.sections.on_platform:
-        return Polygons()
-    near = list(areas.sections.outlines[int(np.searchsorted(areas.heights.tip_mm, lowest - SAME_MM)) : k - 1])
-    rest = bare - union(near) if near else bare
-    return rest if rest.area() >= LEAST_MM2 else Polygons()
+    return offset(union([printed[m] for m in areas.carrying_layers(k) if m < len(printed)]), 0.5 * areas.process.line_width_mm)
 
 
 def explain(supports: Supports, tops_mm: Floats) -> tuple[Unsupported, ...]:
     """Every place that lies bare, the largest first, with the number of its layer among those that print anything.
 
-    tops_mm: heights of these.
+    What the layer below carries is left out, a line on that or beside one: slopes too steep for the process are printed like
+    that, layer upon layer. tops_mm: heights of the layers that print anything.
     """
-    sections, number = supports.sections, np.searchsorted(tops_mm, supports.sections.heights.tip_mm, side="right")
-    places = [(mm2, layer, _reason(layer, area, sections)) for mm2, layer, area in _connected_areas(_beyond_a_line(supports))]
-    places += [(mm2, layer, UNWANTED) for mm2, layer, _ in _connected_areas(supports.unwanted)]
-    places.sort(key=lambda place: (-place[0], place[1]))
-    return tuple(Unsupported(mm2, int(number[layer]), reason) for mm2, layer, reason in places)
-
-
-def _beyond_a_line(supports: Supports) -> list[Polygons]:
-    """The missed places of every layer without what the layer below carries: a line lies on that, or beside one that does. Slopes
-    too steep for the process are printed like that, layer upon layer."""
-    outlines, process = supports.sections.outlines, supports.sections.process
-    bare = list(supports.missed)
+    sections, process, bare = supports.sections, supports.sections.process, list(supports.missed)
     for k, missed in enumerate(bare):
         if k and not missed.is_empty():
-            near = outlines[k - 1] ^ bounding_box(missed, 2.0 * process.line_width_mm)
+            near = sections.outlines[k - 1] ^ bounding_box(missed, 2.0 * process.line_width_mm)
             bare[k] = missed - offset(near, process.line_width_mm)
-    return drop_small(bare, process.support_least_mm2)
+    hanging = _connected_areas(drop_small(bare, process.support_least_mm2))
+    places = [(mm2, layer, _reason(layer, area, sections)) for mm2, layer, area in hanging]
+    places += [(mm2, layer, UNWANTED) for mm2, layer, _ in _connected_areas(supports.unwanted)]
+    places.sort(key=lambda place: (-place[0], place[1]))
+    number = np.searchsorted(tops_mm, sections.heights.tip_mm, side="right")
+    return tuple(Unsupported(mm2, int(number[layer]), reason) for mm2, layer, reason in places)
 
 
 def _connected_areas(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, Polygons]]:
@@ -478,8 +413,7 @@ def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
 
 def _part_at_table(hanging: Polygons, z_mm: float, sections: Sections) -> int | None:
     """The part with which support could be printed under a place if the table were not in the way of the head."""
-    corners = np.concatenate(contours(hanging))
-    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    middle = 0.5 * (np.array(hanging.bounds()[:2]) + hanging.bounds()[2:])
     base_mm, machine = sections.part.base.offset_mm, sections.profile.machine
     below, under = (np.append(middle, base_mm + z) @ sections.part.rotation for z in (z_mm, 0.0))
     if not sections.on_platform and below[2] < least_tip_height_mm(machine, sections.part.pose):

@@ -41,8 +41,6 @@ MEETING = 0.8  # trunks lean towards each other only if they meet in this share 
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
 TIDY_EVERY = 4  # layers between two removals of slits and slivers from branches that are in the way of an obstacle
 INSET = 0.7  # of the lean: then right corners move by the lean
-
-
 STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
 WIDEST = 1.3  # times the distance: how far corners of widened places may reach; sharper ones than 100 degrees are cut off
 
@@ -86,16 +84,12 @@ def add_contact(branches: Sequence[Branch], contact: Polygons, reachable: Polygo
     """The branches of a layer with the contacts that begin in it; a contact joins its square's branch if that is no trunk."""
     grown = list(branches)
     young = {_cell(branch.x, branch.y): k for k, branch in enumerate(branches) if not branch.full}
-    for cell, piece in _pieces(contact) if not contact.is_empty() else ():
-        k = young.get(cell)
-        area = piece if k is None else grown[k].area + piece
+    for cell, piece in _pieces(contact):
+        k = young.get(cell, len(grown))
+        area = grown[k].area + piece if k < len(grown) else piece
         area = closing(area, JOIN_MM).simplify(SMOOTH_MM) ^ reachable
-        if area.area() <= LEAST_MM2:
-            continue
-        if k is None:
-            grown.append(branch_of(area))
-        else:
-            grown[k] = branch_of(area)
+        if area.area() > LEAST_MM2:
+            grown[k : k + 1] = [branch_of(area)]
     return grown
 
 
@@ -111,8 +105,7 @@ def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
         x0, y0, x1, y1 = island.bounds()
         (i0, j0), (i1, j1) = _cell(x0, y0), _cell(x1, y1)
         for i, j in product(range(i0, i1 + 1), range(j0, j1 + 1)):
-            whole = (i0, j0) == (i1, j1)
-            piece = island if whole else island ^ square.translate((i * CELL_MM, j * CELL_MM))
+            piece = island if (i0, j0) == (i1, j1) else island ^ square.translate((i * CELL_MM, j * CELL_MM))
             if piece.area() > LEAST_MM2:
                 pieces.setdefault((i, j), []).append(piece)
     return [(cell, Polygons.compose(several)) for cell, several in sorted(pieces.items())]
@@ -124,11 +117,7 @@ def trunk_radius_mm(process: Process, radius_mm: float) -> float:
 
 
 def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
-    """The branches of a layer in the layer below: every place of the former is within the lean of one of the latter, or
-    where it may stand.
-    """
-    if not branches:
-        return []
+    """The branches of a layer in the layer below: each place is within the lean of one of those there, or where it may stand."""
     lean, reachable = float(areas.lean_mm[layer]), areas.reachable[layer - 1]
     targets = _target_branches(branches, areas, layer)
     borders = index_edges(reachable)
@@ -137,8 +126,7 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
     bad = union(doubtful) - reachable
     if bad.area() < LEAST_MM2:
         return _drop_enclosed(targets)
-    low: list[Branch] = []
-    left: list[Branch] = []
+    low, left = list[Branch](), list[Branch]()
     for old, new, is_free, depth in zip(branches, targets, free, _depths(branches, borders), strict=True):
         if is_free or (new.area ^ bad).area() < LEAST_MM2:
             low.append(new)
@@ -179,21 +167,18 @@ def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: i
 
 def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
     """For each trunk half way to the nearest other one, or its own place; reach_mm: how far it can lean down to the ground."""
-    if len(at) < 2:
-        return [(float(x), float(y)) for x, y in at]
-    apart = np.hypot(at[:, None, 0] - at[None, :, 0], at[:, None, 1] - at[None, :, 1])
-    np.fill_diagonal(apart, np.inf)
-    nearest = apart.argmin(axis=1)
-    meet = apart[np.arange(len(at)), nearest] <= 2.0 * MEETING * reach_mm
-    goals = np.where(meet[:, None], 0.5 * (at + at[nearest]), at)
-    return [(float(x), float(y)) for x, y in goals]
+    if len(at):
+        apart = np.hypot(at[:, None, 0] - at[None, :, 0], at[:, None, 1] - at[None, :, 1])
+        np.fill_diagonal(apart, np.inf)
+        nearest = apart.argmin(axis=1)
+        meet = apart[np.arange(len(at)), nearest] <= 2.0 * MEETING * reach_mm
+        at = np.where(meet[:, None], 0.5 * (at + at[nearest]), at)
+    return [(float(x), float(y)) for x, y in at]
 
 
 def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: float, lean: float) -> Branch | None:
-    """The branch where it is, as thick as it was or by the lean thinner, if that is free.
-
-    borders: edges of the reached places; depth_mm: how deep inside them the branch's middle lies.
-    """
+    """The branch where it is, as thick as it was or by the lean thinner, if that is free. borders: edges of the reached places;
+    depth_mm: how deep inside them the branch's middle lies."""
     if branch.full and depth_mm >= branch.reach_mm:
         return branch
     if branch.radius <= THIN_MM:
@@ -211,8 +196,6 @@ def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: f
 
 def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
     """Branches in the way of an obstacle: the area with a place below stays; the rest moves aside or ends on the ground."""
-    if not branches:
-        return []
     reachable, lean = areas.reachable[layer - 1], float(areas.lean_mm[layer])
     area = union([branch.area for branch in branches])
     tidy = layer % TIDY_EVERY == 0
@@ -224,7 +207,9 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
         thick = drop_slivers(carrying)
         below = islands(thick.simplify(FINE_MM) + _widened(carrying - thick, reachable))
     for island in () if tidy else islands(carrying):  # what is just a thin limb of one can wait
-        below += islands(_widened(island, reachable)) if _sliver(island) else [island.simplify(FINE_MM)]
+        x0, y0, x1, y1 = island.bounds()
+        is_sliver = island.area() < 2.0 * SLIVER_MM * hypot(x1 - x0, y1 - y0)
+        below += islands(_widened(island, reachable)) if is_sliver else [island.simplify(FINE_MM)]
     return [branch_of(island) for island in below if island.area() >= LEAST_MM2]
 
 
@@ -233,18 +218,12 @@ def _widened(slivers: Polygons, reachable: Polygons) -> Polygons:
     return (widen(slivers, THIN_MM) ^ reachable).simplify(FINE_MM)
 
 
-def _sliver(island: Polygons) -> bool:
-    """Whether an island is on average narrower than a sliver, judged by its box."""
-    x0, y0, x1, y1 = island.bounds()
-    return bool(island.area() < 2.0 * SLIVER_MM * hypot(x1 - x0, y1 - y0))
-
-
 def _draw_in(area: Polygons, lean: float) -> Polygons:
     """The area with its edges drawn in; what is too narrow for that stays."""
     drawn_in = []
     for island in islands(area):
         core = offset(island, -INSET * lean)
-        bits = [] if core.is_empty() else islands(island - dilate(core, lean))
+        bits = islands(island - dilate(core, lean))
         drawn_in += [island] if core.is_empty() else [core, *(bit for bit in bits if bit.area() >= lean**2)]
     return union(drawn_in)
 
@@ -261,11 +240,9 @@ def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
 
 
 def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, lean_mm: float) -> Polygons:
-    """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it
-    must. What is placeable needs nothing.
-    """
-    straight = places ^ reachable
-    rest = places - reachable
+    """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it must.
+    What is placeable needs nothing."""
+    straight, rest = places ^ reachable, places - reachable
     if rest.area() >= LEAST_MM2:
         rest = rest - placeable
     if rest.area() >= LEAST_MM2:
@@ -280,8 +257,6 @@ def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, le
 
 
 def widen(area: Polygons, distance_mm: float) -> Polygons:
-    """The area grown by at least a distance, with hardly more corners than it has.
-
-    What is grown layer after layer must not get round corners: each of them would be two in the next layer.
-    """
+    """The area grown by at least a distance, with hardly more corners than it has. What is grown layer after layer must not get
+    round corners: each of them would be two in the next layer."""
     return offset(area, distance_mm, WIDEST)

@@ -93,4 +93,4 @@ def test_a_tree_takes_up_all_of_a_contact_that_is_reachable_in_a_branch_for_ever
 def test_nothing_that_begins_changes_no_tree_and_no_branches_go_nowhere() -> None:
     tree = [trunk(3.0, -2.0, 1.0)]
     assert add_contact(tree, Polygons(), Polygons.square((9.0, 9.0))) == tree
-    assert lower_branches([], None, 3) == []  # type: ignore[arg-type]
+    assert lower_branches([], in_the_open(1.0), 1) == []
