@@ -39,12 +39,11 @@ from slicer.heights import Heights, part_heights
 SKIN = 0.8  # line widths inside the section from where on a tip is off the outer wall, whose middle lies at 0.5
 SIDES = 32  # of what is round about an edge
 BELOW_MM = 0.02  # from a base plane to the section that stands for the cut face in it, of the parts on either side
-BASES_KEPT = 64
 LEVEL = 1e-9  # a plane whose normal is nearer to upright than this meets a layer nowhere or everywhere
 LEAST_COSINE = 0.05  # a plane that stands steeper is taken to lean so much: shadows on it stay finite
 AROUND_MM = 5.0  # support of a limb stays within this distance of its shadow
 COARSE_MM = 0.05  # tolerance to which a shadow is simplified
-PLACES_KEPT = 64
+KEPT = 64  # parts whose faces and shadows are cached
 STRIPE = 2.0  # line widths: grooves and ridges as wide as two beads can be printed
 HOLE_SIDES = 24  # of a hole
 MOUTH_MM = 1.0  # holes are cut so far beyond the base plane, where there is nothing, so that no skin is left over them
@@ -73,13 +72,10 @@ def frame_change(part: Part, to: Part) -> tuple[Floats, Floats]:
     return turn, turn[:, 2] * part.base.offset_mm - np.array([0.0, 0.0, to.base.offset_mm])
 
 
-@lru_cache(BASES_KEPT)
+@lru_cache(KEPT)
 def base_section(part: Part) -> Polygons:
     """The face with which a part stands on its base plane, in its frame."""
     return clean(cross_sections(part.in_part_frame(), np.array([BELOW_MM]))[0])
-
-
-atexit.register(base_section.cache_clear)  # polygons left when Python ends would make manifold3d print a list of leaks
 
 
 def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Polygons]:
@@ -101,20 +97,20 @@ def limb_planes(part: Part, later: Sequence[Part], heights: Heights, beside_mm: 
     return {limb.index: BasePlane.of(part, limb, heights, far_mm, offset(shadow_of(limb), beside_mm)) for limb in limbs}
 
 
-@lru_cache(PLACES_KEPT)
+@lru_cache(KEPT)
 def shadow_of(limb: Part) -> Polygons:
     """The outline of a limb seen along its direction, in its frame."""
     return solid_of(limb.in_part_frame()).project().simplify(COARSE_MM)
 
 
-@lru_cache(PLACES_KEPT)
+@lru_cache(KEPT)
 def room_of(limb: Part) -> Polygons:
     """The area of a limb's base plane over which it and its support are printed."""
     return offset_round(shadow_of(limb), AROUND_MM)
 
 
-atexit.register(shadow_of.cache_clear)  # as base_section
-atexit.register(room_of.cache_clear)
+for cached in (base_section, shadow_of, room_of):  # polygons left when Python ends would make manifold3d print a list of leaks
+    atexit.register(cached.cache_clear)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,14 +135,9 @@ class BasePlane:
             places = room_of(later)
         return cls(*frame_change(earlier, later), heights, far_mm, places)
 
-    @property
-    def cosine(self) -> float:
-        """The cosine of the angle between the two directions."""
-        return float(self.turn[2, 2])
-
     def z_mm(self, layer: int) -> float:
         """The height that stands for a layer."""
-        return float((self.heights.tip_mm if self.cosine >= 0.0 else self.heights.bottom_mm)[layer])
+        return float((self.heights.tip_mm if self.turn[2, 2] >= 0.0 else self.heights.bottom_mm)[layer])
 
     def points_mm(self, places: Floats) -> Floats:
         """(n, 3) points of the earlier frame for (n, 2) places on the plane."""
@@ -159,29 +150,25 @@ class BasePlane:
         if places.is_empty():
             return range(0)
         on_plane: Floats = self.points_mm(np.concatenate(contours(places)))[:, 2]
-        deeper = on_plane - deep_mm * self.cosine
+        deeper = on_plane - deep_mm * self.turn[2, 2]
         low, high = min(on_plane.min(), deeper.min()), max(on_plane.max(), deeper.max())
         return range(int(np.searchsorted(self.heights.tip_mm, low)), int(np.searchsorted(self.heights.bottom_mm, high)))
 
     def band(self, layer: int, low_mm: float, high_mm: float) -> Polygons:
         """The part of a layer low_mm to high_mm above the plane (negative: below it), over or under the places that count."""
-        whole = self._whole_band(layer, low_mm, high_mm)
+        normal, at_mm, far_mm = self.turn[2, :2], float(self.turn[2, 2] * self.z_mm(layer) + self.shift[2]), self.far_mm
+        across = float(np.hypot(*normal))
+        if across < LEVEL:
+            whole = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True) if low_mm <= at_mm <= high_mm else Polygons()
+        else:
+            near, far = np.clip((np.array([low_mm, high_mm]) - at_mm) / across, -far_mm, far_mm)
+            along, aside = normal / across, np.array([-normal[1], normal[0]]) / across * far_mm
+            corners = np.array([near * along - aside, far * along - aside, far * along + aside, near * along + aside])
+            whole = Polygons([corners]) if far > near else Polygons()
         if self.places is None or whole.is_empty():
             return whole
-        narrow_mm = max(LEAST_COSINE - abs(self.cosine), 0.0) * self.far_mm  # by which the shadow of a steep plane may be off
+        narrow_mm = max(LEAST_COSINE - abs(self.turn[2, 2]), 0.0) * far_mm  # by which the shadow of a steep plane may be off
         return whole ^ self.shadow(offset_round(self.places, narrow_mm) if narrow_mm else self.places, layer)
-
-    def _whole_band(self, layer: int, low_mm: float, high_mm: float) -> Polygons:
-        normal, at = self.turn[2, :2], float(self.turn[2, 2] * self.z_mm(layer) + self.shift[2])
-        across, far_mm = float(np.hypot(*normal)), self.far_mm
-        if across < LEVEL:
-            return Polygons.square((2.0 * far_mm, 2.0 * far_mm), True) if low_mm <= at <= high_mm else Polygons()
-        near, far = np.clip((np.array([low_mm, high_mm]) - at) / across, -far_mm, far_mm)
-        if far <= near:
-            return Polygons()
-        along = normal / across
-        aside = np.array([-along[1], along[0]]) * far_mm
-        return Polygons([np.array([near * along - aside, far * along - aside, far * along + aside, near * along + aside])])
 
     def project(self, places: Polygons, layer: int) -> Polygons:
         """Places in a layer carried straight onto the plane, in the later part's frame."""
@@ -208,16 +195,12 @@ def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Pol
     """Plastic just below the base plane; None on the platform. Parts not handed over are taken to fill the section."""
     if part.on_platform:
         return None
-    if not earlier:
-        return section
-    return sections_of(earlier, part, np.array([-BELOW_MM]))[0]
+    return sections_of(earlier, part, np.array([-BELOW_MM]))[0] if earlier else section
 
 
 def joints(part: Part, later: Sequence[Part], section: Polygons, below: Polygons | None) -> Floats:
-    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface.
-
-    section: of its first layer; below: the plastic under it, None on the platform.
-    """
+    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface. section: of
+    its first layer; below: the plastic under it, None on the platform."""
     rims = [] if below is None else [np.insert(loop, 2, 0.0, axis=1) for loop in contours(section ^ below)]
     for upper in later:
         for loop in contours(base_section(upper)):
@@ -228,14 +211,9 @@ def joints(part: Part, later: Sequence[Part], section: Polygons, below: Polygons
 
 
 def skin_beside(edges: Floats, section: Polygons, z_mm: float, process: Process) -> Polygons:
-    """Outer walls of a section near the edges of interfaces, where what a travel or wipe leaves shows along the joint."""
-    near = _beside(edges, z_mm, process.interface_seam_mm)
-    width_mm = min(process.line_width_mm, outer_wall_width_mm(process))
-    return near if near.is_empty() else near ^ (section - offset(section, -SKIN * width_mm))
-
-
-def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
-    """The part of the plane at a height that lies about as near as that to segments (n, 6) in space."""
+    """Outer walls of a section near the edges of interfaces, (n, 6) segments in space, where what a travel or wipe leaves shows
+    along the joint."""
+    reach_mm = process.interface_seam_mm
     near = near_height(edges, z_mm, reach_mm)
     if not len(near):
         return Polygons()
@@ -246,21 +224,16 @@ def _beside(edges: Floats, z_mm: float, reach_mm: float) -> Polygons:
     begin, end = (near[:, :3] + share[:, None] * (near[:, 3:] - near[:, :3]) for share in shares)
     heights = np.array([begin[:, 2], end[:, 2]]) - z_mm
     least = np.where(heights.prod(axis=0) < 0.0, 0.0, np.abs(heights).min(axis=0))
-    reaches = np.sqrt(np.maximum(reach_mm**2 - least**2, 0.0))
-    return union([_around(a, b, reach) for a, b, reach in zip(begin, end, reaches.tolist(), strict=True)])
-
-
-def _around(begin: Floats, end: Floats, reach_mm: float) -> Polygons:
-    """What lies as near as that to a segment seen from above."""
-    disc = Polygons.circle(reach_mm, SIDES)
-    return Polygons.batch_hull([disc.translate((float(x), float(y))) for x, y in (begin[:2], end[:2])])
+    discs = [Polygons.circle(reach, SIDES) for reach in np.sqrt(np.maximum(reach_mm**2 - least**2, 0.0)).tolist()]
+    rows = zip(discs, begin[:, :2].tolist(), end[:, :2].tolist(), strict=True)
+    around = union([Polygons.batch_hull([disc.translate(a), disc.translate(b)]) for disc, a, b in rows])
+    width_mm = min(process.line_width_mm, outer_wall_width_mm(process))
+    return around ^ (section - offset(section, -SKIN * width_mm))
 
 
 def plan_pins(parts: Sequence[Part], profile: Profile) -> Pins:
-    """The pins of all parts of a print, or of those that are known, in print order; {} where no part wants any.
-
-    profile: of the whole print; the part that fills pins says how they are made.
-    """
+    """The pins of all parts of a print, or of those that are known, in print order; {} where no part wants any. profile: of the
+    whole print; the part that fills pins says how they are made."""
     wanted = [part.index for part in parts if not part.on_platform and profile.of_part(part.index).process.interlock == "pins"]
     planned: dict[int, Floats] = {}
     for part in parts if wanted else ():
@@ -322,12 +295,10 @@ def _hole(x: float, y: float, wide_mm: float, bottom_mm: float, top_mm: float) -
 
 def _places(room: Polygons, process: Process) -> list[tuple[float, float]]:
     """Middles of holes: a grid in the room, as wide as leaves no more of them than are wanted."""
-    step_mm, places = process.pin_spacing_mm, _grid(room, process.pin_spacing_mm)
-    for _ in range(MOST_WIDENED):
+    for widened in range(MOST_WIDENED + 1):
+        places = _grid(room, process.pin_spacing_mm * WIDENED**widened)
         if len(places) <= process.most_pins:
             break
-        step_mm *= WIDENED
-        places = _grid(room, step_mm)
     return places[: process.most_pins]
 
 
@@ -337,8 +308,7 @@ def _grid(room: Polygons, step_mm: float) -> list[tuple[float, float]]:
     for island in sorted(islands(room), key=lambda piece: piece.bounds()):
         x0, y0, x1, y1 = island.bounds()
         grid = [(x, y) for y in _row(y0, y1, step_mm) for x in _row(x0, x1, step_mm)]
-        within = lie_within(index_edges(island), np.array(grid)).tolist()
-        places += list(compress(grid, within)) or [_deepest(island)]
+        places += list(compress(grid, lie_within(index_edges(island), np.array(grid)))) or [_deepest(island)]
     return places
 
 
@@ -394,8 +364,8 @@ def cut_grooves(
 
 def grooves(part: Part, process: Process) -> Polygons:
     """Grooves under a part's base, in its frame: stripes along x that end before the walls, so that none is seen."""
-    base, first = base_section(part), interface_process(process)
-    inside = offset(base, -(first.walls + 1) * first.line_width_mm) if not base.is_empty() else base
+    first = interface_process(process)
+    inside = offset(base_section(part), -(first.walls + 1) * first.line_width_mm)
     if inside.is_empty():
         return inside
     x0, y0, x1, y1 = inside.bounds()
