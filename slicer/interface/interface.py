@@ -94,7 +94,8 @@ def limb_planes(part: Part, later: Sequence[Part], heights: Heights, beside_mm: 
     """The base planes of later limbs by part index, each as far as that beside its limb."""
     limbs = [upper for upper in later if upper.base.limbs_mm is not None]
     far_mm = 2.0 * float(np.linalg.norm(part.in_part_frame().vertices, axis=1).max()) if limbs else 0.0
-    return {limb.index: BasePlane.of(part, limb, heights, far_mm, offset(shadow_of(limb), beside_mm)) for limb in limbs}
+    places = {limb.index: offset(shadow_of(limb), beside_mm) for limb in limbs}
+    return {limb.index: BasePlane(*frame_change(part, limb), heights, far_mm, places[limb.index]) for limb in limbs}
 
 
 @lru_cache(KEPT)
@@ -129,10 +130,9 @@ class BasePlane:
     places: Polygons | None = None
 
     @classmethod
-    def of(cls, earlier: Part, later: Part, heights: Heights, far_mm: float, places: Polygons | None = None) -> "BasePlane":
-        """The base plane of a later part, as far as it or its support is printed over it unless other places are given."""
-        if places is None and later.base.limbs_mm is not None:
-            places = room_of(later)
+    def of(cls, earlier: Part, later: Part, heights: Heights, far_mm: float) -> "BasePlane":
+        """The base plane of a later part, as far as it or its support is printed over it."""
+        places = None if later.base.limbs_mm is None else room_of(later)
         return cls(*frame_change(earlier, later), heights, far_mm, places)
 
     def z_mm(self, layer: int) -> float:

@@ -22,7 +22,7 @@ from profiles.machine import Machine
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, half_plane, offset, offset_round, rectangle, union, unite_layers
 from slicer.heights import SAME_MM, Heights
-from slicer.interface.interface import BasePlane, in_frame_of, plane_in_frame_of, room_of
+from slicer.interface.interface import BasePlane, frame_change, in_frame_of, plane_in_frame_of, room_of
 from slicer.sectioning import Sections
 
 COARSE_MM = 0.03  # sections are simplified by this before they are grown
@@ -174,7 +174,7 @@ def above_base_planes(
     blocked = _above_planes(planes, heights, far_mm)
     for limb in limbs:
         for low_mm, places in head_room(limb, machine, gap_mm):
-            plane = BasePlane.of(part, limb, heights, far_mm, places)
+            plane = BasePlane(*frame_change(part, limb), heights, far_mm, places)
             blocked = unite_layers(blocked, [plane.band(layer, low_mm, np.inf) for layer in range(len(blocked))])
     return blocked
 

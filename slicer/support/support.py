@@ -250,21 +250,15 @@ def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Po
     """Support from the lowest layer up: what lies within the lean of the layer below or stands, wide enough for a bead."""
     printed: list[Polygons] = []
     for m, body in enumerate(bodies):
-        if not body.is_empty() and (m > 0 or not areas.sections.on_platform):
-            rest = body - dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else body
-            loose = rest if drop_slivers(rest).is_empty() else _loose(rest, areas, m)
-            if not drop_slivers(loose).is_empty():
-                body = _clip_loose(body, loose, areas)
+        rest = body - dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else body
+        if (m or not areas.sections.on_platform) and not drop_slivers(rest).is_empty():
+            placeable = areas.placeable[m] ^ bounding_box(rest, areas.radius_mm)
+            # Discs reach beyond placeable places, but nothing stands beside one alone.
+            alone = [piece for piece in islands(rest) if drop_slivers(piece ^ placeable).is_empty()]
+            loose = union([rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm), *alone])
+            body = body if drop_slivers(loose).is_empty() else _clip_loose(body, loose, areas)
         printed.append(body)
     return printed
-
-
-def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """The share that does not stand of support which no support carries: discs reach beyond placeable places, but nothing stands
-    beside one alone."""
-    placeable = areas.placeable[m] ^ bounding_box(rest, areas.radius_mm)
-    beside = rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm)
-    return union([beside, *(piece for piece in islands(rest) if drop_slivers(piece ^ placeable).is_empty())])
 
 
 def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polygons:

@@ -57,8 +57,7 @@ class Walls:
 def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:
     """Up to `count` walls of a section, of varying width where islands are narrow; 0: one where no line of a fill has room."""
     rule = bead_rule(count, process, height_mm, nozzle_mm)
-    thick: list[Polygons] = []
-    narrow: list[Polygons] = []
+    thick, narrow = list[Polygons](), list[Polygons]()
     for island in islands(section):
         (thick if _is_thick(island, rule) else narrow).append(island)
     even = walls(Polygons.compose(thick), count, process, height_mm)
@@ -93,10 +92,8 @@ def walls_under_tops(
 def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) -> Rule:
     """The rule for a number of walls of a process in layers of that height."""
     outer, inner = outer_wall_width_mm(process), process.line_width_mm
-    taken = inner - spacing_mm(inner, height_mm)
-    least = least_width_mm(nozzle_mm, height_mm)
-    most = max(WIDEST * nozzle_mm, outer, inner)
-    return Rule(count, outer - taken, inner - taken, taken, least, most)
+    taken, most = inner - spacing_mm(inner, height_mm), max(WIDEST * nozzle_mm, outer, inner)
+    return Rule(count, outer - taken, inner - taken, taken, least_width_mm(nozzle_mm, height_mm), most)
 
 
 def _is_thick(island: Polygons, rule: Rule) -> bool:
