@@ -58,8 +58,8 @@ def anchor_skins(
 ) -> tuple[list[Region], dict[int, list[Bead]]]:
     """The regions of all layers with skins that end on infill or on what is solid, and the infill of those below such skins."""
     done, drawn = list(filled), dict[int, list[Bead]]()
-    for layer, (region, process) in enumerate(zip(filled[1:], processes, strict=False), 1):
-        k, width = layer - 1, processes[layer].line_width_mm
+    for k, process in enumerate(processes[:-1]):  # the layer below and its settings
+        layer, region, width = k + 1, filled[k + 1], processes[k + 1].line_width_mm
         below = open_area(done[k].sparse, fillings, process, k, lightning=False)
         if below.is_empty() or ((region.solid + region.top) ^ below).area() < width**2:
             continue
