@@ -200,9 +200,7 @@ def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float
     leaning = np.abs(mesh.normals[:, 2])
     level, bin_mm = leaning > FLAT, max(BIN_SHARE * least_mm, highest_mm / MOST_BINS)
     steepest = _worst(mesh.vertices[:, 2], mesh.faces[~level], leaning[~level], bin_mm, int(highest_mm / bin_mm) + 1)
-    most_mm = np.clip(
-        process.adaptive_cusp_mm / np.maximum(steepest, 1e-9), least_mm, process.most_layer_height_mm
-    )  # in each bin
+    most_mm = np.clip(process.adaptive_cusp_mm / np.maximum(steepest, 1e-9), least_mm, process.most_layer_height_mm)
     levels_mm, which = np.unique(np.round(mesh.vertices[mesh.faces[level, 0], 2], 6), return_inverse=True)
     wide = np.bincount(which, mesh.areas_mm2[level], len(levels_mm)) >= LEAST_LEVEL_MM2
     stops = [stop for stop in levels_mm[wide].tolist() if from_mm < stop < top_mm - least_mm] + [top_mm]

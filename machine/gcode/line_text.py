@@ -47,7 +47,7 @@ LETTERS = {
 }  # fmt: skip
 
 # Comments that begin layers and parts, their sign and the blanks around taken off: all read them alike.
-begins_layer = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}").fullmatch  # PrusaSlicer's word and ours, Cura's
+LAYER = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}")  # PrusaSlicer's word and ours, Cura's
 PART = re.compile(r"PART: *([0-9]{1,6})(?: of ([0-9]{1,6}))?.*")
 
 
@@ -197,6 +197,11 @@ def _joined(code: str, words: list[tuple[str, str]]) -> str:
     return " ".join(
         f"{command_name(letter + number) if letter in 'GMT' else letter + number.lstrip('+')}" for letter, number in words
     )
+
+
+def begins_layer(comment: str) -> bool:
+    """Whether a comment begins a layer."""
+    return LAYER.fullmatch(comment) is not None
 
 
 def begun_part(comment: str) -> tuple[int, int] | None:

@@ -32,7 +32,7 @@ class Texts(NamedTuple):
 
     @staticmethod
     def of(pieces: Sequence[bytes]) -> "Texts":
-        """Pieces put together."""
+        """Pieces put together; a kernel takes no array of no bytes, so without any text there is a blank."""
         return Texts(np.frombuffer(b"".join(pieces) or b" ", np.uint8), np.cumsum([0, *map(len, pieces)]))
 
 

@@ -93,7 +93,7 @@ class ProgramPosition:
             self.layer = 1 if self.layer is None else self.layer + 1
         elif part := begun_part(comment):
             self.part, self.layer, self.parts = part[0], None, part[1] or self.parts
-        return begins is not None
+        return begins
 
     def read_m73(self, command: str, now_s: float) -> None:
         """Take note of the P (per cent done) and R (minutes left) of an M73; nothing of another command."""

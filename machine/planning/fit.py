@@ -36,12 +36,11 @@ STILL = np.eye(3)  # turns nothing
 EDGE_MM = 2.0  # kept to the plate's edge
 STEP_MM = 2.5  # between places that are tried beside those where boxes touch
 ROUNDING_MM = 1e-6
-
 ROUNDING_DIGITS = 6
 CELLS_MM = (2.0, 0.6)  # finer ones would bring models nearer to each other by 2 mm at most, and take many times as long
 SIDES = 8  # sides of the polygon that stands for the round corner of a brim
 _ROUND = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)])
-Turn = tuple[int, int]  # a model of the plate and one of its parts, both by their places in the lists, from 0
+PartOfModel = tuple[int, int]  # a model of the plate and one of its parts, both by their places in the lists, from 0
 
 
 def check_parts(parts: Sequence[Part], profile: Profile) -> None:
@@ -166,15 +165,15 @@ class Plate:
     the brim around what stands on the plate. With a raft all stand higher. sizes_mm: the models' boxes, gap_mm apart."""
 
     def __init__(
-        self, models: Sequence[Decomposition], together: Sequence[Turn], alone: Sequence[Turn], profile: Profile, brim_mm: float,
-        sizes_mm: Sequence[Place], gap_mm: float,
+        self, models: Sequence[Decomposition], together: Sequence[PartOfModel], alone: Sequence[PartOfModel], profile: Profile,
+        brim_mm: float, sizes_mm: Sequence[Place], gap_mm: float,
     ) -> None:  # fmt: skip
         self.models, self.together, self.alone, self.brim_mm = models, together, alone, brim_mm
         self._sizes_mm, self._gap_mm = sizes_mm, gap_mm
         self._profile, self._machine, self._up_mm = profile, profile.machine, lift_mm(profile)
-        lifted = {model: standing_at(model, MIDDLE, self._up_mm) for model in dict.fromkeys(models)}
-        self._parts = [lifted[model].parts for model in models]
-        self._around_mm = {lifted[model].parts[0]: self._width_around(model) for model in lifted}
+        raised = {model: standing_at(model, MIDDLE, self._up_mm) for model in dict.fromkeys(models)}
+        self._parts = [raised[model].parts for model in models]
+        self._around_mm = {raised[model].parts[0]: self._width_around(model) for model in raised}
         self._hulls: dict[Part, Floats] = {}
         self._known: dict[tuple[object, ...], bool] = {}
 

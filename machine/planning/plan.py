@@ -163,11 +163,8 @@ def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Pr
     machine, length_mm = profile.machine, profile.machine.purge_mm
     if length_mm <= 0.0:
         return None
-    low, width_mm, z_mm = (
-        _low_strokes(parts, sliced, machine),
-        PURGE_WIDTH * machine.head.nozzle_mm,
-        profile.process.first_layer_height_mm,
-    )
+    low, z_mm = _low_strokes(parts, sliced, machine), profile.process.first_layer_height_mm
+    width_mm = PURGE_WIDTH * machine.head.nozzle_mm
     pose, (least, most) = level(machine), np.array(list(axis_limits(machine).values())[:3]).T
     for count, outward in product(range(1, MOST_LANES + 1), OUTWARD):
         lanes = _lanes(machine, outward, count, length_mm / count, width_mm)

@@ -201,7 +201,7 @@ def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Spe
                 break
         else:
             best = candidate if _ways_clear(candidate, turn, machine) else best
-        lowest = min(lowest, max(least, *turn.least_z_mm))
+        lowest = min(lowest, candidate.across_z_mm)
     if best is not None:
         return best
     where = f"turning the table to {machine.tilt.letter}{turn.end.tilt_deg:.3f} {machine.turn.letter}{turn.end.turn_deg:.3f}"

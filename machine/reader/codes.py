@@ -282,7 +282,7 @@ def _number(values: Values, key: str, default: float | None = None) -> float:
     text = values.get(key)
     number = default if text is None else read_number(text)
     if number is None:
-        raise GcodeError(f"{key} is {text!r}: a number is expected"[:190])
+        raise GcodeError(f"{key} is {str(text)[:150]!r}: a number is expected")
     return number
 
 

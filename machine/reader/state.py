@@ -18,7 +18,7 @@ from profiles.machine import Machine
 DEFAULT_FEED = 1500.0
 REMARK_COLUMNS = 6  # columns of remark_rows: part, layer, type, width, height, acceleration
 ROOM = 1024  # remarks
-Words = Mapping[str, float]  # of one command: no letter stands there twice
+Words = Mapping[str, float]  # of one command; of a letter that stands there twice, as in the text behind an M code, the last one
 
 
 class Columns(NamedTuple):

@@ -6,7 +6,8 @@ itself is known from the real layers. Each layer has a rough length of lines, fr
 
 The layers are divided into runs of about equal rough time. Two neighbouring layers of each run are sliced by the slicer's own
 code and timed with the machine's acceleration; the whole run differs from its rough figures by the same factor. Seams lie where
-the layer alone would have them. The estimate is for choosing between decompositions; the dry run has the exact figures.
+the layer alone would have them, and a spiral vase counts as ordinary walls. The estimate is for choosing between decompositions;
+the dry run has the exact figures.
 """
 
 from collections.abc import Sequence
@@ -40,7 +41,7 @@ from slicer.strokes.seam_plan import NO_LIMITS, rear_of
 from slicer.support.handed_down import plan_supports, up_to
 from slicer.support.support import Supports, own_supports, wanted_places
 
-SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced: they miss 2 % (rms of 44 prints), 12 pairs 3 to 4 %
+SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced: of 44 prints they miss 2 % (rms), 12 pairs 3 to 4 %
 FEWEST = 12  # pairs of a part
 RUN = 8  # layers a pair stands for, at least: with more of them a small print would take as long as slicing all of it
 STEP = 2  # layers that a thick one stands for: growing support from half of the layers takes half the time

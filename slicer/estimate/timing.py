@@ -21,6 +21,7 @@ from slicer.strokes.strokes import Strokes
 from slicer.strokes.travels import STANDING_MM
 
 TINY = 1e-9
+SPEED, MOST_MM_S2, STANDS = 6, 7, 8  # columns of a table of moves, after the steps of six axes
 # A wipe turns in its middle by 45 deg, as over the small rings after which most are: mm along each axis for a mm of all of it.
 TURNED = 0.5 / sqrt(2.0)
 
@@ -190,7 +191,7 @@ def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profi
     pulls = material.retract_mm > 0.0
     wipe_mm = material.wipe_mm if pulls else 0.0
     moves = _moves(places, tip, bounds, strokes.retract, speeds, (process.lift_mm, wipe_mm, material.retract_mm))
-    speed_mm_s, most_mm_s2, stands = np.ascontiguousarray(moves[:, 6:].T)
+    speed_mm_s, most_mm_s2, stands = np.ascontiguousarray(moves[:, SPEED:].T)
     moving_s = move_times(moves[:, :6], speed_mm_s, stands > 0.0, machine, most_mm_s2).sum()
     rise_s = line_s(process.layer_height_mm, speeds.lift_mm_s, machine.z.acceleration_mm_s2)
     # The filament moves alone where a retraction ends, and where it begins without a wipe.
@@ -254,5 +255,5 @@ def _add(moves: Floats, n: int, step: tuple[float, float, float], speed: float, 
     if sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2) <= STANDING_MM:
         return n
     moves[n, 0], moves[n, 1], moves[n, 2] = step
-    moves[n, 6], moves[n, 7], moves[n, 8] = speed, most_mm_s2, stands
+    moves[n, SPEED], moves[n, MOST_MM_S2], moves[n, STANDS] = speed, most_mm_s2, stands
     return n + 1

@@ -110,8 +110,8 @@ def room_of(limb: Part) -> Polygons:
     return offset_round(shadow_of(limb), AROUND_MM)
 
 
-for cached in (base_section, shadow_of, room_of):  # polygons left when Python ends would make manifold3d print a list of leaks
-    atexit.register(cached.cache_clear)
+for _cached in (base_section, shadow_of, room_of):  # polygons left when Python ends would make manifold3d print a list of leaks
+    atexit.register(_cached.cache_clear)
 
 
 @dataclass(frozen=True, eq=False)

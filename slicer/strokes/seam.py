@@ -31,9 +31,8 @@ KEPT = 0.25  # from this strength on a planned corner is kept to, however far th
 GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
 FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
 NO_SEAMS = np.zeros((0, 2))
-Target = tuple[
-    float, float, float, float
-]  # where a seam is drawn to, and the distance, mm, that inner and outer corners are worth
+# Where a seam is drawn to, and the distance, mm, that inner and outer corners are worth.
+Target = tuple[float, float, float, float]
 SAMPLE_MM = 2.0  # straight sides are tried at this distance, too
 OFF_WALL = 0.7  # of its length a lead has to reach inside: so far beside its middle the outer wall is out of the tip's way
 

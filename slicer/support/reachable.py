@@ -82,6 +82,12 @@ class ReachableAreas:
         lowest = int(np.searchsorted(self.heights.tip_mm, drop_mm - slack_mm - SAME_MM))
         return range(highest, min(lowest, highest) - 1, -1) if highest >= 0 else range(0)
 
+    @property
+    def lowest_on_plastic(self) -> int:
+        """The layer in which support on what lies below the base plane begins; one more than the last where all are too low."""
+        gap_mm = self.process.support_bottom_gap_mm
+        return int(np.searchsorted(np.maximum(self.heights.bottom_mm, 0.0), gap_mm - SAME_MM))
+
     def next_above(self, layer: int) -> int:
         """The first layer over one that support in it keeps no gap to."""
         return int(np.searchsorted(self.heights.bottom_mm, self.heights.tip_mm[layer] + self.process.support_gap_mm - SAME_MM))
@@ -114,7 +120,6 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
     plain = [outline.simplify(COARSE_MM) for outline in sections.outlines[:highest]]
     wide = [offset(outline, radius + MARGIN_MM) for outline in plain]
     tall = [offset(outline, radius + process.support_distance_mm + MARGIN_MM) for outline in plain[:count]]
-    root = int(np.searchsorted(np.maximum(areas.heights.bottom_mm, 0.0), process.support_bottom_gap_mm - SAME_MM))
     placeable: list[Polygons] = []
     reachable: list[Polygons] = []
     for m in range(count):
@@ -122,7 +127,7 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
         close = (tall[m], *wide[near:m], *wide[m + 1 : areas.next_above(m)], offset(blocked[m], radius + MARGIN_MM))
         obstacles = union([obstacle for obstacle in close if not obstacle.is_empty()])
         stands = [offset(plain[near - 1], BEYOND * radius)] if near > 0 and process.support_on_part else []
-        if sections.plastic_below is not None and m == root:
+        if sections.plastic_below is not None and m == areas.lowest_on_plastic:
             stands.append(offset(sections.plastic_below, BEYOND * radius))
         if handed is not None and m == 0:
             stands.append(handed)

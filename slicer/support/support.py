@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import pi, radians, tan
+from math import inf, pi, radians, tan
 
 import numpy as np
 
@@ -308,11 +308,12 @@ def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: Rea
 def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
     """The hanging places that support does not hold, layer by layer.
 
-    A place is held over printed support and half a bead beyond its edge, where it spans from there to the part, where the part or
-    the platform is a layer's height below where support would end, and on a mere ledge.
+    A place is held over printed support and half a bead beyond its edge, where it spans from there to the part, where no layer of
+    support fits between it and the part, the platform or the plastic below the base plane, and on a mere ledge.
     """
     process, heights, outlines = areas.process, areas.heights, areas.sections.outlines
     distance_mm, missed = process.support_distance_mm, [Polygons()] * len(wanted)
+    below, first_mm = areas.sections.plastic_below, np.append(heights.tip_mm, inf)[areas.lowest_on_plastic]
     for k, hanging in enumerate(wanted):
         if hanging.is_empty():
             continue
@@ -325,6 +326,8 @@ def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: 
         if k and lowest <= SAME_MM and areas.sections.on_platform:
             continue
         near = list(outlines[int(np.searchsorted(heights.tip_mm, lowest - SAME_MM)) : k - 1]) if k else []
+        if k and below is not None and first_mm > heights.bottom_mm[k] - process.support_gap_mm + SAME_MM:
+            near.append(below)
         missed[k] = _if_large(bare - union(near) if near else bare)
     return _drop_ledges(missed, printed, areas)
 

@@ -41,6 +41,7 @@ MITRE = 100.0  # deg: round a sharper corner of a hole the loop is cut off
 SMOOTH = 0.05  # radians: no mitre for less
 PER_CORNER = 3  # points that a corner of a triangle gives at most: that on its rib, and two of a mitre
 WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
+REACH, DEPTH, SPACING = 4, 5, 6  # columns of a table of ribs, after foot and way
 SHORTEST = 1.0  # nominal spacings: a shorter loop is none
 TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
 STEP = 0.42  # nominal spacings: sampling of the boundary
@@ -80,11 +81,11 @@ def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
     walls: list[Wall] = []
     for level in range(rule.walls):
         ribs, starts, node = trace_loops(triangulation, skeleton, rule, level)
-        if not len(node):
+        loops = [(_loop(ribs[a:b], rule, level), piece) for (a, b), piece in zip(pairwise(starts), piece_of[node], strict=True)]
+        kept = [Wall(course, level, True, int(level == 0), int(piece)) for course, piece in loops if len(course)]
+        if not kept:
             break
-        for (a, b), piece in zip(pairwise(starts.tolist()), piece_of[node].tolist(), strict=True):
-            course = _loop(ribs[a:b], rule, level)
-            walls += [Wall(course, level, True, int(level == 0), piece)] if len(course) else []
+        walls += kept
     middle = lines_along(skeleton, rule, piece_of) + _dots(skeleton, rule, piece_of)
     borders = {piece: index_edges(pieces[piece]) for piece in {wall.piece for wall in middle if wall.level == 0}}
     middle = [wall if wall.level else _clipped(wall, borders[wall.piece], rule) for wall in middle]
@@ -95,7 +96,7 @@ def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
 
 def _loop(ribs: Floats, rule: Rule, level: int) -> Floats:
     """The course (n, 3) of a loop, its widths smoothed where counts change; empty where it is too short."""
-    feet, ways, (reach, depth, spacing) = ribs[:, :2], ribs[:, 2:4], ribs[:, 4:].T.copy()
+    feet, ways, (reach, depth, spacing) = ribs[:, :2], ribs[:, 2:4], ribs[:, REACH:].T.copy()
     line, reach_mm = feet + ways * depth[:, None], TRANSITION * rule.inner
     if length_mm(close_loop(line)) < SHORTEST * rule.inner:
         return np.zeros((0, 3))
@@ -139,7 +140,7 @@ def trace_loops(triangulation: Triangulation, skeleton: Skeleton, rule: Rule, le
                     n = _cross(skeleton, (t, twin // 3), depth[t], room_there, ribs, n)
                 h = after(h)
             for k in range(begun, n):
-                ribs[k, 5], ribs[k, 6] = depth[t], spacing_of(rule, skeleton.beads[t], skeleton.thick[t], level)
+                ribs[k, DEPTH], ribs[k, SPACING] = depth[t], spacing_of(rule, skeleton.beads[t], skeleton.thick[t], level)
         node[loops] = start // 3
         loops += 1
         starts[loops] = n
@@ -150,7 +151,7 @@ def trace_loops(triangulation: Triangulation, skeleton: Skeleton, rule: Rule, le
 def _add(ribs: Floats, n: int, foot: tuple[float, float], way: tuple[float, float], reach: float) -> int:
     ribs[n, 0], ribs[n, 1] = foot
     ribs[n, 2], ribs[n, 3] = way
-    ribs[n, 4] = reach
+    ribs[n, REACH] = reach
     return n + 1
 
 

@@ -141,6 +141,14 @@ def test_a_place_that_gets_none_is_told_with_the_part_that_is_in_the_way() -> No
     assert unsupported.reason == "support would stand where the head prints part 2"
 
 
+@pytest.mark.parametrize("gap_mm", [0.2, 0.4, 0.5, 0.6])
+def test_a_place_too_close_above_an_earlier_part_for_support_is_as_good_as_held(gap_mm: float) -> None:
+    plate = m3.Manifold.cube((24, 20, 2), True).translate((0, 0, 6 + gap_mm))
+    stem = m3.Manifold.cube((6, 20, 1 + gap_mm), True).translate((0, 0, 4.5 + 0.5 * gap_mm))
+    model = standing(m3.Manifold.cube((24, 20, 5), True).translate((0, 0, 2.5)) + stem + plate)
+    assert [piece.unsupported for piece in slice_parts(cut(model, ((0, 0, 1), 5.0)), profile())] == [(), ()]
+
+
 def corners(supports: Supports) -> list[Floats]:
     """(n, 3) corners of every layer's support, at its top and bottom."""
     heights, points = supports.sections.heights, []
