@@ -12,7 +12,7 @@ the dry run has the exact figures.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import pi, sqrt
+from math import ceil, pi, sqrt
 
 import numpy as np
 
@@ -44,7 +44,8 @@ from slicer.support.support import Supports, own_supports, wanted_places
 SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced: of 44 prints they miss 2 % (rms), 12 pairs 3 to 4 %
 FEWEST = 12  # pairs of a part
 RUN = 8  # layers a pair stands for, at least: with more of them a small print would take as long as slicing all of it
-STEP = 2  # layers that a thick one stands for: growing support from half of the layers takes half the time
+STEP = 2  # layers that a thick one stands for, at least: growing support from half of the layers takes half the time
+MOST_THICK = 200  # thick layers of a part: a higher part has thicker ones
 FEW = 40  # layers up to the highest place that hangs whose support is grown as it is
 WAY_S = 0.3  # to a layer and to each of its outlines
 SLOWER = 1.4  # strokes with their accelerations and travels than their lengths at their speeds
@@ -180,14 +181,15 @@ def _rough_supports(sections: Sequence[Sections], overhangs: Sequence[Sequence[O
 def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
     """The support that a part has of its own, in thick layers; the first layer stands for itself."""
     process, heights = sections.process, sections.heights
-    begins = np.array([0, *range(1, len(heights.tip_mm), STEP)])
+    step = max(STEP, ceil(len(heights.tip_mm) / MOST_THICK))
+    begins = np.array([0, *range(1, len(heights.tip_mm), step)])
     ends = np.append(begins[1:], len(heights.tip_mm))
     middles = (begins + ends - 1) // 2
     # Hanging places lie anywhere in a thick layer, and support ends below it: the gaps are lost in that.
     coarse = {
         "support": "auto",  # the wanted places are chosen already
-        "support_interface_layers": -(-process.support_interface_layers // STEP),
-        "support_bottom_interface_layers": -(-process.support_bottom_interface_layers // STEP),
+        "support_interface_layers": -(-process.support_interface_layers // step),
+        "support_bottom_interface_layers": -(-process.support_bottom_interface_layers // step),
         "support_gap_mm": 0.0,
         "support_bottom_gap_mm": 0.0,
     }
