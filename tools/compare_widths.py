@@ -17,6 +17,7 @@ others the width of the beam makes no difference.
 
 import argparse
 import csv
+import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -33,11 +34,11 @@ from mdp.learning.task import PAPER_TERMS
 from mdp.learning.widths import NOTHING_COMMON, compare, read_searches, table
 from mdp.mesh import Mesh
 from mdp.model_file import locate
-from mdp.ranking.ranker import CLASSIC
+from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.read import read_mesh
 from mdp.search.search import decompose
 from profiles.errors import LearningError, MeshError
-from profiles.profile import load
+from profiles.profile import Profile, load
 
 Key = tuple[str, str, str, int, str]
 
@@ -114,14 +115,21 @@ def _main(arguments: Sequence[str] | None) -> None:
 
 def _search_models(options: argparse.Namespace) -> None:
     settings = [*(PAPER_TERMS if options.paper_terms else ()), *options.set]
-    done = {row.key for row in read(options.out)}
+    methods, rankers = options.methods.split(","), options.rankers.split(",")
+    for method, width in product(methods, options.widths):  # what is wrong is told before anything is written
+        _profile(settings, method, width)
+    for ranker in rankers:
+        ranker_named(ranker)
+    done, models = {row.key for row in read(options.out)}, _models(options)
+    if not models:
+        raise LearningError(f"folder {options.folder}: holds no model (*.npz) that is asked for")
     with _opened(options.out) as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Row)], lineterminator="\n")
         if file.tell() == 0:
             writer.writeheader()
-        for path in _models(options):
-            kinds = product(options.methods.split(","), options.widths, options.rankers.split(","))
-            wanted = list(dict.fromkeys((path.stem, " ".join(settings), *kind) for kind in kinds))
+        for path in models:
+            kinds = product(methods, options.widths, rankers)
+            wanted = list(dict.fromkeys((path.stem, shlex.join(settings), *kind) for kind in kinds))
             for row in rows(path, [key for key in wanted if key not in done], options.limit, options.faces):
                 writer.writerow(asdict(row))
                 file.flush()
@@ -176,13 +184,17 @@ def rows(path: Path, missing: Sequence[Key], limit: int | None, most_faces: int 
 def _warm_up(settings: str, ranker: str) -> None:
     """Load the kernels and the ranker once, before anything is timed."""
     tree, _ = read_mesh(locate("demo:tree"))
-    decompose(tree, "tree", load(settings=(*settings.split(), "search.directions=50")), ranker=ranker)
+    decompose(tree, "tree", load(settings=(*shlex.split(settings), "search.directions=50")), ranker=ranker)
+
+
+def _profile(settings: Sequence[str], method: str, width: int) -> Profile:
+    return load(settings=(*settings, f"search.method={method}", f"search.beam_width={width}"))
 
 
 def searched(key: Key, mesh: Mesh) -> Row:
     """One search, its failure included."""
     name, settings, method, width, ranker = key
-    profile = load(settings=(*settings.split(), f"search.method={method}", f"search.beam_width={width}"))
+    profile = _profile(shlex.split(settings), method, width)
     core, wall = time.process_time(), time.perf_counter()
     search = (name, settings, method, width, len(mesh.faces))
     try:

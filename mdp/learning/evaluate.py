@@ -115,7 +115,9 @@ def _analyse(network: Network, lists: Sequence[RatedList], options: argparse.Nam
     lost = importance(_scores(network), network.columns, lists)
     rows = [f"| {name} | {value:.4f} |" for name, value in zip(network.columns, lost, strict=True)]
     sys.stdout.write("\n".join(["| feature | importance |", "|---|---:|", *rows, ""]))
-    file = options.pictures / f"figure8-{network.file.stem}.png"
+    alike = [file for file in options.ranker if file.stem == network.file.stem]
+    number = f"-{alike.index(network.file) + 1}" if len(alike) > 1 else ""
+    file = options.pictures / f"figure8-{network.file.stem}{number}.png"
     save(draw_features(network.columns, lost, correlation(network.columns, lists)), file)
     sys.stdout.write(f"\n![importance and correlation]({file})\n")
 

@@ -44,11 +44,24 @@ def test_a_summary_of_no_table_of_searches_ends_with_a_sentence(tmp_path: Path, 
         (("--widths", "a"), "'a': whole numbers between commas are allowed"),
         (("--every", "0"), "--every is 0: 1 or more is allowed"),
         (("--faces", "0"), "--faces is 0: 4 or more is allowed"),
+        (("--methods", "clever"), "search.method is"),
+        (("--rankers", "mine"), "--ranker mine: classic, learned or the name of an .onnx file is allowed"),
+        (("--widths", "0"), "search.beam_width is 0"),
+        (("--only", "zzz"), "holds no model (*.npz) that is asked for"),
         (("--out", "nowhere/out.csv"), "table nowhere/out.csv: cannot be written (No such file or directory)"),
     ],
 )
 def test_a_run_that_cannot_be_made_ends_with_a_sentence(
     words: tuple[str, str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    np.savez(tmp_path / "tee.npz", vertices=shapes.tee().vertices, faces=shapes.tee().faces)
     assert main([str(tmp_path), "--out", str(tmp_path / "out.csv"), *words]) == 1
     assert sentence in capsys.readouterr().err
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_a_setting_with_a_blank_stays_one_setting(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    np.savez(tmp_path / "tee.npz", vertices=shapes.tee().vertices, faces=shapes.tee().faces)
+    words = ["--set", "process.name=my own", "--set", "search.directions=40", "--widths", "1"]
+    assert main([str(tmp_path), "--out", str(tmp_path / "out.csv"), *words]) == 0
+    assert [row.settings for row in read(tmp_path / "out.csv")] == ["'process.name=my own' search.directions=40"]
