@@ -122,8 +122,10 @@ def hanging_area(section: Polygons, below: Polygons, share: float, width_mm: flo
 
 
 def bulge_flow(width_mm: float, height_mm: float, free_sides: int, most_mm: float) -> float:
-    """Flow of a bead that fills the rectangle of its width on its free sides, where nothing covers its round ones. The bead
-    bulges by most_mm at most: half of height times (1 - pi/4) would fill the rectangle."""
+    """Flow of a bead that fills the rectangle of its width on its free sides, where nothing covers its round ones.
+
+    The bead bulges by most_mm at most: half of height times (1 - pi/4) would fill the rectangle.
+    """
     bulge = min(0.5 * height_mm * ROUND_SIDES, most_mm)
     return 1.0 + free_sides * bulge * height_mm / bead_area_mm2(width_mm, height_mm)
 

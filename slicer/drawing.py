@@ -33,10 +33,12 @@ LEGEND_MM = 3.0  # height of a row of the legend
 
 
 def layer_svg(sliced: SlicedPart, number: int) -> str:
-    """The picture of a part's layer, counted from 1, in the part's frame: x to the right, y up, 1 unit = 1 mm. Each bead is a
-    polyline as wide as the bead in the group of its kind (id: the kind's name), with round ends; travels are thin lines, dashed
-    without and solid with a retraction; a dot stands at the beginning of every outer wall. Raises SliceError for a layer that the
-    part does not have."""
+    """The picture of a part's layer, counted from 1, in the part's frame: x to the right, y up, 1 unit = 1 mm.
+
+    Each bead is a polyline as wide as the bead in the group of its kind (id: the kind's name), with round ends; travels are
+    thin lines, dashed without and solid with a retraction; a dot stands at the beginning of every outer wall. Raises
+    SliceError for a layer that the part does not have.
+    """
     if not 1 <= number <= len(sliced.layers):
         raise SliceError(f"part {sliced.index} has no layer {number}: its layers are 1 to {len(sliced.layers)}")
     layer = sliced.layers[number - 1]

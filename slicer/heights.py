@@ -60,10 +60,12 @@ class Heights:
 def layer_heights(
     mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0, limb_planes_mm: Sequence[float] = ()
 ) -> Heights:
-    """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it. A pedestal is sliced for
-    itself and ends pedestal_gap_mm below the model. A layer ends in each of the limb planes: heights, lowest first, at which the
-    part goes on beside limbs that are printed later; but for planes less than the least layer from the top or from the one below.
-    Raises SliceError as equal_heights()."""
+    """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
+
+    A pedestal is sliced for itself and ends pedestal_gap_mm below the model. A layer ends in each of the limb planes: heights,
+    lowest first, at which the part goes on beside limbs that are printed later; but for planes less than the least layer
+    from the top or from the one below. Raises SliceError as equal_heights().
+    """
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
     first_mm = process.first_layer_height_mm if on_platform else interface_height_mm(process)
     from_mm, heights = 0.0, Heights(*np.zeros((3, 0)))
@@ -193,9 +195,11 @@ def _worst(z: Floats, faces: Ints, leaning: Floats, bin_mm: float, bins: int) ->
 
 def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float) -> list[float]:
     """Heights of layers from one height up towards another, each as high as the surface beside it allows; mesh: part frame.
+
     Layers end at level surfaces and at the top, none is lower than least_layer_height_mm or higher than most_layer_height_mm:
     where what is left under a level is less than two of the least, one layer takes all of it, or the level is passed over where
-    that one would be too high. What is left so under the top is not taken."""
+    that one would be too high. What is left so under the top is not taken.
+    """
     least_mm, highest_mm = process.least_layer_height_mm, float(mesh.bounds_mm[1, 2])
     leaning = np.abs(mesh.normals[:, 2])
     level, bin_mm = leaning > FLAT, max(BIN_SHARE * least_mm, highest_mm / MOST_BINS)

@@ -41,8 +41,10 @@ class Place:
 
 def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -> list[Place]:
     """Where in the layers of a part other settings hold than those of its process, those of a later place over an earlier one's.
+
     mesh: the part's, in its frame; cuts_mm: the middles of the layers. Raises SliceError for settings that do not go with the
-    process's own."""
+    process's own.
+    """
     places = []
     (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
     window = rectangle(x0, y0, x1, y1)

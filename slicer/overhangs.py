@@ -33,8 +33,10 @@ GAIN = 0.1  # share by which lines must sag less than in the directions tried be
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """hanging: what it spans; angle_deg: direction of its lines, 0 to 180. longest_mm: the longest span; loose: share of the
-    lines' length that is not held at both ends."""
+    """hanging: what it spans; angle_deg: direction of its lines, 0 to 180.
+
+    longest_mm: the longest span; loose: share of the lines' length that is not held at both ends.
+    """
 
     hanging: Polygons
     angle_deg: float
@@ -48,8 +50,11 @@ class Bridge:
 
 @dataclass(frozen=True, eq=False)
 class Overhang:
-    """The overhangs of one layer. hanging: needs support; bridges: lines span them; ledges: carry themselves, though no line
-    spans them; unwanted: would need support, but a person wants none there."""
+    """The overhangs of one layer.
+
+    hanging: needs support; bridges: lines span them; ledges: carry themselves, though no line spans them; unwanted: would need
+    support, but a person wants none there.
+    """
 
     hanging: Polygons = field(default_factory=Polygons)
     bridges: tuple[Bridge, ...] = ()
@@ -58,10 +63,12 @@ class Overhang:
 
 
 def find_overhangs(sections: Sections) -> list[Overhang]:
-    """For every layer the part of its outline above a risky face, and what begins over nothing. On the platform the first layer
-    may lie. What carries itself by the search's definition (mdp.support_need) does not hang; what bridges layer by layer, as
-    arches do, does not either. Without support whatever has an anchor to hold on to is printed as a bridge, however long.
-    Whatever reaches over the layer below in a place where a person wants support hangs."""
+    """For every layer the part of its outline above a risky face, and what begins over nothing.
+
+    On the platform the first layer may lie. What carries itself by the search's definition (mdp.support_need) does not hang;
+    what bridges layer by layer, as arches do, does not either. Without support whatever has an anchor to hold on to is printed as
+    a bridge, however long. Whatever reaches over the layer below in a place where a person wants support hangs.
+    """
     process, mesh, outlines, cuts_mm = sections.process, sections.mesh, sections.outlines, sections.heights.cut_mm
     level_mm, arch_mm = (inf, inf) if process.support != "auto" else (process.bridge_mm, process.arch_longest_mm)
     enforces = process.support != "none" and len(sections.enforced) > 0
@@ -98,8 +105,10 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
 def _sort_islands(
     hanging: Polygons, need: Polygons, anchors: Polygons, process: Process, longest_mm: tuple[float, float]
 ) -> Overhang:
-    """Sorts the connected pieces of a hanging place. need: what of it needs support by the search's definition; longest_mm: of
-    bridges that do not, and of those that do."""
+    """Sorts the connected pieces of a hanging place.
+
+    need: the part of it that needs support by the search's definition; longest_mm: of bridges that do not, and of those that do.
+    """
     width_mm, places = process.line_width_mm, islands(hanging)
     if all(island.area() < LEAST * width_mm**2 for island in places):
         return Overhang(need)
@@ -118,9 +127,11 @@ def _sort_islands(
 
 def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> Bridge | None:
     """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
-    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The mean fourth power of the spans is
-    least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach over, that is the
-    direction of the shortest spans. angle_deg: the direction where one is asked for, 0: none is."""
+
+    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The mean fourth
+    power of the spans is least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach
+    over, that is the direction of the shortest spans. angle_deg: the direction where one is asked for, 0: none is.
+    """
     if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):
         return None
     sides = edges(hanging)
@@ -186,8 +197,10 @@ def bridges_of_layers(
     sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons], layers: Sequence[int]
 ) -> list[tuple[Bridge, ...]]:
     """The bridges of some layers, in rising order: those that carry themselves, and what hangs over no support, as it best can.
+
     Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
-    supported: where each layer's support is."""
+    supported: where each layer's support is.
+    """
     process, heights, outlines = sections.process, sections.heights, sections.outlines
     width_mm = process.line_width_mm
     bridges = [overhang.bridges for overhang in overhangs] + [()] * (len(outlines) - len(overhangs))
@@ -213,8 +226,10 @@ def bridges_of_layers(
 
 def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> list[Bridge]:
     """Lines over one connected hanging place, each piece of it in the direction in which most of them are held at both ends.
+
     Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn. angle_deg: as
-    find_bridge."""
+    find_bridge.
+    """
     bridges: list[Bridge] = []
     left = [hanging]
     while left:

@@ -144,9 +144,11 @@ def section_parts(parts: Sequence[Part], profile: Profile) -> list[Sections]:
 def section_part(
     part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = (), pins: Pins | None = None
 ) -> Sections:
-    """The sections of a part that is printed after `earlier` and before `later` parts. profile: of the whole print; pins: of all
-    its parts, planned here if they are not given. Raises SliceError when the part's mesh is not closed, or too high to be
-    meant."""
+    """The sections of a part that is printed after `earlier` and before `later` parts.
+
+    profile: of the whole print; pins: of all its parts, planned here if they are not given. Raises SliceError when the part's
+    mesh is not closed, or too high to be meant.
+    """
     of_print, profile = profile, profile.of_part(part.index)
     if profile.process.spiral_vase:  # its bottom and what is above it know of one wall and of no inside
         hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
@@ -254,8 +256,10 @@ def reach_mm(process: Process) -> float:
 def compensate(
     outlines: Sequence[Polygons], part: Part, later: Sequence[Part], beside: Sequence[Polygons], cuts_mm: Floats, process: Process
 ) -> list[Polygons]:
-    """The outlines of a part's layers with outsides and holes compensated, but for its cut faces. beside: what later parts have
-    of each layer; cuts_mm: heights of the layers' sections."""
+    """The outlines of a part's layers with outsides and holes compensated, but for its cut faces.
+
+    beside: what later parts have of each layer; cuts_mm: heights of the layers' sections.
+    """
     if process.outline_compensation_mm == 0.0 and process.hole_compensation_mm == 0.0:
         return list(outlines)
     planes = [plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in later if upper.base.limbs_mm is None]
@@ -269,8 +273,11 @@ def compensate(
 def compensated(
     own: Polygons, others: Polygons, below: Sequence[Sequence[float]], over: Polygons | None = None, *, process: Process
 ) -> Polygons:
-    """A part's section, which others of its model touch, with the sides compensated that no other touches. below: a, b, c of the
-    base plane of each later part that is not a limb; material is added only where a x + b y + c > 0, and not within `over`."""
+    """A part's section, which others of its model touch, with the sides compensated that no other touches.
+
+    below: a, b, c of the base plane of each later part that is not a limb; material is added only where a x + b y + c > 0, and
+    not within `over`.
+    """
     if own.is_empty():
         return own
     whole = own if others.is_empty() else own + closing(own + others, TOUCHING_MM)
@@ -363,7 +370,10 @@ def _within(segments: Floats, box: Zone) -> tuple[Floats, Floats]:
 
 def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
     """For each layer the sections of the volumes and the shadows of the faces, as they belong to it, that are marked on a part;
-    [] where nothing is. mesh: the part's, in its frame; cuts_mm: the middles of the layers."""
+    [] where nothing is.
+
+    mesh: the part's, in its frame; cuts_mm: the middles of the layers.
+    """
     if not marked.anywhere:
         return []
     named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))

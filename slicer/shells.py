@@ -101,8 +101,10 @@ class Shells:
 
 
 def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequence[int] | None = None) -> Shells:
-    """The shells of a part with the support that was planned for it. layers: those that are asked for, all where None; of the
-    others there is what these need, or nothing."""
+    """The shells of a part with the support that was planned for it.
+
+    layers: those that are asked for, all where None; of the others there is what these need, or nothing.
+    """
     sections = supports.sections
     process, places, processes = sections.process, sections.places, layer_processes(sections)
     own, above, (top, bottom), count = sections.own, sections.above, most_shell_layers(process, places), len(processes)
@@ -307,8 +309,10 @@ def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
-    """The walls as beads; all ranks are at most 0, so that walls come before gaps, skin and infill. Outer beads make up for what
-    their outer round side leaves out of the section."""
+    """The walls as beads; all ranks are at most 0, so that walls come before gaps, skin and infill.
+
+    Outer beads make up for what their outer round side leaves out of the section.
+    """
     outer, beads = outer_wall_width_mm(process), []
     outer_flow = bulge_flow(outer, height_mm, 1, process.outer_bulge * outer)
     for level, loops in enumerate(walled.loops):
@@ -385,8 +389,10 @@ def interface_mm3(shells: Shells) -> dict[int, float]:
 
 
 def nearest_areas(whole: Polygons, distances: Sequence[Floats], near: Sequence[Polygons | None]) -> list[float]:
-    """mm2 of an area where each of several linear functions a x + b y + c is the least of those that count there. near: where
-    each counts, None: everywhere."""
+    """mm2 of an area where each of several linear functions a x + b y + c is the least of those that count there.
+
+    near: where each counts, None: everywhere.
+    """
     areas = []
     for k, (mine, own) in enumerate(zip(distances, near, strict=True)):
         nearer = whole if own is None else whole ^ own

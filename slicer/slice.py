@@ -74,8 +74,10 @@ class SlicingProgress:
 def slice_parts(
     parts: Sequence[Part], profile: Profile, on_progress: Callable[[SlicingProgress], None] | None = None
 ) -> tuple[SlicedPart, ...]:
-    """Every part sliced; on_progress: called now and then. Raises SliceError as slice_part does, for the first part in print
-    order that has a reason."""
+    """Every part sliced; on_progress: called now and then.
+
+    Raises SliceError as slice_part does, for the first part in print order that has a reason.
+    """
     if not parts:
         return ()
     models = sum(part.on_platform for part in parts)
@@ -227,8 +229,10 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
 def order_layer(
     beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons
 ) -> tuple[Strokes, Floats, float]:
-    """The beads of a layer in order, with their (k,) speeds and the flow of all of them. tip: where the layer below ends; skin:
-    its outer walls beside the edges of interfaces."""
+    """The beads of a layer in order, with their (k,) speeds and the flow of all of them.
+
+    tip: where the layer below ends; skin: its outer walls beside the edges of interfaces.
+    """
     sections, own, height_mm = shells.sections, shells.layers[index].process, float(shells.sections.heights.height_mm[index])
     profile, process, outline = sections.profile, sections.process, sections.outlines[index]
     if index == 0 and not sections.on_platform:
@@ -281,8 +285,9 @@ def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
 
 def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
     """The beads of a first layer on plastic, what fills its walls before them: outer walls are laid last, against beads that are
-    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up for
-    there, not where a wall has its seam."""
+    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up
+    for there, not where a wall has its seam.
+    """
     inside = [replace(bead, rank=BEFORE_WALLS) if FILL <= bead.rank <= LAST else bead for bead in beads]
     if any(bead.rank <= OUTSIDE for bead in inside):
         return inside

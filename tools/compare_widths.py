@@ -116,7 +116,7 @@ def _main(arguments: Sequence[str] | None) -> None:
 def _search_models(options: argparse.Namespace) -> None:
     settings = [*(PAPER_TERMS if options.paper_terms else ()), *options.set]
     methods, rankers = options.methods.split(","), options.rankers.split(",")
-    for method, width in product(methods, options.widths):  # what is wrong is told before anything is written
+    for method, width in product(methods, options.widths):  # errors are reported before anything is written
         _profile(settings, method, width)
     for ranker in rankers:
         ranker_named(ranker)

@@ -74,7 +74,9 @@ def chords(start: Point, end: Point, centre: Point, sweep: float, count: int) ->
 
 def fit_arcs(points: Floats, pushed: Floats, tolerance_mm: float) -> tuple[NDArray[np.int64], Floats]:
     """Runs of a polyline (n, 2) that an arc replaces within the tolerance both ways; pushed: (n - 1,) filament of each step.
-    Returns (m, 2) the first and last point of each run, in order, and (m, 3) its centre x, y and 1 (clockwise) or 0."""
+
+    Returns (m, 2) the first and last point of each run, in order, and (m, 3) its centre x, y and 1 (clockwise) or 0.
+    """
     steps = np.hypot(*np.diff(points, axis=0).T)
     runs, arcs = np.empty((len(points), 2), np.int64), np.empty((len(points), 3))
     count = _fit_arcs(np.ascontiguousarray(points), pushed / np.maximum(steps, 1e-9), tolerance_mm, runs, arcs)

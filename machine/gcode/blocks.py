@@ -94,7 +94,8 @@ def cold_block(lines: Sequence[str], dialect: Dialect) -> tuple[list[str], list[
     run a macro, a file or a cycle of the machine's own, or are not known.
 
     Raises MoveError where a line that may heat is one that homes, or stands before it: without it the machine may not be homed
-    as it must be. A block without homing is one as a whole, but for a firmware that is homed by hand."""
+    as it must be. A block without homing is one as a whole, but for a firmware that is homed by hand.
+    """
     heats = [heat_in(line, dialect) for line in lines]
     homing = [index for index, line in enumerate(lines) if homes(line, dialect)]
     last = homing[-1] if homing else -1 if dialect.homed_before else len(lines)
@@ -169,7 +170,8 @@ def fill_block(block: str, name: str, values: Mapping[str, object], dialect: Dia
     """The block's lines with {placeholders} replaced, empty lines left out.
 
     A firmware on a serial line gets them without remarks in parentheses, whose words it would execute. Raises ProfileError for an
-    unknown placeholder, for a line whose text firmwares read differently and for a command too long for the firmware."""
+    unknown placeholder, for a line whose text firmwares read differently and for a command too long for the firmware.
+    """
     lines, longest = [], dialect.longest_line
     for line in block.split("\n"):
         text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).rstrip()

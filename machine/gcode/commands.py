@@ -216,7 +216,9 @@ def stands_still(line: str, dialect: Dialect) -> bool:
 
 def _commands(line: str) -> list[tuple[str, str]]:
     """Name and rest of every command in a line; a text that is shown is none.
-    A line that firmwares read differently is one command that nothing is known of."""
+
+    A line that firmwares read differently is one command that nothing is known of.
+    """
     try:
         text = read_line(line).command.upper()
     except GcodeError:

@@ -62,7 +62,8 @@ def read_line(line: str) -> LineText:
     """Take a line apart, with or without its line end. Raises GcodeError, which does not name the line, where firmwares would not
     agree about its text: parentheses or quotes without their partner, an axis named twice, a checksum that does not fit.
 
-    A command of words comes out in capitals, one blank before each word; a text or a macro stays as it is written."""
+    A command of words comes out in capitals, one blank before each word; a text or a macro stays as it is written.
+    """
     text = line.strip()
     if text[:1] in ("", ";"):
         return LineText("", text[1:])
@@ -105,7 +106,9 @@ def macro_name(line: str) -> str:
 
 def plain_line(line: str) -> str:
     """A line as every firmware of a printer reads it as we do, for a file that is not sent command by command.
-    It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line()."""
+
+    It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line().
+    """
     if is_plain_move(line):
         return line
     line = line.rstrip("\r\n")
@@ -149,7 +152,8 @@ def _unframe(text: str, begin: int) -> str:
 
 def _without_remarks(text: str, name: str) -> tuple[str, str]:
     """Code without remarks in parentheses, and the comment. Parentheses between quotes, in a free text, or in a macro right
-    behind a letter (NAME=cube_(1)) are no remarks."""
+    behind a letter (NAME=cube_(1)) are no remarks.
+    """
     code, comment = "", ""
     free, macro, shown = name in FREE_TEXT, MACRO.fullmatch(name) is not None, name in SHOWN
     for piece in PIECE.findall(text):

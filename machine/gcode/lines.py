@@ -40,7 +40,8 @@ class Lines(Sequence[str]):
     """The lines of a text without their ends; equal to any sequence of the same lines.
 
     content: UTF-8 with a line end after every line; start: (n + 1,) where each line begins, and where the last one ends, in 32
-    bits as long as these do."""
+    bits as long as these do.
+    """
 
     def __init__(self, content: Bytes, start: Starts) -> None:
         self.content, self.start = content, start
@@ -146,7 +147,8 @@ codecs.register_error(OLD_LETTERS, _old_letters)
 
 class GcodeFile:
     """Iterating gives the lines without their ends. A file is UTF-8; single bytes that are not, as in the comments of other
-    programs, are read as Windows-1252. Raises GcodeError when the file cannot be read or is no text, which a zero byte shows."""
+    programs, are read as Windows-1252. Raises GcodeError when the file cannot be read or is no text, which a zero byte shows.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -94,7 +94,8 @@ class Modes:
         """Take the words of a move: `coordinates` become where it leads, F the feed; True when an axis is named.
 
         A coordinate that is None is not known: a step leaves it so. Raises GcodeError, if strict, for an F that is not above 0
-        and for a word that is no axis's; else they change nothing."""
+        and for a word that is no axis's; else they change nothing.
+        """
         axes, units, steps, offset = self.axes.words, self.units, self.steps, self.offset
         moved = False
         for letter, value in words:

@@ -100,7 +100,8 @@ def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tu
     """Factor that scales the filament of each step, in proportion to its written length, so that the sum stays; and the most
     filament for a millimetre as written. A factor of 0: nothing is redistributed.
 
-    Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed."""
+    Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed.
+    """
     whole = shared = densest = 0.0
     for k in range(first + 1, end):
         whole += filament_mm[k]
@@ -284,7 +285,9 @@ def _words(pose: Pose, pen: Pen) -> str:
 
 def _stepped(to: Pose, tilt_deg: float, turn_deg: float, speed_deg_s: float, pen: Pen) -> Iterator[str]:
     """MANUAL_STEPPER, one line an axis: both begin together, and speeds and accelerations in proportion end them together.
-    Only the last one is waited for; it is the one that goes farther."""
+
+    Only the last one is waited for; it is the one that goes farther.
+    """
     axes = [
         (abs(tilt_deg), pen.values["tilt_stepper"], to.tilt_deg, pen.machine.tilt),
         (abs(turn_deg), pen.values["turn_stepper"], to.turn_deg, pen.machine.turn),

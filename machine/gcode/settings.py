@@ -73,7 +73,9 @@ def flat(value: Any, key: str) -> Iterator[tuple[str, str]]:
 @dataclass(frozen=True, eq=False)
 class PartTotals:
     """What a part's beads come to: (2, 3) least and greatest axis positions X Y Z, filament, the layers that have any.
-    line: of the comment."""
+
+    line: of the comment.
+    """
 
     line: int
     part: int

@@ -28,7 +28,9 @@ BLOCKS = ("start", "before_part", "after_part", "end")
 
 def write_gcode(program: MachineProgram, profile: Profile) -> Lines:
     """The lines of a G-code file in the dialect of profile.machine.
-    Raises ProfileError for a block of the profile that cannot be filled in or that the firmware refuses."""
+
+    Raises ProfileError for a block of the profile that cannot be filled in or that the firmware refuses.
+    """
     check_blocks(profile)
     machine = profile.machine
     dialect = dialect_of(machine)
@@ -44,7 +46,9 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Lines:
 
 def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
     """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end; filament in mm.
-    Counted with the waits for hotter layers after turns of the table."""
+
+    Counted with the waits for hotter layers after turns of the table.
+    """
     machine = profile.machine
     start, end, move = straight_moves(program, level(machine))
     stop = np.zeros(len(move), dtype=np.bool_)

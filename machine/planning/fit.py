@@ -47,7 +47,8 @@ def check_parts(parts: Sequence[Part], profile: Profile) -> None:
     """Raise MoveError when the machine has no room for a part of a model about the turn axis, at its place on the plate.
 
     A part that stands as its pose has it reaches outside X, Y or Z, or the first one stands over the plate's edge. Half a line
-    is left at the sides, for the tip stays so far inside what it prints."""
+    is left at the sides, for the tip stays so far inside what it prints.
+    """
     for part in parts:
         _check_reach(part, profile)
         if part.on_platform:
@@ -71,7 +72,9 @@ def _check_reach(part: Part, profile: Profile) -> None:
 
 def check_standing(mesh: Mesh, profile: Profile) -> None:
     """Raise MoveError when what stands on the platform of a model about the turn axis lies over the plate's edge at its place.
-    Brims and supports are not known yet: the dry run looks at them."""
+
+    Brims and supports are not known yet: the dry run looks at them.
+    """
     machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
     standing = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM, :2] + _shift(profile)[:2]
     over, edge = over_edge_mm(np.maximum(np.abs(standing) - inset_mm, 0.0), machine.table)
@@ -110,7 +113,9 @@ def lifted(
     decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile
 ) -> tuple[Decomposition, list[SlicedPart]]:
     """Parts that were sliced as if they stood on the plate, and their layers, above their raft.
-    So the layers are those that they have without a raft, and all that keeps clear of the table keeps clear of the raft."""
+
+    So the layers are those that they have without a raft, and all that keeps clear of the table keeps clear of the raft.
+    """
     up = np.array([0.0, 0.0, lift_mm(profile)])
     moved = [piece.moved(*(part.rotation @ up)[:2].tolist()) for part, piece in zip(decomposition.parts, sliced, strict=True)]
     return standing_at(decomposition, MIDDLE, float(up[2])), moved
@@ -144,7 +149,8 @@ def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine,
     """Up to `count` middles (workpiece x, y, mm) of boxes of that size, gap_mm apart, the nearest to a place first.
 
     Rows and columns may have a box or a gap at that place, or in the middle of the plate: what holds most is taken, among equals
-    what stays nearer to the place."""
+    what stays nearer to the place.
+    """
     lattices: list[list[Place]] = []
     for anchor_mm, shift in product(dict.fromkeys((about_mm, MIDDLE)), product((0.0, 0.5), (0.0, 0.5))):
         axes, reach_mm = [], machine.table.radius_mm + hypot(*anchor_mm)

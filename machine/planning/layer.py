@@ -95,7 +95,9 @@ class Tip:
 
 def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats) -> float:
     """Z at which the tip crosses along an approach (k, 2) to a stroke's start, pulled back where it `retracts`.
-    Within a limb the filament is pulled back and the tip lifted wherever the head would meet what stands beside the limb."""
+
+    Within a limb the filament is pulled back and the tip lifted wherever the head would meet what stands beside the limb.
+    """
     if retracts:
         retract(tip)
     lift, level = tip.profile.process.lift_mm if retracts else 0.0, float(start[2])
@@ -217,7 +219,8 @@ def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
     """The way of a wipe after one stroke.
 
     Where the stroke is shorter it goes on, back over the way to its beginning, to the strokes before it in the layer; where
-    there are none, to and fro. Where it must not go over the stroke itself, it goes on over those at once."""
+    there are none, to and fro. Where it must not go over the stroke itself, it goes on over those at once.
+    """
     points = laid.points[laid.starts[k] : laid.starts[k + 1]]
     if not laid.wiped[k] and not (len(before) and runs_round(points, laid.width[k])):
         return before[:0]
@@ -253,7 +256,9 @@ def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
 
 def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> Standing:
     """The printed beads that stand above the base plane of a limb, in its frame.
-    Beads less than their width above the plane are left out: they are the steps of the cut face on which the limb stands."""
+
+    Beads less than their width above the plane are left out: they are the steps of the cut face on which the limb stands.
+    """
     tops, widest_mm = [np.zeros((0, 3))], 0.0
     for part, piece in printed:
         turn, shift = frame_change(part, limb)
@@ -276,7 +281,9 @@ def clear_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> flo
 
 def _resampled(way_mm: Floats, ends: Indices = NO_ENDS) -> tuple[Floats, Indices]:
     """A way (n, d) with points added so that they are at most STEP_MM apart, and the point of the way that each comes from.
-    ends: points from which no way leads to the next one."""
+
+    ends: points from which no way leads to the next one.
+    """
     steps = np.diff(way_mm, axis=0)
     counts = np.maximum(np.ceil(np.linalg.norm(steps, axis=1) / STEP_MM), 1).astype(np.int64)
     counts[ends] = 1
@@ -288,7 +295,9 @@ def _resampled(way_mm: Floats, ends: Indices = NO_ENDS) -> tuple[Floats, Indices
 
 def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_plate: bool) -> None:
     """Print a layer whose points are at (n, 3) machine coordinates, its own moved by a shift.
-    From one place where the filament is pulled back to the next the moves are written at once."""
+
+    From one place where the filament is pulled back to the next the moves are written at once.
+    """
     profile, starts = tip.profile, layer.starts
     strokes = _strokes(tip, layer, points, on_plate=on_plate)
     tip.run_in_mm -= run_in(strokes, layer, tip.run_in_mm, profile)
@@ -311,7 +320,9 @@ def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_pla
 
 def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves:
     """The strokes of a layer whose points are at (n, 3) machine coordinates.
-    Filament by volume (a stroke's flow holds the material's); the speed lowered to what axes, extruder and hot end can do."""
+
+    Filament by volume (a stroke's flow holds the material's); the speed lowered to what axes, extruder and hot end can do.
+    """
     profile, counts = tip.profile, np.diff(layer.starts)
     material = profile.material
     filament_mm2 = pi * material.diameter_mm**2 / 4.0
@@ -362,7 +373,8 @@ def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> fl
     """Add filament that is still to be pushed after a turn to the strokes of a layer; how much they take, mm.
 
     A stroke takes half more than its width and height need, the next one some of the rest; one that is seen takes it only in a
-    layer that has no other."""
+    layer that has no other.
+    """
     if more_mm <= 0.0:
         return 0.0
     seen, taken_mm = layer.is_of(*SEEN), 0.0
@@ -388,7 +400,9 @@ def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> fl
 @kernel
 def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices, begin: Floats, speeds: Speeds) -> Moves:
     """Strokes with the travels to those that begin apart from where the one before them ends, along the approach.
-    begin: (5,) X Y Z of the tip, Z over which it crosses to the first stroke, and what is to be pushed before that."""
+
+    begin: (5,) X Y Z of the tip, Z over which it crosses to the first stroke, and what is to be pushed before that.
+    """
     most = len(strokes.ways) + approach_starts[-1] - approach_starts[0] + 7 * len(apart) + 1  # three travels and a push
     out, done = Moves(table(most, 4), table(5 * len(apart), 6)), longs(2, 0)
     add_point(out, done, begin[0], begin[1], begin[2], 0.0)

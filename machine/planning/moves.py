@@ -20,7 +20,9 @@ RICHER = 1.004  # times as much filament as planned a short stroke may get where
 @dataclass(frozen=True)
 class BeginPart:
     """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient.
-    unsupported: the places of it that no support could be given."""
+
+    unsupported: the places of it that no support could be given.
+    """
 
     index: int
     pose: Pose
@@ -79,7 +81,8 @@ class MachineProgram:
     way to each point, 0 at the first one of a path, where the tip already stands. Wipes and retractions push less than 0. A
     retraction and a turn of the table have one point, where the tip stands; other marks have none. Columns, (m,) each: what:
     index in KINDS of a stroke, else one of TRAVEL ... MARK; speed: mm/s, deg/s of turns; width_mm; fan: 0..1, NaN for the
-    layer's; acceleration_mm_s2: inf where the axes decide. marks: the values of the rows that are turns and marks, in order."""
+    layer's; acceleration_mm_s2: inf where the axes decide. marks: the values of the rows that are turns and marks, in order.
+    """
 
     name: str
     points_mm: Floats
@@ -122,7 +125,9 @@ class MachineProgram:
 
 def straight_moves(program: MachineProgram, start: Pose) -> tuple[Floats, Floats, Indices]:
     """(n, 6) beginning and end of each straight move, X Y Z tilt turn E, and (n,) the row of the program that it belongs to.
-    start: how the table stands before the first one."""
+
+    start: how the table stands before the first one.
+    """
     counts = np.diff(program.starts)
     move = np.repeat(np.arange(len(program)), counts)
     ends = np.ones(len(move), np.bool_)

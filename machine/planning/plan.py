@@ -38,7 +38,8 @@ def plan(
 
     stops: where the print waits for a person. After the last part the table goes back to level, so that the next print's homing
     finds it level, and the tip aside. Raises SliceError for a stop at a layer that is not there; MoveError: a point outside the
-    axis limits, or no safe place for the head while the table turns."""
+    axis limits, or no safe place for the head while the table turns.
+    """
     parts = {part.index: part for part in decomposition.parts}
     pieces = [piece for piece in sliced if any(len(layer) for layer in piece.layers)]
     machine = profile.machine
@@ -159,7 +160,9 @@ def _finish(tip: Tip, part: int) -> None:
 
 def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Floats | None:
     """(n, 3) machine points of the line, in one lane or folded into up to four, along the plate's edge; None: there is no room.
-    It keeps off everything that any part prints near the plate, and the head off the cradle."""
+
+    It keeps off everything that any part prints near the plate, and the head off the cradle.
+    """
     machine, length_mm = profile.machine, profile.machine.purge_mm
     if length_mm <= 0.0:
         return None

@@ -47,7 +47,9 @@ def find_park_position(
     machine: Machine, printed: Printed, at_mm: Floats, pose: Pose, stands: Sequence[tuple[float, float]] = ()
 ) -> Park | None:
     """Where to wait when the tip stands at at_mm (axis positions X Y Z); None when no way up is proved clear.
-    stands: X, Y of the places that may be chosen besides the corners of the axes; the nearest is."""
+
+    stands: X, Y of the places that may be chosen besides the corners of the axes; the nearest is.
+    """
     x, y, z = (float(value) for value in at_mm)
     most = machine.z.limits_mm[1]
     top = obstacle_top_mm(machine, printed, pose) + machine.lift_mm
@@ -97,7 +99,9 @@ def is_way_clear(
     machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None, parts: int = 1
 ) -> bool:
     """True when each body keeps what it must from table, cradle and print while the tip goes from start to end.
-    The way is checked in `parts` pieces: a direction that separates body and solid is easier to find for a short piece."""
+
+    The way is checked in `parts` pieces: a direction that separates body and solid is easier to find for a short piece.
+    """
     tried = directions(rotation(machine, pose) @ UP)
     shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
     places = start + shares * (end - start)
@@ -112,7 +116,9 @@ def is_way_clear(
 @dataclass(frozen=True, eq=False)
 class Turn:
     """A turn of the table on the way of the tip from one place to another, machine X Y Z; target_mm None: the turn is its end.
-    least_z_mm: least Z of the ways across before and after the turn, where something printed may be higher than both places."""
+
+    least_z_mm: least Z of the ways across before and after the turn, where something printed may be higher than both places.
+    """
 
     start: Pose
     end: Pose
@@ -124,7 +130,9 @@ class Turn:
 @dataclass(frozen=True)
 class Route:
     """The tip stands at X, Y of over_mm and at z_mm while the table turns, and crosses to the next part at across_z_mm.
-    seconds: for all moves of the way, the turn itself left out."""
+
+    seconds: for all moves of the way, the turn itself left out.
+    """
 
     over_mm: tuple[float, float]
     z_mm: float
@@ -189,7 +197,9 @@ def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> tuple[F
 
 def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Speeds) -> Route:
     """The quickest safe route of a turn; part: that comes after it.
-    Raises MoveError when no stand is safe inside the axis limits."""
+
+    Raises MoveError when no stand is safe inside the axis limits.
+    """
     tried, reach = sweep(machine, printed, turn.start, turn.end)
     best: Route | None = None
     lowest = inf
@@ -253,7 +263,8 @@ def _ways_clear(candidate: Route, turn: Turn, machine: Machine) -> bool:
     """True when the ways to the stand, at the first pose, and from it, at the second, keep off table and cradle.
 
     What is printed need not be tested: in either pose the ways across lie above it, and nothing is under the head where the tip
-    goes straight up or down."""
+    goes straight up or down.
+    """
     halves = _places(turn, candidate.over_mm, (candidate.z_mm, candidate.across_z_mm))
     ways = [(pose, a, b) for pose, places in zip((turn.start, turn.end), halves, strict=True) for a, b in pairwise(places)]
     return all(is_way_clear(machine, pose, a, b) for pose, a, b in ways if float(np.linalg.norm(b - a)) > 1e-9)

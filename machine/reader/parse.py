@@ -37,7 +37,8 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     """Read G-code lines (with or without line ends) as the machine's firmware would.
 
     Raises GcodeError, with the line, for what is not G-code and for motion codes that are not supported; M codes and
-    macros that are not known are counted in `ignored`: code -> (first line, how often)."""
+    macros that are not known are counted in `ignored`: code -> (first line, how often).
+    """
     lines = Lines.of(lines)
     reader, at = reader_of(machine, len(lines)), 0
     while at < len(lines):
@@ -236,7 +237,9 @@ def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader
 
 def _feed_length(change: Floats, largest: bool = False) -> Floats:
     """(n,) what F counts along (n, 6) changes, by the rule of NIST RS274.
-    largest: of a pure turn only the axis that goes farthest (Klipper)."""
+
+    largest: of a pure turn only the axis that goes farthest (Klipper).
+    """
     length, measure = lengths(change)
     return np.where(measure == 1, np.abs(change[:, 3:5]).max(axis=1, initial=0.0), length) if largest else length
 

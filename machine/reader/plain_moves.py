@@ -36,7 +36,8 @@ WORDS = Texts.of([b"WIDTH:", b"HEIGHT:", b"TYPE:", b"LAYER_CHANGE", b"LAYER:", b
 class Meaning(NamedTuple):
     """What words mean during a run. letters: (256,) axis, F or NONE of each byte; words: WORDS; types: the kinds that are known,
     by number. units, steps, offset: (6,) as those of Modes. rapid: G0 is as fast as can be. accelerations: (2,) of moves that
-    push filament, and of others."""
+    push filament, and of others.
+    """
 
     letters: NDArray[np.int8]
     words: Texts
@@ -51,7 +52,9 @@ class Meaning(NamedTuple):
 
 def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
     """Rows of the plain lines from line `first`, counted from 0; returns the first line that is not plain.
-    Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row."""
+
+    Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row.
+    """
     modes = reader.modes
     begin = lines.content[lines.start[first] : lines.start[first] + 2].tobytes()
     if begin not in FIRST and begin[:1] not in FIRST:  # nothing need be got ready

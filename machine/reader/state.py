@@ -23,7 +23,8 @@ Words = Mapping[str, float]  # of one command; of a letter that stands there twi
 
 class Columns(NamedTuple):
     """Room for rows, one an entry. places: (room + 1, 5), row k ends at k + 1; starts: (room, 5) begins of rows, (0, 5) as long
-    as each begins at the end of the one before it, as nearly always; remark_rows: (k, REMARK_COLUMNS) room for remarks."""
+    as each begins at the end of the one before it, as nearly always; remark_rows: (k, REMARK_COLUMNS) room for remarks.
+    """
 
     line: NDArray[np.int32]
     e_mm: Floats

@@ -25,12 +25,12 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import INTERFACE_WIDTH, spacing_mm
 from slicer.estimate.timing import strokes_s
-from slicer.geometry.polygons import Polygons, edges, union
+from slicer.geometry.polygons import Polygons, perimeter_mm, union
 from slicer.geometry.polyline import lengths_mm
 from slicer.heights import Heights, shell_layers
 from slicer.modifiers import combined
 from slicer.overhangs import LEAST_MM2, Overhang, find_overhangs
-from slicer.paths import bead_area_mm2
+from slicer.paths import Kind, bead_area_mm2
 from slicer.raft import raft_layers
 from slicer.sectioning import Sections, section_parts
 from slicer.shells import Shells, build_shells, lay_beads
@@ -38,10 +38,11 @@ from slicer.slice import order_layer
 from slicer.strokes.order import SUPPORTS
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import NO_LIMITS, rear_of
+from slicer.strokes.speed import SPEED_KEYS
 from slicer.support.handed_down import plan_supports, up_to
 from slicer.support.support import Supports, own_supports, wanted_places
 
-SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced: of 44 prints they miss 2 % (rms), 12 pairs 3 to 4 %
+SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced: estimates of 44 prints are then off by 2 % (rms)
 FEWEST = 12  # pairs of a part
 RUN = 8  # layers a pair stands for, at least: with more of them a small print would take as long as slicing all of it
 STEP = 2  # layers that a thick one stands for, at least: growing support from half of the layers takes half the time
@@ -63,8 +64,10 @@ class Estimate:
 
 
 def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
-    """What printing one part, or several one after the other, takes. The same on every machine. Raises SliceError where a part's
-    mesh is not closed or it is too high to be meant."""
+    """What printing one part, or several one after the other, takes.
+
+    The same on every machine. Raises SliceError where a part's mesh is not closed or it is too high to be meant.
+    """
     several = (parts,) if isinstance(parts, Part) else tuple(parts)
     total, sections = np.zeros(3), section_parts(several, profile)
     overhangs = [find_overhangs(layers) for layers in sections]
@@ -103,17 +106,19 @@ def _of_part(supports: Supports, overhangs: Sequence[Overhang], samples: int) ->
 
 def _rough_s(drawn_mm: Floats, outlines: Indices, process: Process) -> Floats:
     """(n,) seconds of layers with (n, 5) mm of walls, skin, infill, support and dense support, and with (n,) outlines."""
-    kinds = ("inner_wall", "skin", "infill", "support", "support_interface")
-    speeds = np.array([getattr(process, f"{kind}_speed_mm_s") for kind in kinds])
+    kinds = (Kind.INNER_WALL, Kind.SKIN, Kind.INFILL, *SUPPORTS)
+    speeds = np.array([getattr(process, SPEED_KEYS[kind]) for kind in kinds])
     least_s = np.minimum(process.least_layer_time_s, drawn_mm.sum(axis=1) / process.least_speed_mm_s)
     rough_s: Floats = WAY_S * (1 + outlines) + np.maximum(SLOWER * drawn_mm @ (1.0 / speeds), least_s)
     return rough_s
 
 
 def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
-    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, then runs of equal weight. The
-    difference of a layer's weight from that of the next one counts, too, so that runs are short where weights vary and begin at
-    large jumps. A run's samples are the two neighbours in its middle, whose lines have turned directions."""
+    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, then runs of equal weight.
+
+    The difference of a layer's weight from that of the next one counts, too, so that runs are short where weights vary and begin
+    at large jumps. A run's samples are the two neighbours in its middle, whose lines have turned directions.
+    """
     count = len(weight)
     done = np.cumsum(weight[1:] + np.abs(np.diff(weight[1:], append=weight[-1:])))
     cuts = np.searchsorted(done, done[-1] * np.arange(1, samples) / samples) + 2 if count > 1 else np.zeros(0, np.int64)
@@ -230,9 +235,8 @@ def support_lengths_mm(supports: Supports) -> Floats:
     """(n, 2) sparse and dense lines of the support of every layer of a part."""
     sections, process = supports.sections, supports.sections.support_process
     several = zip(supports.areas, supports.dense, supports.hollow, strict=True)
-    extents = [(whole.area(), dense.area(), (whole - hollow).area()) for whole, dense, hollow in several]
-    area, close, filled = np.array(extents).T
-    around = np.array([np.hypot(*(sides[:, 2:] - sides[:, :2]).T).sum() for sides in map(edges, supports.areas)])
+    extents = [(whole.area(), perimeter_mm(whole), dense.area(), (whole - hollow).area()) for whole, dense, hollow in several]
+    area, around, close, filled = np.array(extents).T
     spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
     walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
     if sections.on_platform:

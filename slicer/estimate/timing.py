@@ -39,7 +39,8 @@ class Speeds(NamedTuple):
 
 class Blocks(NamedTuple):
     """Moves as a planner takes them, (m,) each: direction (m, 6) of X Y Z tilt turn E, length, cruise speed, acceleration, by
-    what F measures it, and whether all before it must be over."""
+    what F measures it, and whether all before it must be over.
+    """
 
     direction: Floats
     length: Floats
@@ -89,8 +90,10 @@ def axis_accelerations(machine: Machine) -> Floats:
 
 
 def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
-    """What F measures for (n, 6) deltas of X Y Z tilt turn E, and by which measure (0 X Y Z, 1 rotary, 2 filament, 3 none). The
-    rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament."""
+    """What F measures for (n, 6) deltas of X Y Z tilt turn E, and by which measure (0 X Y Z, 1 rotary, 2 filament, 3 none).
+
+    The rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament.
+    """
     x, y, z, tilt, turn, filament = deltas.T
     ways: list[Floats] = [np.sqrt(x**2 + y**2 + z**2), np.hypot(tilt, turn), np.abs(filament)]
     moves = [way > TINY for way in ways]
@@ -100,9 +103,11 @@ def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
 def move_times(
     deltas: Floats, speed: Floats, stop: NDArray[np.bool_], machine: Machine, most_mm_s2: Floats | None = None
 ) -> Floats:
-    """(n,) seconds for (n, 6) deltas of X Y Z tilt turn E at (n,) speeds (mm/s or deg/s along what F measures). stop: (n,) True
-    where the machine stands still before the move. most_mm_s2: (n,) acceleration told for X Y Z. Axes that would be too fast slow
-    the move down."""
+    """(n,) seconds for (n, 6) deltas of X Y Z tilt turn E at (n,) speeds (mm/s or deg/s along what F measures).
+
+    stop: (n,) True where the machine stands still before the move. most_mm_s2: (n,) acceleration limit of X Y Z. Axes that
+    would be too fast slow the move down.
+    """
     blocks, moving = blocks_of(deltas, speed, stop, machine, most_mm_s2)
     times = np.zeros(len(deltas))
     if moving.any():
@@ -183,8 +188,10 @@ def _block_times(blocks: Blocks, junction_speed: float) -> Floats:
 
 
 def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
-    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions. tip:
-    (2,) where the layer below ends."""
+    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions.
+
+    tip: (2,) where the layer below ends.
+    """
     machine, process, material, speeds = profile.machine, profile.process, profile.material, speeds_of(profile)
     places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
     bounds = speeds_mm_s, stroke_accelerations(profile, first_layer)[strokes.kind]

@@ -72,8 +72,10 @@ def anchor_skins(
 def anchored(
     region: Region, sparse_below: Polygons, infill_below: Sequence[Floats], angle_deg: float, width_mm: float, cell_mm: float
 ) -> Region:
-    """The region with its skins grown along lines at an angle, so that all of these end on something. sparse_below: what is
-    sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart."""
+    """The region with its skins grown along lines at an angle, so that all of these end on something.
+
+    sparse_below: what is sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart.
+    """
     skin, sparse = region.solid + region.top, region.sparse
     for _ in range(MOST_ROUNDS):
         added = _extension(skin, sparse_below, infill_below, angle_deg, width_mm) ^ sparse
@@ -92,7 +94,9 @@ def anchored(
 
 def infill_bridges(region: Region, sparse_below: Polygons, width_mm: float) -> Polygons:
     """Where solid lines span the sparse infill of the layer below, and as far beyond as they hold on to what is solid there.
-    Strips narrower than NARROW lines are left out: the skin beside them carries their lines."""
+
+    Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
+    """
     solid = region.solid + (region.top - offset(region.bare, HIDDEN * width_mm))
     if solid.is_empty() or sparse_below.is_empty():
         return Polygons()
@@ -138,8 +142,10 @@ def _row_crossings(segments: Floats, kind: int, apart_mm: float) -> tuple[Indice
 
 @kernel
 def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
-    """(n, 3) row, from and to, of skins that end over a void on either side, grown to what holds them there. rows, x and kinds:
-    of the crossings of each row, from left to right."""
+    """(n, 3) row, from and to, of skins that end over a void on either side, grown to what holds them there.
+
+    rows, x and kinds: of the crossings of each row, from left to right.
+    """
     out = table(2 * len(rows), 3)
     n = begin = 0
     while begin < len(rows):
@@ -185,8 +191,10 @@ def plastic_of(beads: Sequence[Bead]) -> Plastic | None:
 def hold_ends(
     beads: Sequence[Bead], below: Plastic | None, section: Polygons, section_below: Polygons, width_mm: float
 ) -> list[Bead]:
-    """The beads of a layer, whose skin strokes end on the plastic of the layer below where the model is there or near. section,
-    section_below: the model's sections in this layer and in the one below."""
+    """The beads of a layer, whose skin strokes end on the plastic of the layer below where the model is there or near.
+
+    section, section_below: the model's sections in this layer and in the one below.
+    """
     skins = [k for k, bead in enumerate(beads) if bead.kind in SKINS and not bead.closed]
     if not skins or below is None:
         return list(beads)
@@ -215,8 +223,10 @@ def hold_ends(
 
 
 def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[Bead]:
-    """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them. An end
-    that lies on nothing for longer than an anchor is part of the pattern, and stays."""
+    """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them.
+
+    An end that lies on nothing for longer than an anchor is part of the pattern, and stays.
+    """
     layers, out = [plastic for plastic in below if plastic is not None], list(beads)
     for k, bead in enumerate(beads):
         points, width_mm = bead.points, bead.width_mm

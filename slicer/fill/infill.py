@@ -66,8 +66,10 @@ def has_lightning(process: Process, places: Sequence[Place]) -> bool:
 def plan_fillings(
     sparse: Sequence[Polygons], sections: Sequence[Polygons], process: Process, places: Sequence[Place], heights_mm: Floats
 ) -> list[Filling]:
-    """The infills of a part, each with the density of its pattern. sparse: the area of each layer that takes infill; sections:
-    the part's own."""
+    """The infills of a part, each with the density of its pattern.
+
+    sparse: the area of each layer that takes infill; sections: the part's own.
+    """
     fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
     areas: list[list[Polygons]] = [[] for _ in fillings]
     for layer, area in enumerate(sparse):
@@ -105,8 +107,10 @@ def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: 
 
 
 def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: float) -> float:
-    """The density to draw the pattern with so that it meets the process's density together with its anchors. areas: the sparse
-    areas of all layers of a part. One figure for all of them, or lines would not stand on each other."""
+    """The density to draw the pattern with so that it meets the process's density together with its anchors.
+
+    areas: the sparse areas of all layers of a part. One figure for all of them, or lines would not stand on each other.
+    """
     asked = process.infill_density
     filled = [i for i, area in enumerate(areas) if not area.is_empty()]
     if not filled or asked <= 0:
@@ -131,8 +135,10 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
 def filling_beads(
     sparse: Polygons, leaning: Polygons, fillings: Sequence[Filling], process: Process, heights: Heights, layer: int
 ) -> list[Bead]:
-    """Beads of all infills in the sparse area of a layer, whose settings those of the process are. leaning: where walls of the
-    next layer begin to leave those of this one; a line beside these carries them."""
+    """Beads of all infills in the sparse area of a layer, whose settings those of the process are.
+
+    leaning: where walls of the next layer begin to leave those of this one; a line beside these carries them.
+    """
     width, z_mm, height_mm = process.line_width_mm, float(heights.tip_mm[layer]), float(heights.height_mm[layer])
     lines, sparse = _lines_under_walls(sparse, leaning, width, spacing_mm(width, height_mm))
     beads = [Bead(Kind.INFILL, line, width, RANK) for line in lines]
@@ -194,7 +200,9 @@ def infill_beads(
     lightning: Sequence[Floats] = (),
 ) -> list[Bead]:
     """Beads of the process's pattern in an area of a layer; density (0..1) of the pattern as pattern_density() gives it.
-    lightning: the layer's lines of that pattern, which are planned for all layers together."""
+
+    lightning: the layer's lines of that pattern, which are planned for all layers together.
+    """
     width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
     inner, anchor_mm = _inner(area, process, spacing), 0.0
     if density <= 0 or inner.is_empty():
@@ -220,8 +228,10 @@ def _inner(area: Polygons, process: Process, spacing_mm: float) -> Polygons:
 
 
 def pattern_lines(process: Process, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
-    """The families of lines that the process's pattern has in a layer, which share the density. z_mm: height of the layer;
-    spacing_mm: of lines that fill an area completely."""
+    """The families of lines that the process's pattern has in a layer, which share the density.
+
+    z_mm: height of the layer; spacing_mm: of lines that fill an area completely.
+    """
     pattern, angle_deg = process.infill_pattern, process.infill_angle_deg
     if pattern == "gyroid":
         return [gyroid(z_mm, angle_deg, spacing_mm, density)]
@@ -240,8 +250,10 @@ def honeycomb(number: int, angle_deg: float, spacing_mm: float, density: float) 
 
 
 def side_mm(spacing_mm: float, density: float) -> float:
-    """Side a of the hexagons: a strip of sqrt(3)/2 a holds one line of length 3 a + 2 d / sqrt(3) in every 3 a. d = sqrt(3)/2 a -
-    spacing is how far the slanted sides reach from one flat side to the next."""
+    """Side a of the hexagons: a strip of sqrt(3)/2 a holds one line of length 3 a + 2 d / sqrt(3) in every 3 a.
+
+    d = sqrt(3)/2 a - spacing is how far the slanted sides reach from one flat side to the next.
+    """
     per_side, fixed = 3.0 + 1.0, 2.0 / sqrt(3.0) * spacing_mm
     strip = 1.5 * sqrt(3.0) * density / spacing_mm
     return (per_side + sqrt(per_side**2 - 4.0 * strip * fixed)) / (2.0 * strip)

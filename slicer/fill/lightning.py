@@ -31,9 +31,11 @@ NO_TREES = np.zeros((0, 2)), np.zeros(0, np.int64)
 def lightning_lines(
     insides: Sequence[Polygons], solid: Sequence[Polygons], cell_mm: float, heights_mm: Floats
 ) -> list[list[Floats]]:
-    """The lines (n, 2), from root to tip, of every layer of a part, the lowest first. insides: where a layer's infill may be;
-    solid: the area of a layer that is not sparse, so that the layer below must hold it; cell_mm: distance between branches under
-    it; heights_mm: (n,) of the layers."""
+    """The lines (n, 2), from root to tip, of every layer of a part, the lowest first.
+
+    insides: where a layer's infill may be; solid: the area of a layer that is not sparse, so that the layer below must hold it;
+    cell_mm: distance between branches under it; heights_mm: (n,) of the layers.
+    """
     trees, lines = NO_TREES, []
     for layer in range(len(insides) - 1, -1, -1):
         lean_mm = float(heights_mm[layer]) * tan(radians(LEAN_DEG))
@@ -69,7 +71,9 @@ def _every(loop: Floats, step_mm: float) -> Floats:
 
 def _lower(trees: Trees, inside: Polygons, wanting: Floats, sizes_mm: tuple[float, float]) -> Trees:
     """The trees of the layer below: shorter and straighter, clipped to its inside, with new branches to the places that want one.
-    sizes_mm: by how much a tip may lean, and a cell."""
+
+    sizes_mm: by how much a tip may lean, and a cell.
+    """
     nodes, parent = trees
     if inside.is_empty() or not len(nodes) + len(wanting):
         return NO_TREES
@@ -205,9 +209,11 @@ def _cell(grid: Grid, x: float, y: float) -> int:
 def _nearest_node(
     out: Floats, first: Indices, after: Indices, grid: Grid, place: tuple[float, float], lengths: tuple[float, float]
 ) -> tuple[int, bool]:
-    """The node nearest to a place, the first of several, and whether one holds it. first, after: the last node of each cell of
-    the grid, and for each node the one before it in its cell; -1: none. lengths: how near a node has to be to hold a place, and
-    how near to be the nearest; -1: none is."""
+    """The node nearest to a place, the first of several, and whether one holds it.
+
+    first, after: the last node of each cell of the grid, and for each node the one before it in its cell; -1: none. lengths: how
+    near a node has to be to hold a place, and how near to be the nearest; -1: none is.
+    """
     (x, y), (near, most) = place, lengths
     reach = max(near, grid.size_mm)
     while True:
@@ -231,8 +237,10 @@ def _nearest_node(
 def _grow(
     nodes: Floats, parent: Indices, wanting: Floats, border: EdgeIndex, sizes: tuple[float, float]
 ) -> tuple[Floats, Indices]:
-    """The trees with a branch to every wanted place that none comes near to, from the nearest node or wall. sizes: how near a
-    branch has to come, and how far apart nodes are."""
+    """The trees with a branch to every wanted place that none comes near to, from the nearest node or wall.
+
+    sizes: how near a branch has to come, and how far apart nodes are.
+    """
     near, step = sizes
     ways = table(len(wanting), 2)
     room = len(nodes)

@@ -242,10 +242,12 @@ def _runs(sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm:
 def _wedges(
     pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, runs: Floats, solid_mm: tuple[float, float]
 ) -> Floats:
-    """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward. Between
-    two ends the border is covered by the beads of their lines, half a spacing to both sides and round the end; the rest of it
-    stays open. That is much at the sharp side of a line, and round a corner with room for a line but without one: there the line
-    gets a run along the border."""
+    """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward.
+
+    Between two ends the border is covered by the beads of their lines, half a spacing to both sides and round the end; the rest
+    of it stays open. That is much at the sharp side of a line, and round a corner with room for a line but without one: there
+    the line gets a run along the border.
+    """
     spacing, deep = solid_mm
     wedges, before = floats(len(sense), 0.0), longs(len(sense), 0)
     slants, lengths = floats(len(sense), 0.0), floats(len(sense), 0.0)

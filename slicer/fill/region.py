@@ -19,8 +19,9 @@ SOLID_KEYS = (*SHELL_KEYS, "infill_density", "solid_below_mm2")
 @dataclass(frozen=True, eq=False)
 class Region:
     """A layer's inside: top is skin that is seen, as far as it reaches under walls; solid other skin; sparse takes the infill.
-    bare: what of top has nothing above it. uncut: what would be sparse if the model were in one piece, not clipped to the
-    part."""
+
+    bare: where top has nothing above it. uncut: what would be sparse if the model were in one piece, not clipped to the part.
+    """
 
     bare: Polygons
     top: Polygons
@@ -31,9 +32,12 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """The uncut model around a part's layers. sections, insides: of each layer, and what walls would enclose of it; below, above:
-    of as many layers under the first and over the last one as shells look, the nearest first. later: what of each layer, and of
-    those over the last one, parts printed later take; none of them: ()."""
+    """The uncut model around a part's layers.
+
+    sections, insides: of each layer, and what walls would enclose of it; below, above: of as many layers under the first and
+    over the last one as shells look, the nearest first. later: the areas
+    of each layer, and of those over the last one, that parts printed later take; (): none.
+    """
 
     sections: Sequence[Polygons]
     insides: Sequence[Polygons]
@@ -107,8 +111,10 @@ def _hollow_with(hollow: Sequence[Polygons], run: range, cover: Cover, place: Pl
 
 
 def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
-    """For each i the intersection of layers i .. i + count - 1; nothing beyond the end. Running intersections of blocks from both
-    sides (van Herk 1992): three booleans a layer, however many are common."""
+    """For each i the intersection of layers i .. i + count - 1; nothing beyond the end.
+
+    Running intersections of blocks from both sides (van Herk 1992): three booleans a layer, however many are common.
+    """
     if count <= 0:
         return list(layers)
     n, forward, backward = len(layers), list(layers), list(layers)
@@ -145,8 +151,10 @@ def _without_footings(
     sparse: Sequence[Polygons], sections: Sequence[Polygons], insides: Sequence[Polygons], process: Process
 ) -> list[Polygons]:
     """The sparse places without those under walls which begin on them: a pocket's on its floor, a pillar's on its plate.
-    sections, insides: of the layers over those of the sparse places, but for the last one, over which nothing is known. The solid
-    layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill."""
+
+    sections, insides: of the layers over those of the sparse places, but for the last one, over which nothing is known.
+    The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill.
+    """
     width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
     footings = [
         opening((area ^ section) - inside, 0.5 * BESIDE * width_mm) if not area.is_empty() else area
@@ -200,8 +208,10 @@ def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, pr
 def ironed_areas(
     regions: Sequence[Region], beside: Sequence[Polygons], process: Process, places: Sequence[Place] = ()
 ) -> list[Polygons]:
-    """The skin of each layer that has nothing above it, a line's width away from where a later part will stand. beside: what
-    later parts have of each layer and of the one over the last; places: where other settings hold."""
+    """The skin of each layer that has nothing above it, a line's width away from where a later part will stand.
+
+    beside: what later parts have of each layer and of the one over the last; places: where other settings hold.
+    """
     ironed = combined(places, ["ironing"])
     if not any(own.ironing for own in (process, *(place.over(process) for place in ironed))):
         return [Polygons()] * len(regions)

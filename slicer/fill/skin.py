@@ -74,9 +74,11 @@ def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
 
 
 def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead], list[Polygons]]:
-    """The lines that fill an area, those of each connected piece spread evenly, and the places that they leave in each. The flow
-    makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill it. Where
-    lines would no longer touch each other for that, in narrow places that are all line ends, they reach half as far."""
+    """The lines that fill an area, those of each connected piece spread evenly, and the places that they leave in each.
+
+    The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
+    it. Where lines would no longer touch each other for that, in narrow places that are all line ends, they reach half as far.
+    """
     in_order = solid.pattern == "monotonic"
     beads, rests = list[Bead](), list[Polygons]()
     least_flow = 1.0 + TOUCHING - solid.height_mm * ROUND_SIDES / solid.spacing_mm

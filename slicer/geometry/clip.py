@@ -36,8 +36,10 @@ def rotation_2d(angle_deg: float) -> Floats:
 
 
 def clip_lines(points: Floats, starts: Indices, border: EdgeIndex) -> Pieces:
-    """The pieces of open lines (n, 2) inside the polygons of a border, by the even-odd rule. Every line must begin and end
-    outside."""
+    """The pieces of open lines (n, 2) inside the polygons of a border, by the even-odd rule.
+
+    Every line must begin and end outside.
+    """
     if not len(border.edges) or not len(starts):
         return NO_PIECES
     bounds = np.append(starts, len(points))
@@ -114,7 +116,9 @@ def runs_within(points: Floats, area: Polygons) -> list[Floats]:
 @kernel
 def cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
     """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
-    points, out: (n, 2 or more), further columns are interpolated."""
+
+    points, out: (n, 2 or more), further columns are interpolated.
+    """
     shares, crossed = floats(len(area.edges) + 1, 0.0), longs(len(area.edges), 0)
     columns, n = points.shape[1], 1
     for axis in range(columns):

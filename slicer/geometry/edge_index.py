@@ -34,7 +34,9 @@ class Grid(NamedTuple):
 
 class EdgeIndex(NamedTuple):
     """edges: (n, 4) x0 y0 x1 y1, loop after loop; loop: (n,) number of an edge's loop; begins: where each loop begins, and n.
-    Cell c of row r of the grid holds the edges items[first[r * columns + c] : first[r * columns + c + 1]]."""
+
+    Cell c of row r of the grid holds the edges items[first[r * columns + c] : first[r * columns + c + 1]].
+    """
 
     edges: Floats
     loop: Indices

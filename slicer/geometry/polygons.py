@@ -27,8 +27,10 @@ NEAR_MM, LEAST_MM2 = 1e-6, 1e-6  # a contour that is higher by more than this, a
 
 
 def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
-    """Loops of a section, (n, 2) mm each, as overlap-free polygons without detail too fine to print. Slits narrower than twice
-    closing_mm are closed."""
+    """Loops of a section, (n, 2) mm each, as overlap-free polygons without detail too fine to print.
+
+    Slits narrower than twice closing_mm are closed.
+    """
     if not loops:
         return Polygons()
     whole = of_contours(loops).simplify(RESOLUTION_MM)
@@ -102,8 +104,11 @@ def unite_layers(some: Sequence[Polygons], others: Sequence[Polygons]) -> list[P
 
 
 def islands(polygons: Polygons) -> list[Polygons]:
-    """The connected pieces, each with its holes. A hole that touches the contour round it in some points is a piece of its own
-    for manifold3d, of negative area: it belongs to the piece that it lies in."""
+    """The connected pieces, each with its holes.
+
+    A hole that touches the contour round it in some points is a piece of its own for manifold3d, of negative area: it belongs to
+    the piece that it lies in.
+    """
     pieces = polygons.decompose() if not polygons.is_empty() else []
     whole = [piece for piece in pieces if piece.area() > 0.0]
     for hole in pieces if len(whole) < len(pieces) else []:

@@ -52,8 +52,10 @@ def crossing(segment: Segment, crossed: Segment) -> float:
 
 @no_nrt
 def clamp_projection(along: float, square: float) -> float:
-    """Where (0..1) on a segment its point nearest to another one lies. along: product of the vectors from the segment's beginning
-    to the point and to its end; square: its length squared."""
+    """Where (0..1) on a segment its point nearest to another one lies.
+
+    along: product of the vectors from the segment's beginning to the point and to its end; square: its length squared.
+    """
     return min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
 
 
@@ -234,7 +236,9 @@ def lengthen_steps(points: Floats, starts: Indices, shortest_mm: Floats, most_mm
 @no_nrt
 def _drawn_back(points: Floats, ends: tuple[int, int, int], fixed: Mask, shortest_mm: float) -> tuple[float, float]:
     """How far the line a, b, c moves if b goes back towards a until the step to c is long enough, and the share of the way there.
-    Share 1: b is left out. Infinitely far where that would make a step shorter or move what is fixed."""
+
+    Share 1: b is left out. Infinitely far where that would make a step shorter or move what is fixed.
+    """
     a, b, c = ends
     ux, uy = points[a, 0] - points[b, 0], points[a, 1] - points[b, 1]
     vx, vy = points[b, 0] - points[c, 0], points[b, 1] - points[c, 1]

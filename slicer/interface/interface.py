@@ -199,8 +199,10 @@ def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Pol
 
 
 def joints(part: Part, later: Sequence[Part], section: Polygons, below: Polygons | None) -> Floats:
-    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface. section: of
-    its first layer; below: the plastic under it, None on the platform."""
+    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface.
+
+    section: of its first layer; below: the plastic under it, None on the platform.
+    """
     rims = [] if below is None else [np.insert(loop, 2, 0.0, axis=1) for loop in contours(section ^ below)]
     for upper in later:
         for loop in contours(base_section(upper)):
@@ -232,8 +234,10 @@ def skin_beside(edges: Floats, section: Polygons, z_mm: float, process: Process)
 
 
 def plan_pins(parts: Sequence[Part], profile: Profile) -> Pins:
-    """The pins of all parts of a print, or of those that are known, in print order; {} where no part wants any. profile: of the
-    whole print; the part that fills pins says how they are made."""
+    """The pins of all parts of a print, or of those that are known, in print order; {} where no part wants any.
+
+    profile: of the whole print; the part that fills pins says how they are made.
+    """
     wanted = [part.index for part in parts if not part.on_platform and profile.of_part(part.index).process.interlock == "pins"]
     planned: dict[int, Floats] = {}
     for part in parts if wanted else ():

@@ -40,9 +40,11 @@ def order_beads(
     skin: Polygons | None = None,
     kind_mm_s: Floats | None = None,
 ) -> Strokes:
-    """The beads of one layer in printing order. tip: (2,) where the nozzle stands before, None at the part's start; support:
-    where that is printed; skin: outer walls beside an edge of an interface, which no travel passes over; kind_mm_s: by number of
-    the kind, replaces the process's."""
+    """The beads of one layer in printing order.
+
+    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
+    beside an edge of an interface, which no travel passes over; kind_mm_s: by number of the kind, replaces the process's.
+    """
     if not beads:
         return strokes_of([], np.zeros(0, np.bool_), {}, process.small_wall_mm)
     speed_mm_s: Speed = partial(bead_speed_mm_s, process=process, kind_mm_s=kind_mm_s)
@@ -65,8 +67,10 @@ def order_beads(
 
 
 def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> Ints:
-    """(n,) the number of each bead's island: the smallest outer contour round its start, of the section or of its support. Those
-    of support come after those of the section; FIRST: skirt and brim."""
+    """(n,) the number of each bead's island: the smallest outer contour round its start, of the section or of its support.
+
+    Those of support come after those of the section; FIRST: skirt and brim.
+    """
     ranks = np.array([bead.rank for bead in beads], dtype=np.int32)
     starts = np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
     torn_off = np.array([bead.kind in SUPPORTS for bead in beads], dtype=np.bool_)
@@ -126,8 +130,10 @@ def _middle(beads: Sequence[Bead]) -> Floats:
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
-    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together. Inner
-    walls that are open lines and behind no seam are printed with the infill: most have its speed and lie beside it."""
+    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together.
+
+    Inner walls that are open lines and behind no seam are printed with the infill: most have its speed and lie beside it.
+    """
     leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
     walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
     phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
@@ -162,9 +168,11 @@ def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]
 
 
 def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
-    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader. The others,
-    around places of their own where the walls behind an outer wall part, follow in chains of their own: to print them first would
-    mean going there and back. Open lines among them begin beside no other wall and stay single."""
+    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
+
+    The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
+    print them first would mean going there and back. Open lines among them begin beside no other wall and stay single.
+    """
     chain, others = [leader], list[Bead]()
     for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
         equal = [bead for bead in family if bead.rank == rank]

@@ -1,9 +1,10 @@
 """Path order: a short order of paths that each have a start and an end: greedy nearest neighbour, then exchanges.
 
 A change of speed on the way from one path to the next counts as much as CHANGE_MM of travel, so that paths of one speed follow
-each other unless that means a long detour. Exchanges are the classic ones of the travelling salesman's problem: 2-opt (a stretch
-of the order reversed) and Or-opt (up to three neighbours moved elsewhere), with true lengths also where a path must not be
-reversed.
+each other unless that means a long detour.
+
+Exchanges are the classic ones of the travelling salesman's problem: 2-opt (a stretch of the order reversed) and Or-opt (up to
+three neighbours moved elsewhere), with true lengths also where a path must not be reversed.
 
 Some lines may begin at any of their corners: closed ones without a seam, and long open ones, which are taken in two. A long line
 of infill often runs through the whole island and ends beside its beginning, far from where the tip is. It is begun at the corner
@@ -40,8 +41,11 @@ def order_lines(
     lines: Sequence[Floats], speeds: Floats, fixed: NDArray[np.bool_], freedom: Sequence[int], tip: Floats, goal: Floats
 ) -> list[tuple[int, list[Floats]]]:
     """Lines (n, 2) in a short order from the tip on, as order_paths, begun where their freedom allows it: the number of each and
-    the pieces (n, 2) of it as they are printed. speeds: (n, 2) with which each begins and ends; fixed: (n,) must not be reversed;
-    tip: (3,) where and with which speed all begins; goal: (1, 3) where and with which it ends up, or (0, 3)."""
+    the pieces (n, 2) of it as they are printed.
+
+    speeds: (n, 2) with which each begins and ends; fixed: (n,) must not be reversed; tip: (3,) where and with which speed all
+    begins; goal: (1, 3) where and with which it ends up, or (0, 3).
+    """
     held, cut, pairs = fixed.copy(), [0] * len(lines), zip(lines, freedom, strict=True)
     begun = [_begin_at(line, _corner(line, tip[:2], tip[:2], True)) if free == CLOSED else line for line, free in pairs]
     for _ in range(TRIES if any(freedom) else 1):
@@ -100,8 +104,10 @@ def _nearer_from_its_end(line: Floats, since: Floats, to: Floats) -> bool:
 def order_paths(
     starts: Floats, ends: Floats, fixed: NDArray[np.bool_], tip: Floats, goal: Floats
 ) -> tuple[Indices, NDArray[np.bool_]]:
-    """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) must not be reversed. tip: (3,) place
-    and speed from which the order starts; goal: (1, 3) those at which it should end, or (0, 3)."""
+    """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) must not be reversed.
+
+    tip: (3,) place and speed from which the order starts; goal: (1, 3) those at which it should end, or (0, 3).
+    """
     n = len(starts)
     given, at = table(2 * n + 1, 3), table(2 * n + 1 + len(goal), 3)
     order, flips, held = longs(n, 0), flags(n), flags(n)

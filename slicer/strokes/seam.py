@@ -39,9 +39,11 @@ OFF_WALL = 0.7  # of its length a lead has to reach inside: so far beside its mi
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below. tip:
-    (2,) where the nozzle comes from. limits: what they keep clear of. layer: number. planned: (m, 2) where seams are hidden best,
-    of use to aligned ones."""
+    """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
+
+    tip: (2,) where the nozzle comes from. limits: what they keep clear of. layer: number. planned: (m, 2) where seams are hidden
+    best; aligned seams follow them.
+    """
 
     rear: Floats
     before: Floats
@@ -52,10 +54,12 @@ class Surroundings:
 
 
 def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -> tuple[list[Bead], Floats]:
-    """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls. The walls that run round come as
-    loops (n, 2), solid on their left, and become polylines. A wall stops short of its beginning by seam_gap of its width. An
-    outer wall that is near an interface's edge all round begins and ends a line width inside instead, over its inner walls, and
-    so does one on which a person wants no seam anywhere."""
+    """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls.
+
+    The walls that run round come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its
+    beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
+    inside instead, over its inner walls, and so does one on which a person wants no seam anywhere.
+    """
     seams: dict[int, Floats] = {}
     out = list(beads)
     for kind in RINGS:
@@ -207,7 +211,8 @@ def _in_corner(loop: Floats, target: Target) -> bool:
 
 def _begin_with_room(loop: Floats, lead_mm: float) -> Floats:
     """The loop, begun at the place nearest to its beginning from which a lead leaves its outer wall; the one with most room where
-    there is none: in a sharp corner the way inside runs along the wall."""
+    there is none: in a sharp corner the way inside runs along the wall.
+    """
     counts = (np.hypot(*(start_at(loop, 1) - loop).T) / SAMPLE_MM).astype(np.int64) + 1
     places = [_begin_at(loop, i, s / count) for i, count in enumerate(counts.tolist()) for s in range(count)]
     deepest, most = loop, -1.0

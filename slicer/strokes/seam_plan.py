@@ -75,8 +75,10 @@ def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Proc
 
 
 def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]:
-    """(k, 2) places for each layer, one an outline, where its outer walls are to begin. limits: what the seams of each layer keep
-    clear of."""
+    """(k, 2) places for each layer, one an outline, where its outer walls are to begin.
+
+    limits: what the seams of each layer keep clear of.
+    """
     outlines = [contours(area) for area in sections.outlines]
     loops = [(layer, loop) for layer, of_layer in enumerate(outlines) for loop in of_layer]
     if not loops:
@@ -225,8 +227,10 @@ def is_clear(interfaces: SeamLimits, x: float, y: float) -> bool:
 
 
 def light_at(layer: int, asked: Floats, cuts_mm: Floats, levels: Indices, samples: Sequence[Floats]) -> Floats:
-    """(n,) how much is seen of places of a layer, 0 to 1, between those of the levels below and above. asked: (n, 4) x, y and the
-    unit vector out of the solid; cuts_mm: heights of all layers; levels, samples: as light_samples."""
+    """(n,) how much is seen of places of a layer, 0 to 1, between those of the levels below and above.
+
+    asked: (n, 4) x, y and the unit vector out of the solid; cuts_mm: heights of all layers; levels, samples: as light_samples.
+    """
     upper = min(int(np.searchsorted(levels, layer)), len(levels) - 1)
     lower = upper if levels[upper] <= layer else max(upper - 1, 0)
     low_mm, high_mm = cuts_mm[levels[[lower, upper]]]
@@ -254,8 +258,11 @@ def _look_up(asked: Floats, samples: Floats) -> Floats:
 
 @kernel
 def choose(xy: Floats, cost: Floats, first: Indices, layer: Indices) -> Floats:
-    """(k, 2) the place of each outline, chosen for the least total cost. xy: (n, 2) places, outline after outline from the lowest
-    layer up; cost: (n,) of each; first: (k + 1,) where each outline's begin; layer: (k,) of each outline."""
+    """(k, 2) the place of each outline, chosen for the least total cost.
+
+    xy: (n, 2) places, outline after outline from the lowest layer up; cost: (n,) of each; first: (k + 1,) where each outline's
+    begin; layer: (k,) of each outline.
+    """
     count = len(layer)
     below, best = longs(count, -1), cost.copy()
     begin = 0

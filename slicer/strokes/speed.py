@@ -24,8 +24,21 @@ from slicer.strokes.travels import may_wipe_over
 
 KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
 BY_SHARE = ("overhang_75_speed_mm_s", "overhang_50_speed_mm_s", "overhang_25_speed_mm_s", "overhang_0_speed_mm_s")
-SPEED_KEYS = {kind: f"{kind.name.lower()}_speed_mm_s" for kind in KINDS} | {Kind.OVERHANG: BY_SHARE[0]}
-SPEED_KEYS |= dict.fromkeys((Kind.SKIRT, Kind.PURGE), "first_layer_speed_mm_s")
+SPEED_KEYS = {
+    Kind.OUTER_WALL: "outer_wall_speed_mm_s",
+    Kind.INNER_WALL: "inner_wall_speed_mm_s",
+    Kind.OVERHANG: "overhang_75_speed_mm_s",
+    Kind.GAP: "gap_speed_mm_s",
+    Kind.INFILL: "infill_speed_mm_s",
+    Kind.SKIN: "skin_speed_mm_s",
+    Kind.TOP_SKIN: "top_skin_speed_mm_s",
+    Kind.BRIDGE: "bridge_speed_mm_s",
+    Kind.IRONING: "ironing_speed_mm_s",
+    Kind.SKIRT: "first_layer_speed_mm_s",
+    Kind.PURGE: "first_layer_speed_mm_s",
+    Kind.SUPPORT: "support_speed_mm_s",
+    Kind.SUPPORT_INTERFACE: "support_interface_speed_mm_s",
+}
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
 LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
@@ -74,9 +87,11 @@ def melting_speeds_mm_s(strokes: Strokes, profile: Profile, height_mm: float, fl
 
 @kernel
 def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
-    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or LEAST_STEP_GAIN_S or less. A
-    stretch of one speed that is faster than those before and after it takes the faster one of theirs, a step between a slower and
-    a faster one the slower one; none gets faster."""
+    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or LEAST_STEP_GAIN_S or less.
+
+    A stretch of one speed that is faster than those before and after it takes the faster one of theirs, a step between a slower
+    and a faster one the slower one; none gets faster.
+    """
     steadied, changes = speeds.copy(), True
     while changes:
         changes, begin = False, 0
@@ -106,7 +121,9 @@ def _of_strokes(strokes: Strokes, process: Process) -> Floats:
 
 def bead_speed_mm_s(bead: Bead, process: Process, kind_mm_s: Floats | None = None) -> float:
     """Speed of a bead before it becomes a stroke: as in _of_strokes, but without overhangs and without slowing down to cool.
-    kind_mm_s: by number of the kind, in place of the process's."""
+
+    kind_mm_s: by number of the kind, in place of the process's.
+    """
     if kind_mm_s is not None:
         return float(kind_mm_s[KINDS.index(bead.kind)])
     if bead.over_infill:
@@ -156,8 +173,10 @@ def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float
 
 
 def fan_share(material: Material, process: Process, time_s: float) -> float:
-    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then less and less. Straight
-    from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as PrusaSlicer has it."""
+    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then less and less.
+
+    Straight from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as PrusaSlicer has it.
+    """
     least = min(material.fan_least, material.fan)
     quick, slow = process.least_layer_time_s, material.fan_layer_time_s
     falling = max(0.0, (slow - time_s) / (slow - quick)) if slow > quick else 0.0
@@ -230,8 +249,11 @@ def layer_of(
     add_c: float = 0.0,
     skin: Polygons | None = None,
 ) -> Layer:
-    """The layer of some strokes. flow: factor on that of all; fan: on the part fan; add_c: how much hotter it is printed; skin:
-    outer walls beside the edges of interfaces."""
+    """The layer of some strokes.
+
+    flow: factor on that of all; fan: on the part fan; add_c: how much hotter it is printed; skin: outer walls beside the edges of
+    interfaces.
+    """
     process, material = profile.process, profile.material
     time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)  # at least: accelerations are left out
     layer_fan = fan * fan_share(material, process, time_s)

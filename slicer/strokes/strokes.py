@@ -88,8 +88,10 @@ class Strokes:
         return replace(self, points=points[kept], starts=np.append(0, np.cumsum(kept))[self.starts])
 
     def refined(self, points: Floats, starts: Indices, source: Indices) -> "Strokes":
-        """The strokes with other points; source: (j,) the stroke that each of the new ones is a piece of, in the same order. The
-        pieces of a stroke follow each other without a travel: only the first one keeps retraction and approach."""
+        """The strokes with other points; source: (j,) the stroke that each of the new ones is a piece of, in the same order.
+
+        The pieces of a stroke follow each other without a travel: only the first one keeps retraction and approach.
+        """
         first = np.diff(source, prepend=-1) > 0
         columns = {name: getattr(self, name)[source] for name in COLUMNS}
         approach_starts = np.append(self.approach_starts[source + ~first], len(self.approach))
@@ -151,8 +153,10 @@ def _widths_at(places: Floats, course: Floats) -> Floats:
 
 
 def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float, within_mm: float = 0.0) -> tuple[Strokes, Mask]:
-    """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area. No piece is
-    shorter than shortest_mm, none within the area between two outside shorter than within_mm."""
+    """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area.
+
+    No piece is shorter than shortest_mm, none within the area between two outside shorter than within_mm.
+    """
     index = index_edges(area)
     count, room = -1, 2 * len(strokes.points) + 64
     while count < 0:
@@ -233,10 +237,12 @@ def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, f
 def split_overhangs(
     strokes: Strokes, section: Polygons, below: Polygons | None, process: Process, support: Polygons | None = None
 ) -> Strokes:
-    """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic. below: what
-    the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the share 1/2 - d/w
-    of its width on it; it overhangs where that is less than process.overhang_share. support: dense, right under the layer: over
-    it an overhanging wall sags no farther than the gap, however little of it lies on plastic."""
+    """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic.
+
+    below: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the
+    share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share. support: dense, right under
+    the layer: over it an overhanging wall sags no farther than the gap, however little of it lies on plastic.
+    """
     if below is None or process.overhang_share <= 0.0:
         return strokes
     width_mm, shortest_mm = process.line_width_mm, SHORTEST_HANGING * process.line_width_mm
@@ -262,8 +268,10 @@ def split_overhangs(
 
 
 def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
-    """The strokes in the same order, those of varying width in pieces whose widths are the means of their stretches. height_mm:
-    of the layer; the pieces together hold the plastic of the whole."""
+    """The strokes in the same order, those of varying width in pieces whose widths are the means of their stretches.
+
+    height_mm: of the layer; the pieces together hold the plastic of the whole.
+    """
     if not strokes.varies.any():
         return strokes
     # Points are added where the width changes by more than EVEN_MM from one to the next.

@@ -37,10 +37,12 @@ ROUND = 4.0  # a path whose ends lie nearer than its width, and that is longer t
 def travels(
     since: Floats, to: Floats, section: Polygons, support: Polygons, process: Process, skin: Polygons | None = None
 ) -> tuple[Mask, dict[int, Floats]]:
-    """Which of the n travels, (n, 2) by two, retract, and the detours (k, 2) of some others, by the travel's number. Those no
-    shorter than process.retract_travel_mm retract that leave the inside both of the section and of its support and find no short
-    detour inside either. skin: outer walls beside an edge of an interface; short ones retract as well where they would pass over
-    it, unless they begin or end on it."""
+    """Which of the n travels, (n, 2) by two, retract, and the detours (k, 2) of some others, by the travel's number.
+
+    Those no shorter than process.retract_travel_mm retract that leave the inside both of the section and of its support and
+    find no short detour inside either. skin: outer walls beside an edge of an interface; short ones retract as well where they
+    would pass over it, unless they begin or end on it.
+    """
     retracts: Mask = np.hypot(*(to - since).T) >= process.retract_travel_mm
     detours: dict[int, Floats] = {}
     widths_mm = (min(process.line_width_mm, outer_wall_width_mm(process)), process.support_line_width_mm or process.line_width_mm)
@@ -138,8 +140,10 @@ def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) 
 
 @helper
 def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -> int:
-    """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by. From row
-    1 on; returns the number of rows, 0 where there is no such path."""
+    """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by.
+
+    From row 1 on; returns the number of rows, 0 where there is no such path.
+    """
     shares, crossed = floats(len(track.edges), 0.0), longs(len(track.edges), 0)
     many = crossings(track, straight, shares, crossed)
     x0, y0, x1, y1 = straight
@@ -167,8 +171,10 @@ def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -
 def _go_round(
     track: EdgeIndex, sides: tuple[int, int], end: tuple[float, float], longest: float, path: Floats, n: int
 ) -> tuple[int, float]:
-    """Appends the shorter of the two stretches of a loop from row n on, from one of its sides to a point on the other. Returns
-    the new number of rows, 0 when the stretch is too long, and its length."""
+    """Appends the shorter of the two stretches of a loop from row n on, from one of its sides to a point on the other.
+
+    Returns the new number of rows, 0 when the stretch is too long, and its length.
+    """
     least, shorter = np.inf, 1
     for sense in range(1, -2, -2):
         _, length = _walk(track, sides, end, longest, sense, path, n)

@@ -30,8 +30,11 @@ NO_APPROACH = np.zeros((0, 2))
 
 def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, tip: Floats) -> list[Layer]:
     """The layers above the bottom, as far up as the model is wide enough for a wall; supported: where each layer's support is;
-    first: the lowest; tip: (2,) where the bottom ends. Raises SliceError where the model needs support, one of its layers is not
-    one area without holes, or a turn would not lie on the one below."""
+    first: the lowest; tip: (2,) where the bottom ends.
+
+    Raises SliceError where the model needs support, one of its layers is not one area without holes, or a turn would not lie on
+    the one below.
+    """
     profile, heights, outlines = sections.profile, sections.heights, sections.outlines
     hanging = next((k for k, area in enumerate(supported) if not area.is_empty()), None)
     if hanging is not None:
@@ -77,8 +80,10 @@ def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
 
 
 def _check_step(loop: Floats, below: Polygons, half_mm: float, *, lowest: bool, z_mm: float) -> None:
-    """Raises SliceError where too much of a turn's centreline is farther than a wall's width from that of the wall below. below:
-    the outline of the layer below; lowest: that layer is solid."""
+    """Raises SliceError where too much of a turn's centreline is farther than a wall's width from that of the wall below.
+
+    below: the outline of the layer below; lowest: that layer is solid.
+    """
     reached = offset(below, half_mm)
     points, within = cut_line(loop, reached if lowest else reached - offset(below, -3.0 * half_mm))
     lengths = np.hypot(*np.diff(points, axis=0).T)

@@ -96,8 +96,10 @@ def support_beads(
 
 
 def _joined(dense: Polygons, radius_mm: float, width_mm: float) -> Polygons:
-    """Dense areas with gaps closed that are narrower than twice radius_mm, the distance between sparse lines. Lines that fill one
-    large area lie beside each other; lines of many small areas would hang between the sparse lines."""
+    """Dense areas with gaps closed that are narrower than twice radius_mm, the distance between sparse lines.
+
+    Lines that fill one large area lie beside each other; lines of many small areas would hang between the sparse lines.
+    """
     if dense.num_contour() < 2:
         return dense
     joined = closing(dense, radius_mm)
@@ -117,8 +119,10 @@ def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process:
 
 
 def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: float, reach_mm: float) -> list[Floats]:
-    """Lines (n, 2) on the grid of parallel_lines that end on the border of an area. Ends of neighbouring lines nearer than
-    reach_mm are joined unless the fence lies between them."""
+    """Lines (n, 2) on the grid of parallel_lines that end on the border of an area.
+
+    Ends of neighbouring lines nearer than reach_mm are joined unless the fence lies between them.
+    """
     pieces = clip_pattern(index_edges(area), *parallel_lines(angle_deg, apart_mm))
     if not len(pieces.ends):
         return []

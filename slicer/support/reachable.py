@@ -73,8 +73,11 @@ class ReachableAreas:
         return self.sections.heights
 
     def carrying_layers(self, layer: int) -> range:
-        """The layers, from the highest down, on which the overhangs of a layer may rest. The distance across keeps support as
-        much lower under a slope that is just too flat, or as steep as one that a person may want to be held up."""
+        """The layers, from the highest down, on which the overhangs of a layer may rest.
+
+        The distance across keeps support as much lower under a slope that is just too flat, or as steep as one that a person may
+        want to be held up.
+        """
         process, drop_mm = self.process, float(self.heights.bottom_mm[layer]) - self.process.support_gap_mm
         steepest = 0.0 if self.sections.enforced else tan(radians(process.self_supporting_angle_deg))
         slack_mm = process.support_distance_mm / max(steepest, STEEPEST)
@@ -110,8 +113,10 @@ def drop_slivers(places: Polygons) -> Polygons:
 
 
 def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Polygons | None = None) -> ReachableAreas:
-    """The areas of as many layers of a part as there are `blocked`; all of the plate is placeable on the platform. handed: places
-    on the base plane that support of an earlier part can reach."""
+    """The areas of as many layers of a part as there are `blocked`; all of the plate is placeable on the platform.
+
+    handed: places on the base plane that support of an earlier part can reach.
+    """
     process, count = sections.support_process, len(blocked)
     radius, angle = process.line_width_mm, min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
     lean_mm = sections.heights.height_mm[:count] * tan(radians(angle))
@@ -147,8 +152,10 @@ def support_reach_mm(sections: Sections) -> float:
 
 
 def blocked_areas(sections: Sections, count: int, gap_mm: float, far_mm: float) -> list[Polygons]:
-    """For each of the lowest layers where support cannot be, or where a person wants none. gap_mm: distance to later parts' base
-    planes; far_mm: distance from the origin beyond which there is no support."""
+    """For each of the lowest layers where support cannot be, or where a person wants none.
+
+    gap_mm: distance to later parts' base planes; far_mm: distance from the origin beyond which there is no support.
+    """
     heights = sections.heights[:count]
     blocked = above_base_planes(sections.part, sections.later, heights, gap_mm, far_mm, sections.profile.machine)
     if sections.standing:
@@ -216,8 +223,10 @@ def _above_planes(planes: Sequence[Floats], heights: Heights, far_mm: float) -> 
 
 
 def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, Polygons]]:
-    """Heights above a limb's base plane, each with the area in which nothing may stand higher while the limb is printed. The tip
-    is assumed to reach down to the base plane everywhere in the limb's room. Nothing below -gap_mm is forbidden."""
+    """Heights above a limb's base plane, each with the area in which nothing may stand higher while the limb is printed.
+
+    The tip is assumed to reach down to the base plane everywhere in the limb's room. Nothing below -gap_mm is forbidden.
+    """
     room, clearance_mm, profile = room_of(limb), machine.clearance_mm, machine.head.silhouette_mm
     rings = [(-gap_mm, profile[0][0])]
     rings += [(height - clearance_mm, wider) for (_, height), (wider, _) in pairwise(profile)]

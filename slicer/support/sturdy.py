@@ -93,8 +93,10 @@ def _with_touching(area: Polygons, about: Polygons, thin: Polygons) -> Polygons:
 
 
 def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
-    """An area united with the room around a thin piece until it is as large as a circle of diameter least_mm. lacking_mm: the
-    radius that the piece lacks, the first distance to try. Growth ends least_mm from the piece."""
+    """An area united with the room around a thin piece until it is as large as a circle of diameter least_mm.
+
+    lacking_mm: the radius that the piece lacks, the first distance to try. Growth ends least_mm from the piece.
+    """
     least_mm2, distance_mm, step_mm, before_mm2 = 0.25 * pi * least_mm**2, lacking_mm, lacking_mm, thin.area()
     filled, mm2 = area, area.area()
     for _ in range(TRIES if mm2 < least_mm2 else 0):
@@ -110,8 +112,10 @@ def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, l
 
 
 def _loose(body: Polygons, wide: Polygons, below: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """The added area of layer m that neither lies within the lean of the layer below nor stands on something. Only pieces thinner
-    than a branch and pieces that begin in this layer may grow onto something to stand on."""
+    """The added area of layer m that neither lies within the lean of the layer below nor stands on something.
+
+    Only pieces thinner than a branch and pieces that begin in this layer may grow onto something to stand on.
+    """
     lean_mm, branch_mm, added = float(areas.lean_mm[m]), areas.process.support_branch_mm, wide - below
     loose = added if below.is_empty() else drop_slivers(added - dilate(below, lean_mm))
     if loose.is_empty() or areas.placeable[m].is_empty():

@@ -206,8 +206,11 @@ def stand(
 
 
 def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The support of every layer with roots under support that ends in the air above. A root is at most as deep as the steepest
-    slope that support may not slide along is high under its disc; a thin one no deeper than a tip may be long."""
+    """The support of every layer with roots under support that ends in the air above.
+
+    A root is at most as deep as the steepest slope that support may not slide along is high under its disc; a thin one no deeper
+    than a tip may be long.
+    """
     process = areas.process
     across = process.support_distance_mm + 2.0 * areas.radius_mm
     angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
@@ -277,8 +280,10 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
 
 
 def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
-    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate. Each
-    piece becomes up to twice as wide as the support on it is high, but grows by at most support_foot_mm on each side."""
+    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
+
+    Each piece becomes up to twice as wide as the support on it is high, but grows by at most support_foot_mm on each side.
+    """
     outlines, process = areas.sections.outlines, areas.process
     widths_mm = [4.0 * piece.area() / perimeter_mm(piece) for piece in islands(printed[0])]  # of a long strip twice its width
     enough_mm = process.support_foot_mm + 0.5 * max(widths_mm, default=0.0)  # higher support gets no wider foot

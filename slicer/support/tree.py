@@ -177,8 +177,10 @@ def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
 
 
 def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: float, lean: float) -> Branch | None:
-    """The branch where it is, as thick as it was or by the lean thinner, if that is free. borders: edges of the reached places;
-    depth_mm: how deep inside them the branch's middle lies."""
+    """The branch where it is, as thick as it was or by the lean thinner, if that is free.
+
+    borders: edges of the reached places; depth_mm: how deep inside them the branch's middle lies.
+    """
     if branch.full and depth_mm >= branch.reach_mm:
         return branch
     if branch.radius <= THIN_MM:
@@ -240,8 +242,9 @@ def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
 
 
 def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, lean_mm: float) -> Polygons:
-    """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it must.
-    What is placeable needs nothing."""
+    """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it
+    must. What is placeable needs nothing.
+    """
     straight, rest = places ^ reachable, places - reachable
     if rest.area() >= LEAST_MM2:
         rest = rest - placeable
@@ -257,6 +260,8 @@ def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, le
 
 
 def widen(area: Polygons, distance_mm: float) -> Polygons:
-    """The area grown by at least a distance, with hardly more corners than it has. What is grown layer after layer must not get
-    round corners: each of them would be two in the next layer."""
+    """The area grown by at least a distance, with hardly more corners than it has.
+
+    What is grown layer after layer must not get round corners: each of them would be two in the next layer.
+    """
     return offset(area, distance_mm, WIDEST)

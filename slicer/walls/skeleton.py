@@ -40,8 +40,10 @@ MOST_HOPS = 8  # from node to node; two that lead to each other would go on for 
 
 
 class Rule(NamedTuple):
-    """walls: loops from a boundary inward at most. outer, inner: nominal spacings; round: width less spacing. least, most: widths
-    of beads. All mm."""
+    """walls: loops from a boundary inward at most. outer, inner: nominal spacings; round: width less spacing.
+
+    least, most: widths of beads. All mm.
+    """
 
     walls: int
     outer: float
@@ -168,8 +170,10 @@ def _put_feet(
 
 @no_nrt
 def _centre(out: Skeleton, ends: tuple[int, int], short: float, long: float) -> bool:
-    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other. ends: the
-    corners with the nearest and the farthest foot; short, long: how far these are. Returns whether it moved."""
+    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other.
+
+    ends: the corners with the nearest and the farthest foot; short, long: how far these are. Returns whether it moved.
+    """
     near, far = ends
     t = near // 3
     ax, ay = out.feet[near, 0] - out.centres[t, 0], out.feet[near, 1] - out.centres[t, 1]
@@ -354,8 +358,10 @@ def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
 
 @helper
 def _spread(skeleton: Skeleton, rule: Rule) -> None:
-    """Corners and what lies between parts of the axis belong to the thickest place that they lead up to. A round place has no
-    axis, only a thickest point, and so no bead in the middle."""
+    """Corners and what lies between parts of the axis belong to the thickest place that they lead up to.
+
+    A round place has no axis, only a thickest point, and so no bead in the middle.
+    """
     root, beads = _roots(skeleton), skeleton.beads
     for t in range(len(root)):
         if root[t] == t and beads[t] % 2 and not _on_axis(skeleton, t):

@@ -56,8 +56,10 @@ ABUT = 0.45  # of a bead's width: a line ends so far from the middle of a bead t
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """course: (n, 3) x, y and width; level: 0 outermost; closed: it runs round, and its course ends where it begins. free: sides
-    on which no bead lies beside it; piece: the number of the polygons that it lies in."""
+    """course: (n, 3) x, y and width; level: 0 outermost; closed: it runs round, and its course ends where it begins.
+
+    free: sides on which no bead lies beside it; piece: the number of the polygons that it lies in.
+    """
 
     course: Floats
     level: int

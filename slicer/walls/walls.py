@@ -131,7 +131,9 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
 
 def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, behind_mm: float, least_mm: float) -> Polygons:
     """The part of the centreline of an area's outermost bead that has the core behind it: all, where no rest is at least so wide.
-    half: reach of the bead outward from its centreline; behind: distance from the centreline to the core."""
+
+    half: reach of the bead outward from its centreline; behind: distance from the centreline to the core.
+    """
     if area.is_empty():
         return line
     rest = area - offset(core, half_mm + behind_mm + SLACK_MM, BLUNT)
@@ -151,8 +153,10 @@ def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polyg
 
 
 def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> list[Bead]:
-    """Beads that fill places between other beads, which cover their round sides, with their area times height of plastic. They
-    are as wide as the place. What is narrower than LEAST_GAP of a line stays empty."""
+    """Beads that fill places between other beads, which cover their round sides, with their area times height of plastic.
+
+    They are as wide as the place. What is narrower than LEAST_GAP of a line stays empty.
+    """
     spacing, widest_mm = spacing_mm(line_width_mm, height_mm), MOST_WIDTH * line_width_mm
     rule = Rule(ROUNDS, MOST_WIDTH / SPLIT * spacing, spacing, 0.0, LEAST_GAP * line_width_mm, spacing_mm(widest_mm, height_mm))
     filled = [place for place in places if not place.is_empty()]
@@ -169,8 +173,10 @@ def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> 
 
 
 def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float, few: float = FEW) -> Polygons:
-    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it. few: of the width squared;
-    smaller places are left out."""
+    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it.
+
+    few: of the width squared; smaller places are left out.
+    """
     few_mm2 = few * width_mm**2
     rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
     return larger(opening(larger(rest, few_mm2), 0.5 * LEAST_GAP * width_mm), few_mm2)
