@@ -22,7 +22,8 @@ PROJECT = ("profiles", "mdp", "slicer", "machine", "pyproject.toml", "README.md"
 # Beside the bundles of a first run: what calls the kernels of some models and settings only.
 RUNS = (
     "print demo:tree --port sim --set machine.arcs=true",
-    "export demo:figure -o a.gcode --set process.adaptive_cusp_mm=0.05 --set process.seam=random --set search.simplify_faces=500",
+    "export demo:figure -o a.gcode --set process.adaptive_cusp_mm=0.05 --set process.seam=random --set search.simplify_faces=500"
+    " --set process.infill_pattern=lightning",
     "simulate a.gcode --baud 115200",
 )
 
