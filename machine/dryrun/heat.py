@@ -68,7 +68,7 @@ def _cold(program: ParsedProgram) -> Iterable[Finding]:
     first = int(rows[0])
     waited_row = max((event.row for event in heating if event.row <= first), default=0)
     severity, unless = unless_own(program, waited_row, first)
-    message = f"{{count}} moves push filament through a nozzle that is not hot: M109 S must come first and stay on{unless}"
+    message = f"filament is pushed through a nozzle that is not hot (moves: {{count}}): M109 S must come first{unless}"
     return per_part(program, rows, program.e_mm[rows], message, code="cold-extrusion", severity=severity)
 
 
@@ -100,7 +100,7 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
     if not beads.any():
         return []
     if not own:
-        usual = float(np.median(wanted[beads]))
+        usual = min(float(np.median(wanted[beads])), machine.nozzle_limit_c)
         least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
     message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
     cool, hot = (np.flatnonzero(beads & wrong) for wrong in (wanted < least, wanted > most))

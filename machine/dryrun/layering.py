@@ -51,6 +51,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         begins = (np.diff(part_of[program.remark[mine]]) != 0) | program.turned_between(mine)
         ends += (some.start + 1 + np.flatnonzero(begins)).tolist()
     support, loose = program.rows_of_types(*SUPPORT, Kind.SKIRT.value), program.rows_of_types(*LOOSE)
+    spanning = program.rows_of_types(Kind.OVERHANG.value, Kind.BRIDGE.value)
     problems, seen = [], set()
     for begin, end in pairwise([0, *ends, len(rows)]):
         mine = rows[begin:end]
@@ -63,6 +64,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             continue
         remark, gap = program.remark[high], gap[gap > 0.0]
         in_air = ((contacts.air_mm[high] + contacts.beside_mm[high]) > 0.0) & ~loose[high]
+        in_air |= spanning[high] & (gap > STAND_OFF_MM)  # whatever carries its ends lies below
         layer, lengths_mm = program.remarks.layer, deposited.length_mm[np.searchsorted(deposited.rows, mine)]
         laid_mm = np.bincount(layer[program.remark[mine]], weights=lengths_mm)
         hangs = (gap < SEEN_SHARE * program.remarks.height_mm[remark]) | in_air

@@ -42,11 +42,16 @@ def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ..
     return tuple(stops)
 
 
+def parts_in_words(count: int) -> str:
+    """Which numbers parts have: "1 to 3"."""
+    return "1 alone" if count == 1 else f"1 to {count}"
+
+
 def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
     """Raise SliceError for a stop in a part that does not exist. count: the number of parts."""
     for stop in stops:
         if stop.part > count:
-            raise SliceError(f"{stop.option}: there is no part {stop.part}, the parts are 1 to {count}")
+            raise SliceError(f"{stop.option}: there is no part {stop.part}, the parts are {parts_in_words(count)}")
 
 
 def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:

@@ -26,7 +26,6 @@ from profiles.profile import Profile
 from slicer.bead import INTERFACE_WIDTH, spacing_mm
 from slicer.estimate.timing import strokes_s
 from slicer.geometry.polygons import Polygons, perimeter_mm, union
-from slicer.geometry.polyline import lengths_mm
 from slicer.heights import Heights, shell_layers
 from slicer.modifiers import combined
 from slicer.overhangs import LEAST_MM2, Overhang, find_overhangs
@@ -166,10 +165,14 @@ def _line_before(profile: Profile, filament_mm2: float) -> Floats:
 
 def _raft(supports: Supports, filament_mm2: float) -> Floats:
     """(3,) figures of the raft under a part, if it has one; all of it counts as support."""
-    layers = raft_layers(supports)
+    layers, profile = raft_layers(supports), supports.sections.profile
+    time_s, tip = 0.0, rear_of(supports.sections.mesh.bounds_mm)
+    for k, layer in enumerate(layers):
+        if len(layer):
+            time_s += strokes_s(layer, layer.speed_mm_s, tip, profile, k == 0)
+            tip = layer.points[-1]
     mm3 = float(sum(layer.volumes_mm3.sum() for layer in layers))
-    time_s = float(sum((lengths_mm(layer.points, layer.starts) / layer.speed_mm_s).sum() for layer in layers))
-    return np.array([SLOWER * time_s + WAY_S * len(layers), mm3 / filament_mm2, mm3])
+    return np.array([time_s, mm3 / filament_mm2, mm3])
 
 
 def _rough_supports(sections: Sequence[Sections], overhangs: Sequence[Sequence[Overhang]]) -> list[Supports]:

@@ -16,6 +16,7 @@ from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from profiles.machine import Machine
 from profiles.profile import Profile
+from slicer.paths import Layer
 from slicer.strokes.speed import stroke_accelerations, travel_mm_s2
 from slicer.strokes.strokes import Strokes
 from slicer.strokes.travels import STANDING_MM
@@ -187,13 +188,13 @@ def _block_times(blocks: Blocks, junction_speed: float) -> Floats:
     return times
 
 
-def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
+def strokes_s(strokes: Strokes | Layer, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
     """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions.
 
     tip: (2,) where the layer below ends.
     """
     machine, process, material, speeds = profile.machine, profile.process, profile.material, speeds_of(profile)
-    places = strokes.points, strokes.starts, strokes.approach, strokes.approach_starts
+    places = strokes.points, strokes.starts, strokes.width_mm, strokes.approach, strokes.approach_starts
     bounds = speeds_mm_s, stroke_accelerations(profile, first_layer)[strokes.kind]
     pulls = material.retract_mm > 0.0
     wipe_mm = material.wipe_mm if pulls else 0.0
@@ -210,7 +211,7 @@ def strokes_s(strokes: Strokes, speeds_mm_s: Floats, tip: Floats, profile: Profi
 
 @kernel
 def _moves(
-    places: tuple[Floats, Indices, Floats, Indices],
+    places: tuple[Floats, Indices, Floats, Floats, Indices],
     tip: Floats,
     bounds: tuple[Floats, Floats],
     retract: Mask,
@@ -220,7 +221,7 @@ def _moves(
     """(n, 9) straight moves of strokes one after the other with the travels to them: steps of X Y Z tilt turn E, speed, greatest
     acceleration, and 1 where the machine stands still before. A travel that retracts wipes and lifts, and ends at a stand, where
     the filament is primed. far_mm: of a lift, a wipe and the filament pulled back meanwhile."""
-    points, starts, approach, approach_starts = places
+    points, starts, width_mm, approach, approach_starts = places
     speeds, most = bounds
     lift_mm, wipe_mm, pulled_mm = far_mm
     wipe_mm_s = min(paces.travel_mm_s, wipe_mm * paces.filament_mm_s / max(pulled_mm, TINY))
@@ -232,7 +233,7 @@ def _moves(
             if n > 0:
                 begun = starts[k - 1]
                 apart = sqrt((x - points[begun, 0]) ** 2 + (y - points[begun, 1]) ** 2)
-                wipe = wipe_mm if apart <= points[begun, 2] else -wipe_mm  # on along a ring, back along a line
+                wipe = wipe_mm if apart <= width_mm[k - 1] else -wipe_mm  # on along a ring, back along a line
                 ux, uy, uz = moves[n - 1, 0], moves[n - 1, 1], moves[n - 1, 2]
                 length = sqrt(ux**2 + uy**2 + uz**2)
                 ux, uy, aside = ux / length, uy / length, TURNED * wipe

@@ -42,6 +42,7 @@ STEP = 0.125  # line widths between the places of a stroke under which plastic i
 CARRIES = 0.35  # line widths from the middle of a line that it carries the middle of what lies on it
 ONWARD = 1.0  # line widths that a stroke may go on to plastic
 LAP = 0.5  # line widths that a stroke which ends on plastic laps over it or beyond it
+LAPS = (LAP, 0.25, 0.0)  # that are tried where plastic is nearby: a single wall leaves no room for more inside the outline
 CARRYING = 3  # layers below that carry infill: the lines of a pattern lie in the same place in every third layer at least
 SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
 HELD, EXTEND, CUT = range(3)  # an end on plastic, one that may be extended to it, and one that may also be cut back
@@ -269,9 +270,10 @@ def _held(points: Floats, plastic: Plastic, outline: EdgeIndex, width_mm: float,
     onward = along * (ONWARD * width_mm / max(float(np.hypot(*along)), 1e-9))
     way = _first_held(np.stack([points[0], points[0] + onward]), plastic, width_mm, ONWARD * width_mm)
     if way >= 0.0:
-        end = points[0] + onward * ((way / width_mm + LAP) / ONWARD)
-        if depths(end[None], outline)[0] > 0.5 * width_mm:
-            return np.concatenate([end[None], points[1:]])
+        ends = points[0] + onward * ((way / width_mm + np.array(LAPS)[:, None]) / ONWARD)
+        inside = depths(ends, outline) > 0.5 * width_mm
+        if inside.any():
+            return np.concatenate([ends[[inside.argmax()]], points[1:]])
     if need == EXTEND:
         return points
     way = _first_held(points, plastic, width_mm, np.inf) - LAP * width_mm

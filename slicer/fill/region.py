@@ -35,8 +35,8 @@ class Cover:
     """The uncut model around a part's layers.
 
     sections, insides: of each layer, and what walls would enclose of it; below, above: of as many layers under the first and
-    over the last one as shells look, the nearest first. later: the areas
-    of each layer, and of those over the last one, that parts printed later take; (): none.
+    over the last one as shells look, the nearest first. later: the areas of each layer, and of those over the last one, that
+    parts printed later take; (): none.
     """
 
     sections: Sequence[Polygons]

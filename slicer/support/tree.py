@@ -242,8 +242,9 @@ def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
 
 
 def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, lean_mm: float) -> Polygons:
-    """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it
-    must. What is placeable needs nothing.
+    """Reachable places of a layer that carry places of the layer above.
+
+    They lie straight below where that can be, aside where it must. What is placeable needs nothing.
     """
     straight, rest = places ^ reachable, places - reachable
     if rest.area() >= LEAST_MM2:

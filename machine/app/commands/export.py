@@ -13,6 +13,7 @@ from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say_lines
 from machine.app.terminal.report import joints_table, print_price, print_table
 from machine.dryrun.dryrun import summary
+from machine.planning.stops import parts_in_words
 from machine.view.page import print_page
 from profiles.errors import OutputError
 from slicer.drawing import layer_svg
@@ -75,4 +76,5 @@ def draw_layer(sliced: Sequence[SlicedPart], part: int, layer: int) -> bytes:
     for piece in sliced:
         if piece.index == part:
             return layer_svg(piece, layer).encode()
-    raise OutputError(f"--layer {part}:{layer}: there is no part {part}, the parts are 1 to {max(p.index for p in sliced)}")
+    there = parts_in_words(max(p.index for p in sliced))
+    raise OutputError(f"--layer {part}:{layer}: there is no part {part}, the parts are {there}")

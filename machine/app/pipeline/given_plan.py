@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from machine.app.requests import MOST_COPIES, ModelRequest
+from machine.planning.stops import parts_in_words
 from mdp.directions.orientation import motion_between
 from mdp.directions.turns import turned_further
 from mdp.mesh import Floats, Mesh
@@ -135,5 +136,5 @@ def check_parts_named(profile: Profile, parts: int) -> None:
     """Raise ProfileError for settings of parts that are not there."""
     for settings in profile.parts:
         if settings.part > parts:
-            there = "1 alone" if parts == 1 else f"1 to {parts}"
+            there = parts_in_words(parts)
             raise ProfileError(f"part {settings.part} is not there to have {settings.in_words}: the parts are {there}")

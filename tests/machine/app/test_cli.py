@@ -459,6 +459,15 @@ def test_closed_streams_end_no_command_unless_it_writes_to_them(words: str, expe
     assert (done.returncode, done.stderr) == expected
 
 
+def test_ctrl_c_after_a_command_is_done_changes_nothing() -> None:
+    program = (
+        "import os, signal, sys; from machine.app.start import main; sys.argv = ['tiltprint', '--version']; code = main(); "
+        "os.kill(os.getpid(), signal.SIGINT); sys.exit(code)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=Path(__file__).parents[3])
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_the_console_of_a_closed_input_ends_at_once() -> None:
     start = f"{sys.executable} -c 'from machine.app.start import main; raise SystemExit(main())'"
     command = ["sh", "-c", f"{start} console --port sim <&-"]

@@ -49,6 +49,15 @@ def test_a_sound_print_has_no_finding_whatever_it_spans(settings: tuple[str, ...
     assert not {"air", "gap"} & {f.code for f in run.findings}
 
 
+def test_a_roof_far_above_all_that_lies_below_it_is_found_though_it_is_a_bridge() -> None:
+    part = whole(standing(m3.Manifold.cube((20, 20, 10))))
+    profile = load(settings=("process.walls=0", "process.infill_density=0"))
+    decomposition = Decomposition("", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    program = plan(decomposition, slice_parts([part], profile), profile)
+    (error,) = dry_run(write_gcode(program, profile), profile).errors
+    assert "layer 5 begins 8.40 mm above all that lies below it" in error.message
+
+
 @pytest.mark.parametrize("settings", TELLING, ids=lambda settings: settings[0])
 @pytest.mark.parametrize("layer", range(3, 24, 4))
 def test_a_layer_without_its_beads_is_found_at_the_next_one(settings: tuple[str, ...], layer: int) -> None:

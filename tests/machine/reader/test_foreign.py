@@ -211,3 +211,11 @@ def test_a_macro_of_the_machine_s_own_may_home_and_heat_unseen(start: str, end: 
     assert severities([start, *print_]) == {"not-homed": "warning", "cold-extrusion": "warning", "heater-on": "error"}
     assert severities([start, *print_[1:], end]) == {"not-homed": "warning", "cold-extrusion": "warning"}
     assert severities([*print_, end])["heater-on"] == "warning"
+
+
+def test_temperatures_that_no_nozzle_reaches_leave_an_expected_range_that_can_be() -> None:
+    hot = ["G28", "M104 S200", "M109 S200", "G1 Z0.2 F600", "M104 S1000", "M83", "G1 X90 E1"]
+    machine = load("three_axis").machine
+    (message,) = [f.message for f in dry_run(hot, load("three_axis")).findings if f.code == "temperature"]
+    least, most = map(float, re.findall(r"(\d+) to (\d+) are expected", message)[0])
+    assert least < most == machine.nozzle_limit_c

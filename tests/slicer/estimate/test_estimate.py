@@ -177,6 +177,13 @@ def test_an_estimate_is_near_the_dry_run(
     assert expected.filament_mm == pytest.approx(float(run.program.filament_mm.max()), rel=share)
 
 
+@pytest.mark.parametrize("layers", [1, 8])
+def test_a_raft_takes_as_long_as_in_the_dry_run(layers: int) -> None:
+    part, settings = whole(box(50, 40, 0.6)), profile(f"process.raft_layers={layers}")
+    decomposition = Decomposition("shape", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    assert estimate(part, settings).time_s == pytest.approx(build(decomposition, settings).run.time_s, rel=0.03)
+
+
 def test_the_same_parts_are_always_estimated_alike() -> None:
     parts = cut(comb(), LEANING)
     assert estimate(parts, profile()) == estimate(parts, profile())

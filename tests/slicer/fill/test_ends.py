@@ -140,6 +140,15 @@ def test_an_anchor_grows_from_layer_to_layer() -> None:
     assert (np.diff(reached) < 1.5 * WIDTH).all()
 
 
+@pytest.mark.parametrize("walls", [1, 2])
+@pytest.mark.parametrize("density", [0.0, 0.02])
+def test_a_roof_spans_an_empty_inside_whatever_walls_there_are(walls: int, density: float) -> None:
+    box = standing(m3.Manifold.cube((30.0, 30.0, 4.0)))
+    layers = slice_part(whole(box), profile(f"process.walls={walls}", f"process.infill_density={density}")).layers
+    roof_mm3 = [layer.volumes_mm3.sum() for layer in layers[-4:]]
+    assert roof_mm3 == pytest.approx([30.0 * 30.0 * 0.2] * 4, rel=0.03)
+
+
 @pytest.mark.parametrize("pattern", ["gyroid", "cubic"])
 def test_hardly_a_line_of_infill_ends_over_nothing(pattern: str) -> None:
     box = m3.Manifold.cube((28.0, 22.0, 12.0), True).rotate((0.0, 0.0, 20.0))
