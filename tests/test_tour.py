@@ -87,7 +87,7 @@ def test_the_check_tells_what_exists_from_what_does_not() -> None:
     "signature",
     [
         "mdp.read.read_mesh(path, scale, rotate_deg)",
-        "mdp.search.search.decompose(mesh, name, profile)",
+        "mdp.search.search.decompose(mesh, name, profile, request)",
         "slicer.slice.slice_parts(parts, profile, on_progress)",
         "machine.planning.plan.plan(decomposition, sliced, profile, stops)",
         "machine.gcode.writer.write_gcode(program, profile)",

@@ -18,7 +18,7 @@ from mdp.directions.orientation import in_words
 from mdp.model_file import locate
 from mdp.read import read_mesh
 from mdp.search.orient import orient_and_decompose
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.profile import Profile, load
 
 HEAD = (
@@ -51,7 +51,7 @@ def main() -> None:
 def row(model: str, profile: Profile) -> str:
     """One line of the table."""
     mesh, _ = read_mesh(locate(model), profile.process.scale, profile.process.rotate_deg)
-    search = partial(decompose, name=model, profile=profile, price=pricing(profile))
+    search = partial(decompose, name=model, profile=profile, request=SearchRequest(price=pricing(profile)))
     upright, search_s = timed(lambda: search(mesh))
     oriented, lay_s = timed(lambda: orient_and_decompose(mesh, profile, pricing, search))
     whole, laid = upright.front[0], oriented.decomposition

@@ -104,9 +104,7 @@ def growth(mesh: Mesh, profile: Profile, largest: int) -> None:
 
 def sampled_bounds(mesh: Mesh, profile: Profile) -> Bounds:
     """The bounds of the sampled directions, as a search has them."""
-    search = profile.search
-    disc, volume_mm3 = platform_disc(mesh, search), mesh.volume_mm3
-    return bounds_of(directions(search), disc=disc, volume_mm3=volume_mm3, machine=profile.machine, search=search)
+    return bounds_of(directions(profile.search), mesh, profile, platform_disc(mesh, profile.search))
 
 
 def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], int]:

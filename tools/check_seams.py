@@ -34,7 +34,7 @@ from mdp.mesh import Floats, Indices
 from mdp.model_file import locate
 from mdp.pose import Pose, rotation
 from mdp.search.orient import orient_and_decompose
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.machine import Machine
 from profiles.profile import Profile, load
 
@@ -277,7 +277,7 @@ def played(model: str, settings: list[str]) -> tuple[DryRun, Profile]:
         return dry_run(lines, profile, known=()), profile
     profile = load(settings=settings)
 
-    search = partial(decompose, name=model, profile=profile, price=pricing(profile))
+    search = partial(decompose, name=model, profile=profile, request=SearchRequest(price=pricing(profile)))
     decomposition = orient_and_decompose(mesh_of(locate(model), profile), profile, pricing, search).decomposition
     return build(decomposition, profile).run, profile
 

@@ -14,7 +14,7 @@ from time import process_time
 from compare_prints import files, mesh_of
 
 from machine.app.pipeline.pricing import pricing
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
 from slicer.overhangs import find_overhangs
@@ -54,7 +54,7 @@ def main() -> None:
 def row(file: Path, profile: Profile) -> str:
     """One model's line."""
     try:
-        parts = decompose(mesh_of(file, profile), file.name, profile, price=pricing(profile)).parts
+        parts = decompose(mesh_of(file, profile), file.name, profile, SearchRequest(price=pricing(profile))).parts
         began = process_time()
         sections = [section_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
         own = [own_supports(layers, find_overhangs(layers)) for layers in sections]

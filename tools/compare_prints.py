@@ -21,7 +21,7 @@ from machine.app.pipeline.pricing import pricing
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
 from mdp.search.orient import orient_and_decompose
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
 
@@ -85,7 +85,7 @@ def row(file: Path, profile: Profile, orient: bool) -> str:
     """One model's line of the table."""
     try:
         mesh = mesh_of(file, profile)
-        search = partial(decompose, name=file.name, profile=profile, price=pricing(profile))
+        search = partial(decompose, name=file.name, profile=profile, request=SearchRequest(price=pricing(profile)))
         decomposition = orient_and_decompose(mesh, profile, pricing, search).decomposition if orient else search(mesh)
         if len(decomposition.parts) == 1 and not orient:
             return f"| {file.name} | 1 | 1 | 1 | | {decomposition.risky_area_mm2:.0f} | | | stays whole |"

@@ -36,7 +36,7 @@ from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.read import read_mesh
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.errors import LearningError, MeshError
 from profiles.profile import Profile, load
 
@@ -184,7 +184,7 @@ def rows(path: Path, missing: Sequence[Key], limit: int | None, most_faces: int 
 def _warm_up(settings: str, ranker: str) -> None:
     """Load the kernels and the ranker once, before anything is timed."""
     tree, _ = read_mesh(locate("demo:tree"))
-    decompose(tree, "tree", load(settings=(*shlex.split(settings), "search.directions=50")), ranker=ranker)
+    decompose(tree, "tree", load(settings=(*shlex.split(settings), "search.directions=50")), SearchRequest(ranker=ranker))
 
 
 def _profile(settings: Sequence[str], method: str, width: int) -> Profile:
@@ -198,7 +198,7 @@ def searched(key: Key, mesh: Mesh) -> Row:
     core, wall = time.process_time(), time.perf_counter()
     search = (name, settings, method, width, len(mesh.faces))
     try:
-        result = decompose(mesh, name, profile, ranker=ranker)
+        result = decompose(mesh, name, profile, SearchRequest(ranker=ranker))
     except Exception as error:  # noqa: BLE001 - whatever fails is what the table counts
         spent = (time.process_time() - core, time.perf_counter() - wall)
         return Row(*search, 0.0, 0.0, 1.0, 0, *spent, 0, f"{type(error).__name__}: {error}", ranker)

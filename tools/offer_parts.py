@@ -34,9 +34,8 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.read import read_mesh
-from mdp.search.by_plan import cut_by_plan
 from mdp.search.orient import forecast_orientations, orient_and_decompose
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
 
@@ -118,7 +117,9 @@ def sheet(row: dict[str, str], folder: Path, profile: Profile) -> dict[str, Any]
 def offers_of(mesh: Mesh, profile: Profile) -> list[Offer]:
     """What is chosen today, one piece in the best orientations and as the file has it, and the most different rows of fronts."""
     size_mm, price = float(np.ptp(mesh.vertices, axis=0).max()), pricing(profile)
-    oriented = orient_and_decompose(mesh, profile, pricing, partial(decompose, name="", profile=profile, price=price))
+    oriented = orient_and_decompose(
+        mesh, profile, pricing, partial(decompose, name="", profile=profile, request=SearchRequest(price=price))
+    )
     taken = np.eye(3) if oriented.orientation is None else oriented.orientation.rotation
     forecasts = sorted(forecast_orientations(mesh, profile, pricing), key=lambda forecast: forecast.whole_mm2)
     printable = [forecast.orientation.rotation for forecast in forecasts if np.isfinite(forecast.whole_mm2)]
@@ -163,7 +164,7 @@ def cut_rows(mesh: Mesh, rotation: Floats, profile: Profile, settings: Sequence[
 def decomposed(mesh: Mesh, offer: Offer, profile: Profile) -> Decomposition:
     """A model laid down and cut as it is offered."""
     plan = PlanFile("", parts=tuple(map(PlannedPart.of, reversed(offer.planes))))
-    return cut_by_plan(standing_still(mesh, offer.rotation), "", profile, plan)
+    return cut_by_plan(standing_still(mesh, offer.rotation), "", profile, SearchRequest(plan=plan))
 
 
 def as_plan(offer: Offer) -> dict[str, Any]:

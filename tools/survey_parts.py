@@ -19,7 +19,7 @@ from compare_prints import files, mesh_of
 
 from machine.app.pipeline.pricing import pricing
 from mdp.decomposition import Decomposition
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
 
@@ -52,7 +52,7 @@ def survey(file: Path, profile: Profile, terms: dict[str, Profile]) -> dict[str,
     try:
         mesh = mesh_of(file, profile)
         began = process_time()
-        ours = decompose(mesh, file.name, profile, price=pricing(profile))
+        ours = decompose(mesh, file.name, profile, SearchRequest(price=pricing(profile)))
         row = {"model": file.name, "faces": len(mesh.faces), "core_s": process_time() - began, **figures(ours)}
         rivals = {name: decompose(mesh, file.name, rival) for name, rival in terms.items()}
     except UserError as error:

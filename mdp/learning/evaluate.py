@@ -21,7 +21,7 @@ from mdp.learning.lists import RatedList, followed, of_side, read_lists
 from mdp.learning.ndcg import NDCGS, REGRETS, Measure, Scores, as_searched, at, interval
 from mdp.learning.sources import Side
 from mdp.mesh import Floats
-from mdp.ranking.network import Network
+from mdp.ranking.ranker import Network
 from profiles.errors import LearningError
 
 ALWAYS = ("M2", "M6")  # what lines are fitted in

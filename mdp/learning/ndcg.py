@@ -10,7 +10,7 @@ import numpy as np
 
 from mdp.learning.lists import RatedList
 from mdp.mesh import Floats, Ints
-from mdp.ranking.network import DECIMALS
+from mdp.ranking.ranker import DECIMALS
 
 RESAMPLES = 2000  # of a bootstrap: 50 of them lie beyond either end of 95 %
 

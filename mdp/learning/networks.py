@@ -16,7 +16,7 @@ from onnx import TensorProto, helper, numpy_helper
 from mdp.learning.lists import SMALLEST_RANGE, RatedList, Singles
 from mdp.learning.ndcg import Scores
 from mdp.mesh import Floats
-from mdp.ranking.network import INPUT, OUTPUT
+from mdp.ranking.ranker import INPUT, OUTPUT
 from profiles.errors import LearningError
 from profiles.files import SHARED, write_whole
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mdp.learning.index import FAILED, NO_CUT, NO_RISK, NO_SIDE, Row, Search
 from mdp.learning.models import coarser, oriented, read_model
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
 from profiles.profile import DEFAULTS, Profile, load
 
@@ -67,7 +67,7 @@ def run(search: Search, path: Path, settings: Settings) -> Result:
         if resting is None:
             return Result(replace(row, excluded=NO_SIDE, seconds=round(process_time() - began, 2)))
         records: list[bytes] = []
-        decomposition = decompose(resting, search.id, profile, on_record=records.append)
+        decomposition = decompose(resting, search.id, profile, SearchRequest(on_record=records.append))
     except UserError as error:
         return Result(replace(row, excluded=f"{FAILED}{error}", seconds=round(process_time() - began, 2)))
     limit_s = settings.time_limit_s

@@ -1,48 +1,7 @@
 """Plan file: a decomposition as a small TOML file that a person can read, change and use again.
 
-    version = 1
-    model = "kitten.off"
-    sha256 = "..."                      # of the model as it was cut; another model is refused
-
-    [[part]]                            # in print order; part 1 stands on the platform
-    [[part]]
-    normal = [0.0, 0.5, 0.8660254]      # printing direction; its base plane: the points p with normal . p = offset_mm
-    offset_mm = 31.0
-    process = {walls = 4}               # settings of this part alone
-    limbs_mm = [[0.0, 12.0, 48.0]]      # only the pieces above the plane at these points, the others stand; absent: all of them
-
-    [[keep]]                            # no plane passes through this box of the workpiece frame
-    min_mm = [-5.0, -5.0, 20.0]
-    max_mm = [5.0, 5.0, 30.0]
-
-    [[keep]]                            # the same through a box that leans: so much along each of three axes of its own
-    min_mm = [-5.0, -5.0, 20.0]
-    max_mm = [5.0, 5.0, 30.0]
-    axes = [[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]]
-
-    [[no_seam]]                         # seams here count a hundred times: a box, or the faces of a colour of the model's file
-    colour = "#00ff00"
-
-    [[no_support]]                      # nothing is held up here: the faces around a point that turn from it by at most so much
-    point_mm = [0.0, -12.5, 41.0]
-    angle_deg = 30.0
-
-    [[modifier]]                        # other settings in a box, which may lean, a mesh, or a height range; later ones win
-    mesh = "insert.stl"                 # a file beside the plan, closed, lying in the workpiece frame as it is
-    process = {infill_density = 1.0}
-
-    [[modifier]]
-    z_mm = [10.0, 20.0]
-    process = {walls = 4}
-
-    [[support]]                         # whatever overhangs in here is held up, however little
-    min_mm = [-20.0, -14.0, 20.0]
-    max_mm = [-8.0, -6.0, 41.0]
-
-    [[front]]                           # the best decomposition of every other number of parts, for --parts
-    planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ..., then the points of its limbs, if any
-
-A file of planes by hand needs no sha256, and a part may leave out `normal` or `offset_mm`: the search completes it.
+docs/plan.md has an example and explains every key. A file of planes by hand needs no sha256, and a part may leave out `normal` or
+`offset_mm`: the search completes it.
 """
 
 from collections.abc import Sequence
@@ -63,14 +22,8 @@ VERSION = 1  # of what a plan's keys mean
 GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
 ZONE_KINDS = ("keep", "no_seam", "no_support", "support")  # as mdp.zone.Zones has them
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "modifier", "front")
-PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
-BOX_KEYS = ("min_mm", "max_mm", "axes", "room")
-ZONE_KEYS = (*BOX_KEYS, "colour", "point_mm", "angle_deg")
-MESH_ZONES = ("no_support", "support")  # kinds that may be a mesh, too
-MODIFIER_KEYS = (*BOX_KEYS, "z_mm", "mesh", "process")
 MOST_MM = 1e5  # fifty times what any printer makes (mdp.read.MOST_MM)
 ROW_FIGURES = ("support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2")
-ROW_KEYS = ("planes", *ROW_FIGURES)
 
 
 @dataclass(frozen=True)
@@ -138,6 +91,9 @@ class PlanFile:
         return rows[max(allowed)]
 
 
+NO_PLAN = PlanFile("")
+
+
 def mesh_sha256(mesh: Mesh) -> str:
     """A word for the faces of a mesh and its vertices to the micrometre, the same on every machine."""
     vertices = np.floor(mesh.vertices / GRID_MM + GRID_SHIFT).astype("<i8")
@@ -151,23 +107,14 @@ def plan_of(
     settings: Sequence[PartSettings] = (),
 ) -> PlanFile:
     """The plan of a decomposition."""
-    rows = tuple(_row(row) for row in decomposition.front)
-    parts = tuple(
-        PlannedPart.of(
-            part.base,
-            f"part {part.index}: {part.volume_mm3 / 1000:.2f} cm3, printed at tilt {part.pose.tilt_deg:.2f} and turn "
-            f"{part.pose.turn_deg:.2f} deg",
-        )
-        for part in decomposition.parts[1:]
-    )
+    rows = tuple(planned_row(tuple(map(PlannedPart.of, reversed(row.planes))), row) for row in decomposition.front)
+    parts = []
+    for part in decomposition.parts[1:]:
+        pose = f"tilt {part.pose.tilt_deg:.2f} and turn {part.pose.turn_deg:.2f} deg"
+        parts.append(PlannedPart.of(part.base, f"part {part.index}: {part.volume_mm3 / 1000:.2f} cm3, printed at {pose}"))
     turned = None if orientation is None else tuple(_vector(row) for row in orientation)
     sha = mesh_sha256(decomposition.mesh)
-    return PlanFile("plan.toml", decomposition.name, sha, turned, parts, zones, rows, tuple(settings))
-
-
-def _row(row: FrontRow) -> PlannedRow:
-    parts = tuple(map(PlannedPart.of, reversed(row.planes)))
-    return planned_row(parts, row)
+    return PlanFile("plan.toml", decomposition.name, sha, turned, tuple(parts), zones, rows, tuple(settings))
 
 
 def planned_row(parts: tuple[PlannedPart, ...], row: FrontRow) -> PlannedRow:

@@ -11,22 +11,7 @@ import numpy as np
 
 from mdp.mesh import parse_colour
 from mdp.plane import unit_direction
-from mdp.plans.plan_file import (
-    BOX_KEYS,
-    KEYS,
-    MESH_ZONES,
-    MODIFIER_KEYS,
-    MOST_MM,
-    PART_KEYS,
-    ROW_FIGURES,
-    ROW_KEYS,
-    VERSION,
-    ZONE_KEYS,
-    ZONE_KINDS,
-    PlanFile,
-    PlannedPart,
-    PlannedRow,
-)
+from mdp.plans.plan_file import KEYS, MOST_MM, ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
 from mdp.read import read_in_place
 from mdp.sweep.limbs import MOST_JOINED
 from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, MeshVolume, Modifier, Painted, Zone, Zones
@@ -35,6 +20,12 @@ from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
 from profiles.toml_text import read_toml
 
+PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
+BOX_KEYS = ("min_mm", "max_mm", "axes", "room")
+ZONE_KEYS = (*BOX_KEYS, "colour", "point_mm", "angle_deg")
+MESH_ZONES = ("no_support", "support")  # kinds that may be a mesh, too
+MODIFIER_KEYS = (*BOX_KEYS, "z_mm", "mesh", "process")
+ROW_KEYS = ("planes", *ROW_FIGURES)
 MOST_BYTES = 10_000_000  # far more than the workbench writes; a file as large is refused unread
 MOST_ZONES = 1000  # of a kind: every face is asked for each
 MODIFIER_VOLUMES = {"a box": set(BOX_KEYS), "a height range z_mm": {"z_mm"}, "a mesh": {"mesh"}}
@@ -69,11 +60,8 @@ class _Reader:
             raise self._error(f"version is {_show(table.get('version'))}: this program reads version {VERSION}")
         tables = list(enumerate(self._list(table, "part", MOST_PARTS), start=1))
         parts = [self._part(part, number) for number, part in tables]
-        settings = tuple(
-            PartSettings(part=number, process=self._process(part, f"part {number}: "))
-            for number, part in tables
-            if part.get("process")
-        )
+        own = {number: self._process(part, f"part {number}: ") for number, part in tables if part.get("process")}
+        settings = tuple(PartSettings(part=number, process=process) for number, process in own.items())
         if parts and parts[0] != PlannedPart(None, None):
             raise self._error("part 1 stands on the platform and has no plane: put an empty [[part]] before the first plane")
         kinds: dict[str, Any] = {kind: self._zones(table, kind) for kind in ZONE_KINDS}
@@ -82,7 +70,7 @@ class _Reader:
         if len({len(row.parts) for row in rows}) < len(rows):
             raise self._error("two rows of [[front]] have the same number of planes: one is allowed for each")
         model, sha = self._text(table, "model"), self._text(table, "sha256")
-        turned = self._orientation(table)
+        turned = None if table.get("orientation") is None else self._rotation(table, "orientation")
         return PlanFile(self.name, model, sha, turned, tuple(parts[1:]), zones, tuple(rows), settings)
 
     def _part(self, table: dict[str, Any], number: int) -> PlannedPart:
@@ -112,10 +100,8 @@ class _Reader:
         planes = table.get("planes")
         if not isinstance(planes, list) or len(planes) >= MOST_PARTS:
             raise self._error(f"{where}planes is {_show(planes)}: a list of [x, y, z, offset_mm] is expected")
-        parts = []
-        for plane in planes:
-            parts.append(self._row_part(plane, f"{where}planes"))
-        return PlannedRow(tuple(parts), **{key: self._number(table.get(key, 0.0), where + key, 1e15) for key in ROW_FIGURES})
+        parts = tuple(self._row_part(plane, f"{where}planes") for plane in planes)
+        return PlannedRow(parts, **{key: self._number(table.get(key, 0.0), where + key, 1e15) for key in ROW_FIGURES})
 
     def _row_part(self, plane: Any, key: str) -> PlannedPart:
         """A part by the four numbers of its plane and three more for each of its limbs."""
@@ -126,23 +112,18 @@ class _Reader:
         return PlannedPart(self._unit(values[:3], key), self._number(values[3], key), limbs_mm=limbs_mm)
 
     def _zones(self, table: dict[str, Any], key: str) -> tuple[AnyZone, ...]:
-        zones: list[AnyZone] = []
-        for number, values in enumerate(self._list(table, key, MOST_ZONES), start=1):
-            where = f"{key} {number}: "
-            self._only(values, (*ZONE_KEYS, *(("mesh",) if key in MESH_ZONES else ())), where)
-            if "mesh" in values:
-                if len(values) > 1:
-                    raise self._error(f"{where}has a mesh and {', '.join(values.keys() - {'mesh'})}: one of them is allowed")
-                zones.append(self._solid(values, where))
-                continue
-            if "colour" in values:
-                zones.append(self._painted(values, where))
-                continue
-            if "point_mm" in values or "angle_deg" in values:
-                zones.append(self._grown(values, where))
-                continue
-            zones.append(self._box(values, where))
-        return tuple(zones)
+        tables = enumerate(self._list(table, key, MOST_ZONES), start=1)
+        return tuple(self._zone(values, key, f"{key} {number}: ") for number, values in tables)
+
+    def _zone(self, values: dict[str, Any], key: str, where: str) -> AnyZone:
+        self._only(values, (*ZONE_KEYS, *(("mesh",) if key in MESH_ZONES else ())), where)
+        if "mesh" in values:
+            if len(values) > 1:
+                raise self._error(f"{where}has a mesh and {', '.join(values.keys() - {'mesh'})}: one of them is allowed")
+            return self._solid(values, where)
+        if "colour" in values:
+            return self._painted(values, where)
+        return self._grown(values, where) if "point_mm" in values or "angle_deg" in values else self._box(values, where)
 
     def _box(self, values: dict[str, Any], where: str) -> Zone:
         low, high = (self._vector(values.get(corner), where + corner) for corner in ("min_mm", "max_mm"))
@@ -154,9 +135,8 @@ class _Reader:
     def _room(self, values: Any, where: str) -> Zone:
         """A box outside of which another does not count."""
         if not isinstance(values, dict):
-            raise self._error(
-                f"{where.strip()} is {_show(values)}: a box is expected, as {{min_mm = [0, 0, 0], max_mm = [9, 9, 9]}}"
-            )
+            expected = "a box is expected, as {min_mm = [0, 0, 0], max_mm = [9, 9, 9]}"
+            raise self._error(f"{where.strip()} is {_show(values)}: {expected}")
         self._only(values, BOX_KEYS, where)
         return self._box(values, where)
 
@@ -209,9 +189,6 @@ class _Reader:
         if colour is None:
             raise self._error(f'{where}colour is {_show(text)}: # and six hexadecimal digits are expected, as "#ff0000"')
         return Painted(colour)
-
-    def _orientation(self, table: dict[str, Any]) -> tuple[Vector, ...] | None:
-        return None if table.get("orientation") is None else self._rotation(table, "orientation")
 
     def _rotation(self, table: dict[str, Any], key: str) -> tuple[Vector, Vector, Vector]:
         """The rows of a rotation; key: where it stands, its last word the table's key."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.ranking.candidates import Bounds, Feasibility, Reason, ScoredCandidates
+from mdp.ranking.candidates import Reason, ScoredCandidates, check
 
 FIRST_THRESHOLD, THRESHOLD_FACTOR, ROUNDS = 1e-4, 5.0, 11  # shares of the risky area; the last one is above 1e3
 RESIDUAL_THRESHOLDS = np.array(list(accumulate(repeat(THRESHOLD_FACTOR, ROUNDS - 1), mul, initial=FIRST_THRESHOLD)))
@@ -62,23 +62,16 @@ class CandidateTable:
     def __init__(
         self,
         scored: ScoredCandidates,
-        limits: Bounds,
         situation: Situation,
-        *,
-        check: Callable[[Ints, Floats], Feasibility],
         least_gain_mm2: float = 0.0,
         is_weak: Callable[[Plane], bool] = lambda plane: False,
     ) -> None:
         """least_gain_mm2: what gains less is for parts of the preferred volume only; is_weak: whether a plane that can be cut
         leaves too weak a base, asked for only where a row's turn comes."""
-        self.scored: ScoredCandidates = scored
-        self.limits: Bounds = limits
-        self.least_gain_mm2 = least_gain_mm2
-        self.situation: Situation = situation
-        self.saved_mm2: float = situation.saved_mm2
-        self.residual_mm2: float = situation.residual_mm2
-        self.lost_mm2: float = situation.lost_mm2
-        self._check, self._is_weak, self._strong = check, is_weak, set[int]()
+        self.scored, self.limits, self.least_gain_mm2 = scored, scored.limits, least_gain_mm2
+        self.situation, self.model = situation, situation.model
+        self.saved_mm2, self.residual_mm2, self.lost_mm2 = situation.saved_mm2, situation.residual_mm2, situation.lost_mm2
+        self.check, self._is_weak, self._strong = check, is_weak, set[int]()
         count = len(scored.gain_mm2)
         self.reason = np.full(count, UNKNOWN, np.int32)
         self.volume_mm3: Floats = np.zeros(count)
@@ -88,15 +81,10 @@ class CandidateTable:
         self._rankings: dict[float, _TradeOffRanking] = {}
         self._rounds: list[Ints] = []
 
-    @property
-    def model(self) -> Model:
-        """What shares are shares of."""
-        return self.situation.model
-
-    def rows_of_round(self, number: int, risky_mm2: float) -> Ints:
-        """The rows that come below the residual threshold in this round first; risky_mm2: what the threshold is a share of."""
+    def rows_of_round(self, number: int) -> Ints:
+        """The rows that come below the residual threshold in this round first."""
         if not self._rounds:
-            rounds = relaxation_rounds(self.scored.lost_mm2 / risky_mm2)
+            rounds = relaxation_rounds(self.scored.lost_mm2 / self.model.risky_mm2)
             order = np.argsort(rounds, kind="stable")
             self._rounds = np.split(order, np.searchsorted(rounds[order], np.arange(1, ROUNDS + 1)))
         return self._rounds[number]
@@ -116,7 +104,8 @@ class CandidateTable:
         if len(fresh) == 0:
             return
         alike = np.nonzero(np.isin(self.scored.direction, self.scored.direction[fresh]))[0]
-        checked = self._check(self.scored.direction[alike], self.scored.offset_mm[alike])
+        scored, limits = self.scored, self.limits
+        checked = self.check(scored.remainder, limits, limits.step_mm, scored.direction[alike], scored.offset_mm[alike])
         self.reason[alike], self.volume_mm3[alike] = checked.reason, checked.volume_mm3
         self.section_mm2[alike], self.contact_area_mm2[alike] = checked.section_mm2, checked.contact_area_mm2
         self._sliver_mm[alike] = checked.fragile_mm
@@ -205,13 +194,8 @@ class _TradeOffRanking:
             self._planes.append(plane)
 
 
-def relaxation_round(residual: float) -> int:
-    """The round whose residual threshold lets in a candidate with this share of the risky area left on its part."""
-    return int(relaxation_rounds(np.array([residual]))[0])
-
-
 def relaxation_rounds(residual: Floats) -> Ints:
-    """(n,) the same for many."""
+    """(n,) rounds whose residual thresholds let in candidates with these shares of the risky area left on their parts."""
     return np.searchsorted(RESIDUAL_THRESHOLDS, residual, side="right").astype(np.int32)
 
 

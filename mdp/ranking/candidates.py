@@ -21,7 +21,7 @@ from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.limbs import LimbSums
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import Patches, Zone, spans_mm
-from profiles.machine import Machine
+from profiles.profile import Profile
 from profiles.search import Search
 
 # A plane is never laid into a face that overhangs along its direction: that would look like resting on the cut, over air.
@@ -68,7 +68,8 @@ def directions(search: Search) -> Floats:
 @dataclass(frozen=True, eq=False)
 class Bounds:
     """What every direction must respect, worked out once a search: (k,) arrays. keep_mm: (k, spans, 2) offsets between which a
-    plane passes through a zone; crumb_mm: a piece that is lower is a crumb."""
+    plane passes through a zone; crumb_mm: a piece that is lower is a crumb; fragile_mm: what is thinner is a sliver;
+    step_mm: between the candidates of a direction."""
 
     directions: Floats
     least_offset_mm: Floats
@@ -77,31 +78,34 @@ class Bounds:
     least_interface_mm2: float
     keep_mm: Floats
     crumb_mm: float
+    fragile_mm: float
+    step_mm: float
+
+    @property
+    def contact_area_mm2(self) -> float:
+        """The least area that a piece of the part stands on."""
+        return max(self.least_interface_mm2, LEAST_CONTACT_AREA_MM2)
 
 
 def bounds_of(
-    chosen: Floats,
-    *,
-    disc: tuple[Floats, float],
-    volume_mm3: float,
-    machine: Machine,
-    search: Search,
-    keep: Sequence[Zone | Patches] = (),
+    chosen: Floats, mesh: Mesh, profile: Profile, disc: tuple[Floats, float], keep: Sequence[Zone | Patches] = ()
 ) -> Bounds:
-    """Bounds for (k, 3) directions, a disc that every plane must clear, a model's volume and the zones that stay whole."""
-    centre, radius = disc
+    """Bounds for (k, 3) directions; disc: what every plane must clear; keep: the zones that stay whole."""
+    (centre, radius), search = disc, profile.search.effective
     tilt = np.hypot(chosen[:, 0], chosen[:, 1])
     heights = np.zeros(len(chosen))
     if search.clearance:
-        heights = np.array([least_height_mm(machine, direction) for direction in chosen])
+        heights = np.array([least_height_mm(profile.machine, direction) for direction in chosen])
     return Bounds(
         directions=chosen,
         least_offset_mm=chosen[:, :2] @ centre + radius * tilt,
         least_height_mm=heights,
-        least_volume_mm3=search.least_volume_share * volume_mm3,
+        least_volume_mm3=search.least_volume_share * mesh.volume_mm3,
         least_interface_mm2=search.least_interface_mm2,
         keep_mm=spans_mm(chosen, keep),
         crumb_mm=sqrt(search.least_interface_mm2),
+        fragile_mm=max(search.fragile_mm, COPLANAR_MM),
+        step_mm=search.offset_step_mm,
     )
 
 
@@ -125,12 +129,13 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 @dataclass(frozen=True, eq=False)
 class ScoredCandidates:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
-    not known yet. direction is a row of Bounds.directions; above_mm2: what is risky above the plane printed straight up;
+    not known yet. direction is a row of limits.directions; above_mm2: what is risky above the plane printed straight up;
     residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; hopeless_mm2: what of the first two no cut
-    can save, 0 unless requested. first, columns: (k,) the first plane along each direction, in steps of step_mm, and
+    can save, 0 unless requested. first, columns: (k,) the first plane along each direction, in steps of limits.step_mm, and
     the number of all planes along it."""
 
     remainder: Remainder
+    limits: Bounds
     direction: Ints
     offset_mm: Floats
     above_mm2: Floats
@@ -142,12 +147,11 @@ class ScoredCandidates:
     hopeless_mm2: Floats
     first: Ints
     columns: Ints
-    step_mm: float
 
     @property
     def end_mm(self) -> Floats:
         """Offset of the last plane along the direction of each candidate."""
-        end_mm: Floats = ((self.first + self.columns - 1) * np.float64(self.step_mm))[self.direction]
+        end_mm: Floats = ((self.first + self.columns - 1) * np.float64(self.limits.step_mm))[self.direction]
         return end_mm
 
     @property
@@ -178,12 +182,12 @@ class Feasibility:
 
 
 def score_candidates(
-    remainder: Remainder, limits: Bounds, terms: CostTerms, *, step_mm: float, least_gain_mm2: float, hopeless: Mask | None = None
+    remainder: Remainder, limits: Bounds, terms: CostTerms, least_gain_mm2: float, hopeless: Mask | None = None
 ) -> ScoredCandidates:
     """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe and the stairs that
     it takes away, less those that it brings and its seam. hopeless: the faces that no cut can save, see sweep.gains."""
-    swept = gains(remainder, limits.directions, step_mm, threshold(terms.angle_deg), hopeless)
-    residual, offset = residual_mm2(swept, terms), swept.offsets_mm(step_mm)
+    swept = gains(remainder, limits.directions, limits.step_mm, threshold(terms.angle_deg), hopeless)
+    residual, offset = residual_mm2(swept, terms), swept.offsets_mm(limits.step_mm)
     gain = gain_mm2(swept, residual)
     above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
     scored = swept.used & above & (gain >= least_gain_mm2)
@@ -192,6 +196,7 @@ def score_candidates(
     direction = np.nonzero(scored)[0].astype(np.int32)
     return ScoredCandidates(
         remainder=remainder,
+        limits=limits,
         direction=direction,
         offset_mm=offset[scored],
         above_mm2=swept.up_mm2[scored],
@@ -203,7 +208,6 @@ def score_candidates(
         hopeless_mm2=swept.hopeless_mm2[scored],
         first=swept.first,
         columns=swept.columns,
-        step_mm=step_mm,
     )
 
 
@@ -228,11 +232,11 @@ def seam_mm2(swept: Gains | LimbSums, terms: CostTerms) -> Floats:
     return terms.seam_mm * swept.rim_mm + terms.feature_mm2 * swept.crossed + terms.cut_mm2
 
 
-def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Feasibility:
-    """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut."""
+def check(remainder: Remainder, limits: Bounds, step_mm: float, direction: Ints, offset_mm: Floats) -> Feasibility:
+    """Which of the planes (rows of limits.directions, offsets on a grid of step_mm) can be cut."""
     rows, inverse = np.unique(direction, return_inverse=True)
-    swept = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows], limits.crumb_mm)
-    at = (inverse, np.rint(offset_mm / search.offset_step_mm).astype(np.int64) - swept.first[inverse])
+    swept = sweep(remainder, limits.directions[rows], step_mm, limits.least_height_mm[rows], limits.crumb_mm)
+    at = (inverse, np.rint(offset_mm / step_mm).astype(np.int64) - swept.first[inverse])
     reason, keep_mm = np.zeros(len(direction), np.int32), limits.keep_mm[direction]
     checks = {
         Reason.PLATFORM: offset_mm < limits.least_offset_mm[direction],
@@ -240,8 +244,8 @@ def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints,
         Reason.REACH: ~np.isfinite(limits.least_height_mm[direction]),
         Reason.CLEARANCE: swept.lowest_mm[at] < limits.least_height_mm[direction],
         Reason.VOLUME: swept.volume_mm3[at] < limits.least_volume_mm3,
-        Reason.INTERFACE: swept.contact_area_mm2[at] < max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2),
-        Reason.FRAGILE: swept.fragile_mm[at] < max(search.fragile_mm, COPLANAR_MM),
+        Reason.INTERFACE: swept.contact_area_mm2[at] < limits.contact_area_mm2,
+        Reason.FRAGILE: swept.fragile_mm[at] < limits.fragile_mm,
         Reason.KEEP: ((keep_mm[..., 0] < offset_mm[:, None]) & (offset_mm[:, None] < keep_mm[..., 1])).any(axis=1),
     }
     for why, out in checks.items():
@@ -250,17 +254,16 @@ def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints,
     return Feasibility(reason, *(column[at] for column in columns))
 
 
-def refusals(
-    scored: ScoredCandidates, limits: Bounds, search: Search, *, least_gain_mm2: float, is_weak: Callable[[Plane], bool]
-) -> dict[Reason, int]:
+def refusals(scored: ScoredCandidates, least_gain_mm2: float, is_weak: Callable[[Plane], bool]) -> dict[Reason, int]:
     """How many of all planes of a solid each reason takes, to report why nothing can be cut. scored: at least those of its
     candidates that gain least_gain_mm2; is_weak: called only for planes that pass every other check."""
+    limits, step_mm = scored.limits, scored.limits.step_mm
     direction = np.repeat(np.arange(len(scored.columns), dtype=np.int32), scored.columns)
     begins = np.concatenate([[0], np.cumsum(scored.columns)])
-    offset_mm = (np.arange(begins[-1]) + np.repeat(scored.first - begins[:-1], scored.columns)) * np.float64(scored.step_mm)
-    reason = check(scored.remainder, limits, search, direction, offset_mm).reason
+    offset_mm = (np.arange(begins[-1]) + np.repeat(scored.first - begins[:-1], scored.columns)) * np.float64(step_mm)
+    reason = check(scored.remainder, limits, step_mm, direction, offset_mm).reason
     gains_enough = np.zeros(len(reason), np.bool_)
-    column = np.rint(scored.offset_mm / scored.step_mm).astype(np.int64) - scored.first[scored.direction]
+    column = np.rint(scored.offset_mm / step_mm).astype(np.int64) - scored.first[scored.direction]
     gains_enough[begins[scored.direction] + column] = scored.gain_mm2 >= least_gain_mm2
     reason[(reason == Reason.FEASIBLE) & ~gains_enough] = Reason.GAIN
     for row in np.flatnonzero(reason == Reason.FEASIBLE):

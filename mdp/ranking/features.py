@@ -36,26 +36,13 @@ def _wasted(table: CandidateTable, rows: Ints) -> Floats:
     return (scored.lost_mm2 - scored.seam_mm2 - scored.hopeless_mm2)[rows] / table.model.risky_mm2
 
 
-def _risky_left(table: CandidateTable, rows: Ints) -> Floats:
-    return (table.situation.risky_mm2 - table.scored.above_mm2[rows]) / table.model.risky_mm2
-
-
-def _hopeless_left(table: CandidateTable, rows: Ints) -> Floats:
-    return (table.situation.hopeless_mm2 - table.scored.hopeless_mm2[rows]) / table.model.risky_mm2
-
-
 def _above_platform(table: CandidateTable, rows: Ints) -> Floats:
-    return _share(
-        (table.scored.offset_mm[rows] - table.limits.least_offset_mm[table.scored.direction[rows]]) / table.model.radius_mm
-    )
+    above_mm = table.scored.offset_mm[rows] - table.limits.least_offset_mm[table.scored.direction[rows]]
+    return _share(above_mm / table.model.radius_mm)
 
 
 def _fragile(table: CandidateTable, rows: Ints) -> Floats:
     return _share(np.array([table.fragile_mm(int(row)) for row in rows], dtype=np.float64) / table.model.radius_mm)
-
-
-def _extent(table: CandidateTable, rows: Ints) -> Floats:
-    return (table.scored.end_mm - table.scored.offset_mm)[rows] / table.model.radius_mm
 
 
 FEATURES: dict[str, Column] = {
@@ -67,14 +54,14 @@ FEATURES: dict[str, Column] = {
     "M6": lambda table, rows: (table.lost_mm2 + table.scored.lost_mm2[rows]) / table.model.risky_mm2,
     "wasted": _wasted,
     "hopeless": lambda table, rows: table.scored.hopeless_mm2[rows] / table.model.risky_mm2,
-    "hopeless_left": _hopeless_left,
-    "risky_left": _risky_left,
+    "hopeless_left": lambda table, rows: (table.situation.hopeless_mm2 - table.scored.hopeless_mm2[rows]) / table.model.risky_mm2,
+    "risky_left": lambda table, rows: (table.situation.risky_mm2 - table.scored.above_mm2[rows]) / table.model.risky_mm2,
     "seam": lambda table, rows: table.scored.seam_mm2[rows] / table.model.risky_mm2,
     "tilt": lambda table, rows: table.normals(rows)[:, 2],
     "turn": lambda table, rows: table.normals(rows) @ table.situation.last,
     "section": lambda table, rows: table.section_mm2[rows] / table.model.circle_mm2,
     "contact": lambda table, rows: table.contact_area_mm2[rows] / table.model.circle_mm2,
-    "extent": _extent,
+    "extent": lambda table, rows: (table.scored.end_mm - table.scored.offset_mm)[rows] / table.model.radius_mm,
     "volume_left": lambda table, rows: (table.situation.volume_mm3 - table.volume_mm3[rows]) / table.model.volume_mm3,
     "cuts": lambda table, rows: np.full(len(rows), table.situation.cuts / TENS),
     "round": lambda table, rows: table.rounds(rows) / TENS,

@@ -62,27 +62,17 @@ def shortlist(tables: Sequence[CandidateTable], bound_mm2: float) -> Iterator[Ra
 
 
 def rank_classic(
-    tables: Sequence[CandidateTable], risky_mm2: float, bound_mm2: float, least_reduction: float = 0.0, preferred_mm3: float = 0.0
+    tables: Sequence[CandidateTable], bound_mm2: float, least_reduction: float = 0.0, preferred_mm3: float = 0.0
 ) -> Iterator[RankedCandidate]:
     """Feasible candidates, best first; those that would leave bound_mm2 or more for ever are left out.
 
-    risky_mm2: the model's risky area, which the residual thresholds and the reductions are shares of. least_reduction:
-    accumulated reduction that a candidate must exceed. preferred_mm3: parts of at least this volume come before all smaller
-    ones.
+    least_reduction: accumulated reduction, a share of the model's risky area, that a candidate must exceed. preferred_mm3: parts
+    of at least this volume come before all smaller ones.
     """
-    ranking = _ClassicRanking(tables, risky_mm2, bound_mm2, least_reduction)
+    ranking = _ClassicRanking(tables, bound_mm2, least_reduction)
     yield from ranking.within_volume(preferred_mm3, np.inf)
     if preferred_mm3 > 0.0:
         yield from ranking.within_volume(0.0, preferred_mm3)
-
-
-@dataclass(frozen=True, eq=False)
-class _Round:
-    """Candidates of all tables side by side, by reduction, larger parts first among equals."""
-
-    table: Ints
-    row: Ints
-    reduction: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +80,6 @@ class _ClassicRanking:
     """The candidates of some tables that would leave less than bound_mm2 for ever and reduce more than least_reduction."""
 
     tables: Sequence[CandidateTable]
-    risky_mm2: float
     bound_mm2: float
     least_reduction: float
 
@@ -99,28 +88,30 @@ class _ClassicRanking:
         near: list[list[Plane]] = [[] for _ in self.tables]
         best, ahead = -np.inf, FIRST_LOOK
         for number in range(ROUNDS):
-            sorted_round = self._sort_round(number, best, any_gain=least_mm3 > 0.0)
-            for position, (index, row) in enumerate(zip(sorted_round.table.tolist(), sorted_round.row.tolist(), strict=True)):
+            indices, rows, reduction = self._sort_round(number, best, any_gain=least_mm3 > 0.0)
+            for position, (index, row) in enumerate(zip(indices.tolist(), rows.tolist(), strict=True)):
                 table = self.tables[index]
                 if table.reason[row] == UNKNOWN:
                     soon, ahead = slice(position, position + ahead), min(2 * ahead, LOOK_AHEAD)
-                    self._check_ahead(sorted_round.table[soon], sorted_round.row[soon])
+                    for own in np.unique(indices[soon]):  # of every table in one go, all their directions in parallel
+                        self.tables[own].check_rows(rows[soon][indices[soon] == own])
                 if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
                     continue
                 plane = table.plane(row)
                 if not any(nearly_equal(plane, earlier) for earlier in near[index]) and table.feasible(row):
                     near[index].append(plane)
-                    best = max(best, float(sorted_round.reduction[position]))
+                    best = max(best, float(reduction[position]))
                     yield RankedCandidate(index, row, number)
 
-    def _sort_round(self, number: int, best: float, any_gain: bool) -> _Round:
-        """What a round lets in that reduces at least as much as the best so far; few of all, so they are chosen before anything
-        is sorted. any_gain: also what gains enough for large parts only."""
+    def _sort_round(self, number: int, best: float, any_gain: bool) -> tuple[Ints, Ints, Floats]:
+        """What a round lets in that reduces at least as much as the best so far, by reduction, larger parts first among equals:
+        (n,) tables, rows and reductions. Few of all, so they are chosen before anything is sorted. any_gain: also what gains
+        enough for large parts only."""
         indices: list[tuple[Ints, Ints, Ints]] = []
         values: list[Floats] = []
         for index, table in enumerate(self.tables):
-            scored, rows = table.scored, table.rows_of_round(number, self.risky_mm2)
-            reduction = np.round((scored.gain_mm2[rows] + table.saved_mm2) / self.risky_mm2 / EQUAL) * EQUAL
+            scored, rows = table.scored, table.rows_of_round(number)
+            reduction = np.round((scored.gain_mm2[rows] + table.saved_mm2) / table.model.risky_mm2 / EQUAL) * EQUAL
             admitted = (reduction >= best) & (reduction > self.least_reduction)
             admitted &= scored.residual_mm2[rows] + table.residual_mm2 < self.bound_mm2
             admitted &= any_gain | (scored.gain_mm2[rows] >= table.least_gain_mm2)
@@ -130,9 +121,4 @@ class _ClassicRanking:
         number_of, row, direction = (np.concatenate(column, dtype=np.int32) for column in zip(*indices, strict=True))
         offset, reduction = np.concatenate(values, axis=1)
         order = np.lexsort((direction, number_of, offset, -reduction))
-        return _Round(number_of[order], row[order], reduction[order])
-
-    def _check_ahead(self, table: Ints, row: Ints) -> None:
-        """Check these candidates of every table in one go, all their directions in parallel."""
-        for index in np.unique(table):
-            self.tables[index].check_rows(row[table == index])
+        return number_of[order], row[order], reduction[order]

@@ -27,15 +27,19 @@ FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file can carry; the clo
 Arrays = dict[str, NDArray[Any]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Offer:
     """A ranked candidate. parent: signature of the node it would cut; features: its COLUMNS; round: the one whose residual
-    threshold let it in."""
+    threshold let it in. A trace adds the stage, the number of the parent and of the node it led to, and whether that was new."""
 
     parent: Hashable
     plane: Plane
     features: Floats
     round: int
+    stage: int = 0
+    parent_number: int = NO_NODE
+    child: int = NO_NODE
+    chosen: bool = False
 
 
 def offer(parent: Hashable, table: CandidateTable, candidate: RankedCandidate) -> Offer:
@@ -52,15 +56,6 @@ class Child:
     row: int
     signature: Hashable
     cost_mm2: float
-
-
-@dataclass(eq=False)
-class _Candidate:
-    stage: int
-    parent: int
-    offer: Offer
-    chosen: bool = False
-    child: int = NO_NODE
 
 
 @dataclass(eq=False)
@@ -82,9 +77,9 @@ class Trace:
         self._number: dict[Hashable, int] = {root: 0}
         whole_mm2 = model.risky_mm2 if cost_mm2 is None else cost_mm2
         self._nodes = [_Node(whole_mm2 / model.risky_mm2 if model.risky_mm2 > 0 else 0.0, 0, NO_NODE)]
-        self._candidates: list[_Candidate] = []
+        self._candidates: list[Offer] = []
         self._stage = 0
-        self._known: dict[tuple[int, bytes, float], _Candidate] = {}
+        self._known: dict[tuple[int, bytes, float], Offer] = {}
 
     def begin_stage(self, beam: Sequence[Hashable]) -> None:
         """The next stage begins: the nodes with these signatures are the ones that are cut."""
@@ -110,7 +105,7 @@ class Trace:
     def outcomes(self) -> Floats:
         """(nodes,) outcome of every node as share of the model's risky area."""
         best = np.array([node.cost for node in self._nodes])
-        links = [(candidate.parent, candidate.child) for candidate in self._candidates if candidate.child != NO_NODE]
+        links = [(candidate.parent_number, candidate.child) for candidate in self._candidates if candidate.child != NO_NODE]
         changed = True
         while changed:  # a twin can link a node to one made earlier, so one pass from the last node to the first may not do
             changed = False
@@ -131,13 +126,13 @@ class Trace:
         rows, nodes = self._candidates, self._nodes
         child = _integers(row.child for row in rows)
         return {
-            "features": _table([row.offer.features for row in rows], len(COLUMNS)),
-            "parent_features": _table([nodes[row.parent].features for row in rows], len(COLUMNS)),
+            "features": _table([row.features for row in rows], len(COLUMNS)),
+            "parent_features": _table([nodes[row.parent_number].features for row in rows], len(COLUMNS)),
             "stage": _integers(row.stage for row in rows),
-            "round": _integers(row.offer.round for row in rows),
-            "parent": _integers(row.parent for row in rows),
-            "normal": _table([row.offer.plane.normal for row in rows], 3),
-            "offset_mm": np.array([row.offer.plane.offset_mm for row in rows], dtype=np.float64),
+            "round": _integers(row.round for row in rows),
+            "parent": _integers(row.parent_number for row in rows),
+            "normal": _table([row.plane.normal for row in rows], 3),
+            "offset_mm": np.array([row.plane.offset_mm for row in rows], dtype=np.float64),
             "chosen": np.array([row.chosen for row in rows], dtype=np.bool_),
             "child": child,
             "outcome": np.where(child == NO_NODE, np.nan, outcomes[child]),
@@ -158,20 +153,19 @@ class Trace:
         """The arrays as the content of an .npz file; the same search gives the same bytes."""
         return npz(self.arrays())
 
-    def _candidate(self, offer: Offer) -> _Candidate:
-        parent = self._number[offer.parent]
-        key = (parent, offer.plane.normal.tobytes(), offer.plane.offset_mm)
-        if key not in self._known:
-            self._known[key] = _Candidate(self._stage, parent, offer)
-            self._candidates.append(self._known[key])
-        return self._known[key]
+    def _candidate(self, offer: Offer) -> Offer:
+        offer.stage, offer.parent_number = self._stage, self._number[offer.parent]
+        known = self._known.setdefault((offer.parent_number, offer.plane.normal.tobytes(), offer.plane.offset_mm), offer)
+        if known is offer:
+            self._candidates.append(offer)
+        return known
 
-    def _node(self, child: Child, candidate: _Candidate) -> int:
+    def _node(self, child: Child, candidate: Offer) -> int:
         """The number of a child, a new one unless it is a twin."""
         number = self._number.setdefault(child.signature, len(self._nodes))
         if number == len(self._nodes):
             cost = child.cost_mm2 / self.model.risky_mm2
-            self._nodes.append(_Node(cost, self._stage, candidate.parent, candidate.offer.features))
+            self._nodes.append(_Node(cost, self._stage, candidate.parent_number, candidate.features))
         return number
 
 

@@ -8,30 +8,33 @@ nearly equal; a learned ranker that chose for all of them won less.
 The cuts of these slots take all that lies above their planes. When cuts of single limbs compete with them for the slots, the
 result can be worse, so limbs have slots of their own (search_limbs). Those choose among few planes: limbs of the uncut model that
 save enough and that the head can print beside what stands, and the planes that rank first in the beam.
+
+search_as_published is the authors' own loop of 2020, for comparisons and for records on the paper's terms.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from heapq import merge
 from itertools import chain, islice
 from math import isqrt
+from operator import itemgetter
 
 import numpy as np
 
+from mdp.cost.cost import CutCost
 from mdp.kernels.threads import ahead
-from mdp.mesh import Floats
 from mdp.overhang import threshold
 from mdp.plane import Plane
-from mdp.ranking.candidate_table import CandidateTable, nearly_equal, relaxation_round
+from mdp.ranking.candidate_table import CandidateTable, nearly_equal
 from mdp.ranking.candidates import gain_mm2, lost_mm2, residual_mm2
-from mdp.ranking.ranker import Ranker
+from mdp.ranking.ranker import Network
 from mdp.ranking.ranking import LISTED, RankedCandidate, rank_by_trade_off, rank_classic, shortlist
 from mdp.ranking.record import Child, Trace, offer
 from mdp.search.front import Front
 from mdp.search.node import Node
 from mdp.search.problem import Problem
-from mdp.sweep.limbs import find_limbs
+from mdp.sweep.limbs import LimbSums, find_limbs
 
 # How many times the area made safe an area that is left for ever counts; None: the ranker's own. Many models, one greedy search
 # each: 4 is best on average, no value is best on most models.
@@ -44,6 +47,9 @@ MOST_PLANES = 16  # planes of the beam's ranking, by each trade-off, whose direc
 LIMB_TRADE_OFFS = (4.0, 1.0)  # a slot each
 PATIENCE = 2  # stages without a better node after which the search for limbs ends
 MOST_TRIED = 16  # limbs, and planes, that a slot tries at a node
+
+Pick = tuple[RankedCandidate, Node]  # a candidate that a slot of the beam took, and the node that it leads to
+Offered = tuple[float, Node, Plane, CutCost | None]  # a possible cut: its key, lower is better, and its cost where that is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +65,10 @@ class Branch:
         return self.coming.result()
 
 
-@dataclass(frozen=True, eq=False)
-class Pick:
-    """A candidate that a slot of the beam took, and the node it leads to."""
-
-    candidate: RankedCandidate
-    node: Node
-
-
 class Beam:
     """A beam of search.beam_width slots; bests holds the best node that each slot ever had."""
 
-    def __init__(self, problem: Problem, ranker: Ranker, trace: Trace | None) -> None:
+    def __init__(self, problem: Problem, ranker: Network | None, trace: Trace | None) -> None:
         self.problem, self.ranker, self.trace = problem, ranker, trace
         width = problem.settings.beam_width
         self.nodes: list[Node | None] = [problem.start] + [None] * (width - 1)
@@ -98,15 +96,14 @@ class Beam:
         for slot in range(len(self.nodes)):
             pick = self._pick([branch for branch in branches[: slot + 1] if branch is not None], slot)
             picks.append(pick)
-            self._branches.append(None if pick is None or self.problem.full(pick.node) else self._branch(pick.node, slot))
+            self._branches.append(None if pick is None or self.problem.full(pick[1]) else self._branch(pick[1], slot))
         if self.trace is not None:
             self._record(self.trace, [branch for branch in branches if branch is not None], picks)
-        self.nodes = [None if pick is None else pick.node for pick in picks]
+        self.nodes = [None if pick is None else pick[1] for pick in picks]
         for slot, node in enumerate(self.nodes):
             if node is not None:
                 self.front.offer(node)
-            if node is not None and node.cost_mm2 < self.bests[slot].cost_mm2:
-                self.bests[slot] = node
+                self.bests[slot] = min(self.bests[slot], node, key=lambda node: node.cost_mm2)
         for branch in branches:
             if branch is not None and branch.node is not self.problem.root:
                 branch.node.let_go()
@@ -118,15 +115,14 @@ class Beam:
                 branch.coming.cancel()
 
     def _branch(self, node: Node, slot: int) -> Branch:
-        learned = self.ranker.learned
-        large = TRADE_OFFS[slot % len(TRADE_OFFS)] is None and not learned
-        return Branch(node, ahead(self.problem.table, node, large, learned or self.trace is not None))
+        large = TRADE_OFFS[slot % len(TRADE_OFFS)] is None and self.ranker is None
+        return Branch(node, ahead(self.problem.table, node, large, self.ranker is not None or self.trace is not None))
 
     def finalists(self) -> list[Node]:
         """The nodes to polish: of the second slot and of every slot with a square number the best one that it or a lower one
         ever held and that is no finalist yet; of a single slot its best where a learned ranker saved the time."""
         if len(self.bests) == 1:
-            return [node for node in self.bests if node.cuts and self.ranker.learned]
+            return [node for node in self.bests if node.cuts and self.ranker is not None]
         finalists: list[Node] = []
         for count in range(2, len(self.bests) + 1):
             if count == 2 or isqrt(count) ** 2 == count:
@@ -145,7 +141,7 @@ class Beam:
             if child is not None and self._seen.get(child.signature, slot + 1) > slot:
                 self._seen[child.signature] = slot
                 taken.append(plane)
-                return Pick(candidate, child)
+                return candidate, child
         return None
 
     def _rank(self, branches: Sequence[Branch], slot: int) -> Iterator[RankedCandidate]:
@@ -156,10 +152,9 @@ class Beam:
         trade_off = TRADE_OFFS[slot % len(TRADE_OFFS)]
         if trade_off is not None:
             return rank_by_trade_off(tables, trade_off, bound_mm2)
-        if self.ranker.learned:  # what follows the shortlist is for the case that nothing on it can be cut
+        if self.ranker is not None:  # what follows the shortlist is for the case that nothing on it can be cut
             return chain(self.ranker.rank(shortlist(tables, bound_mm2), tables), rank_by_trade_off(tables, LISTED[0], bound_mm2))
-        classic = rank_classic(tables, self.problem.model.risky_mm2, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
-        return self.ranker.rank(classic, tables)
+        return rank_classic(tables, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
 
     def _child(self, branch: Branch, candidate: RankedCandidate) -> Node | None:
         key, row = (candidate.table, candidate.row), candidate.row
@@ -170,21 +165,17 @@ class Beam:
     def _record(self, trace: Trace, branches: Sequence[Branch], picks: Sequence[Pick | None]) -> None:
         """Put the stage on record: the first candidates of the classic ranking, and what the slots took."""
         tables = [branch.table for branch in branches]
-        risky_mm2 = self.problem.model.risky_mm2
         bound_mm2, preferred_mm3 = self.best.cost_mm2, self.problem.preferred_mm3
-        classic = rank_classic(tables, risky_mm2, bound_mm2, preferred_mm3=preferred_mm3) if tables else iter(())
+        classic = rank_classic(tables, bound_mm2, preferred_mm3=preferred_mm3) if tables else iter(())
         offered = list(islice(classic, max(RECORDED, 2 * len(self.nodes))))
         number_of = {(candidate.table, candidate.row): number for number, candidate in enumerate(offered)}
         children = []
-        for pick in picks:
-            if pick is None:
-                continue
-            table, row = pick.candidate.table, pick.candidate.row
+        for candidate, node in filter(None, picks):
+            table, row = candidate.table, candidate.row
             if (table, row) not in number_of:
                 number_of[table, row] = len(offered)
-                lost_mm2 = float(tables[table].scored.lost_mm2[row])
-                offered.append(RankedCandidate(table, row, relaxation_round(lost_mm2 / risky_mm2)))
-            children.append(Child(number_of[table, row], pick.node.signature, pick.node.cost_mm2))
+                offered.append(RankedCandidate(table, row, int(tables[table].rounds(np.array([row]))[0])))
+            children.append(Child(number_of[table, row], node.signature, node.cost_mm2))
         signatures = [branch.node.signature for branch in branches]
         trace.add([offer(signatures[ranked.table], tables[ranked.table], ranked) for ranked in offered], children)
 
@@ -203,13 +194,13 @@ def search_limbs(problem: Problem, first: Branch) -> list[Node]:
     limits, seen, found = problem.bounds_along(directions), set[tuple[float, ...]](), list[Node]()
     nodes, best = [problem.start], problem.start
     while nodes and not problem.full(nodes[0]) and not problem.late():
-        offers = [_Offers.of(problem, node, limbs, problem.table(node, limits=limits)) for node in nodes]
-        children = []
+        offers = [(node, problem.limb_sums(node, limbs), problem.table(node, limits=limits)) for node in nodes]
+        nodes = []
         for trade_off in LIMB_TRADE_OFFS:
-            ranked = merge(*(offer.rank(trade_off, best.cost_mm2) for offer in offers), key=lambda ranked: ranked.key)
-            child = next((child for each in ranked if (child := _cut(problem, each, seen)) is not None), None)
-            children += [] if child is None else [child]
-        nodes = children
+            cuts = (_rank_cuts(problem, limbs, offer, trade_off, best.cost_mm2) for offer in offers)
+            ranked = merge(*cuts, key=itemgetter(0))
+            child = next((child for offered in ranked if (child := _cut(problem, offered, seen)) is not None), None)
+            nodes += [] if child is None else [child]
         best = min((best, *nodes), key=lambda node: node.cost_mm2)
         found.append(best)
         if len(found) > PATIENCE and found[-1 - PATIENCE] is best:
@@ -217,67 +208,31 @@ def search_limbs(problem: Problem, first: Branch) -> list[Node]:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Ranked:
-    """A possible cut. key: lower is better; row: of the node's table, None for limbs."""
-
-    key: float
-    node: Node
-    plane: Plane
-    table: CandidateTable
-    row: int | None
-
-
-@dataclass(frozen=True, eq=False)
-class _Offers:
-    """What may be cut off a node: limbs, with (r,) gain, loss and cost for ever of each, and a table of planes."""
-
-    problem: Problem
-    node: Node
-    limbs: Sequence[Plane]
-    gain_mm2: Floats
-    lost_mm2: Floats
-    residual_mm2: Floats
-    table: CandidateTable
-
-    @classmethod
-    def of(cls, problem: Problem, node: Node, limbs: Sequence[Plane], table: CandidateTable) -> "_Offers":
-        sums = problem.limb_sums(node, limbs)
-        residual = residual_mm2(sums, problem.terms)
-        gain = np.where(sums.exists & ~sums.alone, gain_mm2(sums, residual), -np.inf)
-        return cls(problem, node, limbs, gain, lost_mm2(sums, residual), residual, table)
-
-    def rank(self, trade_off: float, bound_mm2: float) -> Iterator[_Ranked]:
-        """The cuts, best first, by trade_off times the loss less the gain, over all cuts so far. Cuts that would leave at least
-        bound_mm2 for ever are left out."""
-        node, scored = self.node, self.table.scored
-        before = trade_off * node.lost_mm2 - (self.problem.root.cost_mm2 - node.cost_mm2)
-        keys = before + trade_off * self.lost_mm2 - self.gain_mm2
-        good = (self.gain_mm2 >= self.problem.least_gain_mm2) & (node.residual_mm2 + self.residual_mm2 < bound_mm2)
-        order = [row for row in np.argsort(keys, kind="stable") if good[row]][:MOST_TRIED]
-        of_limbs = (_Ranked(float(keys[row]), node, self.limbs[row], self.table, None) for row in order)
-        rows = (ranked.row for ranked in islice(rank_by_trade_off([self.table], trade_off, bound_mm2), MOST_TRIED))
-        of_planes = (
-            _Ranked(
-                before + trade_off * float(scored.lost_mm2[row]) - float(scored.gain_mm2[row]),
-                node,
-                self.table.plane(row),
-                self.table,
-                row,
-            )
-            for row in rows
-        )
-        return merge(of_limbs, of_planes, key=lambda ranked: ranked.key)
+def _rank_cuts(
+    problem: Problem, limbs: Sequence[Plane], offer: tuple[Node, LimbSums, CandidateTable], trade_off: float, bound_mm2: float
+) -> Iterator[Offered]:
+    """What may be cut off a node, limbs or what lies above planes of its table: best first, by trade_off times the loss less the
+    gain, over all cuts so far. Cuts that would leave at least bound_mm2 for ever are left out."""
+    node, sums, table = offer
+    residual = residual_mm2(sums, problem.terms)
+    gain = np.where(sums.exists & ~sums.alone, gain_mm2(sums, residual), -np.inf)
+    before = trade_off * node.lost_mm2 - (problem.root.cost_mm2 - node.cost_mm2)
+    keys = before + trade_off * lost_mm2(sums, residual) - gain
+    good = (gain >= problem.least_gain_mm2) & (node.residual_mm2 + residual < bound_mm2)
+    order = [row for row in np.argsort(keys, kind="stable") if good[row]][:MOST_TRIED]
+    scored, ranked = table.scored, islice(rank_by_trade_off([table], trade_off, bound_mm2), MOST_TRIED)
+    of_limbs = ((float(keys[row]), node, limbs[row], None) for row in order)
+    of_planes = (
+        (before + trade_off * float(scored.lost_mm2[row]) - float(scored.gain_mm2[row]), node, table.plane(row), scored.cost(row))
+        for row in (candidate.row for candidate in ranked)
+    )
+    return merge(of_limbs, of_planes, key=itemgetter(0))
 
 
-def _cut(problem: Problem, ranked: _Ranked, seen: set[tuple[float, ...]]) -> Node | None:
+def _cut(problem: Problem, offered: Offered, seen: set[tuple[float, ...]]) -> Node | None:
     """The node after a cut; None where it cannot be made or its solid was seen before."""
-    if ranked.row is not None:
-        child = problem.cut(ranked.node, ranked.plane, ranked.table.scored.cost(ranked.row))
-    elif problem.allowed(ranked.node, ranked.plane):
-        child = problem.cut(ranked.node, ranked.plane)
-    else:
-        return None
+    _, node, plane, cost = offered
+    child = problem.cut(node, plane, cost) if plane.limbs_mm is None or problem.allowed(node, plane) else None
     if child is None or child.signature in seen:
         return None
     seen.add(child.signature)
@@ -304,3 +259,70 @@ def _find_limbs(problem: Problem) -> list[Plane]:
         if len(planes) == MOST_LIMBS or checked == MOST_CHECKED or problem.late():
             break
     return planes
+
+
+def search_as_published(
+    problem: Problem,
+    ranker: Network | None,
+    trace: Trace | None,
+    on_stage: Callable[[int, int, Node], None],
+) -> tuple[Node, int]:
+    """The best node of the authors' loop, and after how many stages.
+
+    It ends as soon as the beam's best does not rise, keeps twins, and stops looking at candidates once one of a good parent
+    is useless. A learned ranker chooses among the first 50 candidates; the plain best is followed beside its choice, so the beam
+    holds one node more where it was not chosen. on_stage is told of a stage, its beam and the best node.
+    """
+    best, beam, stage = problem.start, [problem.start], 0
+    while problem.continues(stage):
+        stage += 1
+        tables = [problem.table(node, described=trace is not None or ranker is not None) for node in beam]
+        chosen, children = _fill_as_published(problem, ranker, beam, tables)
+        if trace is not None:
+            _record_as_published(trace, beam, tables, chosen, children)
+        highest = min(children, key=lambda node: node.cost_mm2, default=best)
+        if highest.cost_mm2 >= best.cost_mm2:
+            break
+        best, beam = highest, children
+        on_stage(stage, len(beam), best)
+    return best, stage
+
+
+def _fill_as_published(
+    problem: Problem, ranker: Network | None, beam: Sequence[Node], tables: Sequence[CandidateTable]
+) -> tuple[list[RankedCandidate], list[Node]]:
+    """The candidates that fill the next beam, best first, and what they lead to; what cannot be cut is passed over."""
+    useless = max(table.saved_mm2 for table in tables) / problem.model.risky_mm2
+    classic = iter(rank_classic(tables, np.inf, useless))
+    plain = list(islice(classic, 1))
+    chosen: list[RankedCandidate] = []
+    children: list[Node] = []
+
+    def follow(candidate: RankedCandidate) -> None:
+        table, row = tables[candidate.table], candidate.row
+        child = problem.cut(beam[candidate.table], table.plane(row), table.scored.cost(row))
+        if child is not None:
+            chosen.append(candidate)
+            children.append(child)
+
+    offered = chain(plain, classic)
+    for candidate in offered if ranker is None else ranker.rank(offered, tables):
+        follow(candidate)
+        if len(children) == problem.settings.beam_width:
+            break
+    if ranker is not None and plain and plain[0] not in chosen:
+        follow(plain[0])
+    return chosen, children
+
+
+def _record_as_published(
+    trace: Trace,
+    beam: Sequence[Node],
+    tables: Sequence[CandidateTable],
+    chosen: Sequence[RankedCandidate],
+    children: Sequence[Node],
+) -> None:
+    """Put a stage on record: the candidates that filled the beam. Nodes of the last stage are not expanded, the loop ended."""
+    trace.begin_stage([node.signature for node in beam])
+    offers = [offer(beam[candidate.table].signature, tables[candidate.table], candidate) for candidate in chosen]
+    trace.add(offers, [Child(row, child.signature, child.cost_mm2) for row, child in enumerate(children)])

@@ -37,30 +37,26 @@ LIMB_SHIFT_MM = 0.5  # between the offsets that are tried for limbs, each with a
 MOST_SHOWN = 8  # colours in a message
 
 
-def check_model(plan: PlanFile, mesh: Mesh, name: str) -> None:
-    """Raise PlanError where a plan was made of another model."""
+def check_plan(plan: PlanFile, mesh: Mesh, name: str) -> None:
+    """Raise PlanError where a plan was made of another model, or means faces that the model has not: of a colour, or around a
+    point."""
     if plan.sha256 and plan.sha256 != mesh_sha256(mesh):
         raise PlanError(
             f"plan {plan.name} was made of another model: {plan.model or 'its model'} is not {name} as it is read now "
             "(the file has changed, or process.scale, process.rotate_deg or search.pedestal_mm; without the line sha256 the "
             "planes are tried all the same)"
         )
-
-
-def check_zones(plan: PlanFile, mesh: Mesh, name: str) -> None:
-    """Raise PlanError where a plan means faces that the model has not: of a colour, or around a point."""
     for kind in ZONE_KINDS:
         for number, zone in enumerate(getattr(plan.zones, kind), start=1):
             label = f"plan {plan.name}: {kind} {number}:"
             if isinstance(zone, Painted):
-                _check_colour(zone, mesh, name, label)
+                _check_colour(zone, mesh, name, f"{label} colour is {colour_text(zone.colour)}")
             elif isinstance(zone, Grown) and (away_mm := zone.away_mm(mesh)) > FARTHEST_MM:
                 point = ", ".join(f"{x:g}" for x in zone.point_mm)
                 raise PlanError(f"{label} point_mm is [{point}], {away_mm:.3g} mm from {name}: up to {FARTHEST_MM:g} is allowed")
 
 
 def _check_colour(zone: Painted, mesh: Mesh, name: str, label: str) -> None:
-    label = f"{label} colour is {colour_text(zone.colour)}"
     if mesh.colours is None:
         raise PlanError(f"{label}, but {name} paints no face: a 3MF, PLY, GLB or STEP file with colours is expected")
     used = [colour for colour in np.unique(mesh.colours).tolist() if colour != NO_COLOUR]
@@ -71,12 +67,13 @@ def _check_colour(zone: Painted, mesh: Mesh, name: str, label: str) -> None:
 
 def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
     """The node after the cuts of all planned parts, the last one in print order first. Raises PlanError."""
-    node = problem.root
+    node, least_mm = problem.root, FINEST * problem.settings.offset_step_mm
     for number in range(len(plan.parts) + 1, 1, -1):
         planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
-        _check_offset(problem, planned, label)
-        plane = planned.plane or _complete(problem, node, planned, label)
-        child = cut_or_refuse(problem, node, plane)
+        offset_mm = planned.offset_mm  # a grid of offsets through a plane next to the origin would have too many planes
+        if offset_mm is not None and 0.0 < abs(offset_mm) < least_mm:
+            raise PlanError(f"{label}: offset_mm is {offset_mm:g}: 0 or at least {least_mm:g} is allowed")
+        child = cut_or_refuse(problem, node, planned.plane or _complete(problem, node, planned, label))
         if isinstance(child, Refusal):
             raise PlanError(f"{label} cannot be cut off: {child.text}")
         node = child
@@ -143,45 +140,42 @@ def cut_near(problem: Problem, node: Node, plane: Plane) -> Node | None:
 
 def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
     """The planes around one that the sweep finds nothing against: shifted ones, the nearest first, then leaning ones."""
-    if plane.limbs_mm is not None:
-        yield from _beside_limbs(problem, node, plane)
+    if plane.limbs_mm is not None:  # one by one, and leaning about the section of the limbs
+        passed = passing_places(limb_mesh(node.remainder, plane), plane)
+        middle = passed.mean(axis=0) if len(passed) else plane.offset_mm * plane.normal
+        for lean_deg in LEANS_DEG:
+            for normal in _leaning(plane.normal, lean_deg):
+                for shift in sorted(range(-MOST_SHIFTS, MOST_SHIFTS + 1), key=abs):
+                    offset_mm = float(normal @ middle) + SHIFT_MM * shift
+                    yield from _if_free(problem, node, replace(plane, normal=normal, offset_mm=offset_mm))
         return
     vertices, passed = node.remainder.mesh.vertices, passing_places(node.remainder.mesh, plane)
     if len(passed) == 0:
         return
     middle = passed.mean(axis=0)
-    own = problem.settings.model_copy(update={"offset_step_mm": SHIFT_MM})
     shifts = np.arange(-MOST_SHIFTS, MOST_SHIFTS + 1)
     for lean_deg in LEANS_DEG:
         normals = _leaning(plane.normal, lean_deg)
         offsets = (np.rint(normals @ middle / SHIFT_MM)[:, None] + shifts) * SHIFT_MM
         heights = vertices @ normals.T
         row, column = np.nonzero((heights.min(axis=0) < offsets.T).T & (heights.max(axis=0) > offsets.T).T)
-        checked = check(node.remainder, _limits(problem, normals), own, row.astype(np.int32), offsets[row, column])
+        checked = check(node.remainder, _limits(problem, normals), SHIFT_MM, row.astype(np.int32), offsets[row, column])
         for place in np.argsort(np.abs(shifts[column]), kind="stable"):
             if checked.reason[place] == Reason.FEASIBLE:
                 yield Plane(normals[row[place]], float(offsets[row[place], column[place]]))
 
 
-def _beside_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The same for the plane of limbs: shifted ones, the nearest first, then those that lean about the section of the limbs."""
-    passed = passing_places(limb_mesh(node.remainder, plane), plane)
-    middle = passed.mean(axis=0) if len(passed) else plane.offset_mm * plane.normal
-    shifts = sorted(range(-MOST_SHIFTS, MOST_SHIFTS + 1), key=abs)
-    for lean_deg in LEANS_DEG:
-        for normal in _leaning(plane.normal, lean_deg):
-            for shift in shifts:
-                offset_mm = float(normal @ middle) + SHIFT_MM * shift
-                yield from _if_free(problem, node, replace(plane, normal=normal, offset_mm=offset_mm))
-
-
 def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
     """The planes that the sweep finds nothing against, over the whole height of what remains: first those of the same normal, the
     nearest first, then those that lean by a few degrees."""
-    if plane.limbs_mm is not None:
-        yield from _planes_near_limbs(problem, node, plane)
-        return
     vertices = node.remainder.mesh.vertices
+    if plane.limbs_mm is not None:  # along its normal only
+        heights = vertices @ plane.normal
+        low, high = float(heights.min()), float(heights.max())
+        offsets = np.arange(low, high, max(LIMB_SHIFT_MM, (high - low) / MOST_PLACES))
+        for offset_mm in offsets[np.argsort(np.abs(offsets - plane.offset_mm), kind="stable")]:
+            yield from _if_free(problem, node, replace(plane, offset_mm=float(offset_mm)))
+        return
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # a plane that leans, leans about it
     for lean_deg in FARTHER_LEANS_DEG:
@@ -189,21 +183,11 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
             heights = vertices @ normal
             low, high = float(heights.min()), float(heights.max())
             step_mm = max(SHIFT_MM, (high - low) / MOST_PLACES)
-            offsets: Floats = np.arange(floor(low / step_mm) + 1, ceil(high / step_mm)) * np.float64(step_mm)
-            own = problem.settings.model_copy(update={"offset_step_mm": step_mm})
-            reason = check(node.remainder, _limits(problem, normal[None]), own, np.zeros(len(offsets), np.int32), offsets).reason
-            free = offsets[reason == Reason.FEASIBLE]
+            offsets = np.arange(floor(low / step_mm) + 1, ceil(high / step_mm)) * np.float64(step_mm)
+            limits, row = _limits(problem, normal[None]), np.zeros(len(offsets), np.int32)
+            free = offsets[check(node.remainder, limits, step_mm, row, offsets).reason == Reason.FEASIBLE]
             for offset_mm in free[np.argsort(np.abs(free - normal @ middle), kind="stable")]:
                 yield Plane(normal, float(offset_mm))
-
-
-def _planes_near_limbs(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The same for the plane of limbs, but along its normal only."""
-    heights = node.remainder.mesh.vertices @ plane.normal
-    low, high = float(heights.min()), float(heights.max())
-    offsets = np.arange(low, high, max(LIMB_SHIFT_MM, (high - low) / MOST_PLACES))
-    for offset_mm in offsets[np.argsort(np.abs(offsets - plane.offset_mm), kind="stable")]:
-        yield from _if_free(problem, node, replace(plane, offset_mm=float(offset_mm)))
 
 
 def _if_free(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
@@ -234,19 +218,17 @@ def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
 
 
 def _unfit(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
-    """Why a plane cannot cut a node, what stands beside limbs left aside."""
+    """Why a plane cannot cut a node, what stands beside limbs left aside: what the sweep finds, or no pose serves the part."""
     why = _refusal(problem, node, plane)
     if why is not None or not problem.settings.clearance:
         return why
-    hindrance = _find_hindrance(problem, node, plane)
-    return None if hindrance is None else Refusal(hindrance, Reason.REACH)
-
-
-def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:
-    """A grid of offsets through a plane next to the origin would have too many planes."""
-    least_mm = FINEST * problem.settings.offset_step_mm
-    if planned.offset_mm is not None and 0.0 < abs(planned.offset_mm) < least_mm:
-        raise PlanError(f"{label}: offset_mm is {planned.offset_mm:g}: 0 or at least {least_mm:g} is allowed")
+    points, machine = problem.corners_cut(node, plane) + problem.place_mm, problem.machine
+    if len(points) == 0:
+        return Refusal("nothing lies above its plane", Reason.REACH)
+    obstacles = [find_obstacle(machine, pose, points) for pose in poses(machine, plane.normal)]
+    if any(obstacle is None for obstacle in obstacles):
+        return None
+    return Refusal("; the other way round ".join(obstacle for obstacle in obstacles if obstacle) or OUT_OF_REACH, Reason.REACH)
 
 
 def _limits(problem: Problem, directions: Floats) -> Bounds:
@@ -255,22 +237,40 @@ def _limits(problem: Problem, directions: Floats) -> Bounds:
 
 
 def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
-    """Why a person's plane may not cut a node; None: the sweep finds nothing against it."""
+    """Why a person's plane may not cut a node, in a sentence with its numbers; None: the sweep finds nothing against it."""
     missed = _miss(problem, node, plane)
     if missed is not None:
         return Refusal(missed)
-    limits = _limits(problem, plane.normal[None])
+    limits, settings, fragile_mm = _limits(problem, plane.normal[None]), problem.settings, np.inf
     if plane.limbs_mm is None:
         checked = problem.check_plane(node, plane, limits)
         reason, fragile_mm = Reason(int(checked.reason[0])), float(checked.fragile_mm[0])
     else:
         reason = problem.check_limbs(node, plane, limits)
-        fragile_mm = problem.sliver_mm(node, plane) if reason == Reason.FRAGILE else np.inf
-    if reason == Reason.WEAK:
-        stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
-        return Refusal(f"{REASONS[reason]}: {problem.settings.nozzle_load_n:g} N at its top are {stress}", reason)
-    text = _explain(problem, plane, limits, reason, fragile_mm)
-    return None if text is None else Refusal(text, reason)
+    if reason == Reason.FEASIBLE:
+        return None
+    text = REASONS[reason]
+    match reason:
+        case Reason.PLATFORM:
+            least_mm = limits.least_offset_mm[0]
+            text += f": along its normal offset_mm must be at least {least_mm:.2f}, it is {plane.offset_mm:.6g}"
+        case Reason.REACH:
+            text += f" of its normal on {problem.machine.name}"
+        case Reason.CLEARANCE:
+            needed, body, _ = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
+            text = f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
+        case Reason.INTERFACE:
+            text = "a piece of it would hang in the air: it stands on nothing that is printed before"
+        case Reason.FRAGILE:
+            fragile_mm = fragile_mm if plane.limbs_mm is None else problem.sliver_mm(node, plane)
+            sliver = f"its plane would leave a sliver {fragile_mm:.2g} mm thin"
+            text = f"{sliver}: {limits.fragile_mm:g} is the least (search.fragile_mm)"
+        case Reason.KEEP:
+            text = f"its plane would pass through zone {problem.zones.crossed(plane)} of [[keep]], which stays whole"
+        case Reason.WEAK:
+            stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
+            text += f": {settings.nozzle_load_n:g} N at its top are {stress}"
+    return Refusal(text, reason)
 
 
 def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
@@ -286,40 +286,6 @@ def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
         f"its plane misses the model: along its normal the model lies between {whole.min():.2f} and {whole.max():.2f} mm, "
         f"offset_mm is {plane.offset_mm:.6g}"
     )
-
-
-def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fragile_mm: float) -> str | None:
-    """A reason as a sentence with its numbers; None for a feasible plane."""
-    match reason:
-        case Reason.FEASIBLE:
-            return None
-        case Reason.PLATFORM:
-            least_mm = limits.least_offset_mm[0]
-            return f"{REASONS[reason]}: along its normal offset_mm must be at least {least_mm:.2f}, it is {plane.offset_mm:.6g}"
-        case Reason.REACH:
-            return f"{REASONS[reason]} of its normal on {problem.machine.name}"
-        case Reason.CLEARANCE:
-            needed, body, _ = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
-            return f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
-        case Reason.INTERFACE:
-            return "a piece of it would hang in the air: it stands on nothing that is printed before"
-        case Reason.FRAGILE:
-            least_mm = max(problem.settings.fragile_mm, COPLANAR_MM)
-            return f"its plane would leave a sliver {fragile_mm:.2g} mm thin: {least_mm:g} is the least (search.fragile_mm)"
-        case Reason.KEEP:
-            return f"its plane would pass through zone {problem.zones.crossed(plane)} of [[keep]], which stays whole"
-    return REASONS[reason]
-
-
-def _find_hindrance(problem: Problem, node: Node, plane: Plane) -> str | None:
-    """Why no pose serves a part that the sweep found nothing against; None: one does."""
-    points, machine = problem.corners_cut(node, plane) + problem.place_mm, problem.machine
-    if len(points) == 0:
-        return "nothing lies above its plane"
-    obstacles = [find_obstacle(machine, pose, points) for pose in poses(machine, plane.normal)]
-    if any(obstacle is None for obstacle in obstacles):
-        return None
-    return "; the other way round ".join(obstacle for obstacle in obstacles if obstacle) or OUT_OF_REACH
 
 
 def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) -> Plane:
@@ -338,8 +304,7 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
     if len(direction) == 0:
         raise PlanError(f"{label}: no {missing} can be found for it, every such plane misses what is left of the model")
     offset_mm, gains_mm2 = swept.offsets_mm(step_mm)[wanted], gain_mm2(swept, residual_mm2(swept, problem.terms))[wanted]
-    own = problem.settings.model_copy(update={"offset_step_mm": step_mm})
-    reason = check(node.remainder, limits, own, direction.astype(np.int32), offset_mm).reason
+    reason = check(node.remainder, limits, step_mm, direction.astype(np.int32), offset_mm).reason
     for row in np.lexsort((offset_mm, -directions[direction, 2], -np.round(gains_mm2 / EQUAL_MM2))):
         if reason[row] == Reason.FEASIBLE:
             offset = float(offset_mm[row]) if planned.offset_mm is None else planned.offset_mm

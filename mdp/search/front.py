@@ -42,13 +42,11 @@ class Front:
 
     def offer(self, node: Node) -> None:
         """Take note of a node and of all that led to it from the start."""
-        step: Node | None = node
-        while step is not None and len(step.cuts) >= self._start:
+        for step in node.path[self._start :]:
             held = self._alike.setdefault(len(step.cuts), [])
             if step not in held:
                 most_mm2 = min(alternative.cost_mm2 for alternative in (step, *held)) * (1.0 + self._equal)
                 held[:] = [alternative for alternative in (*held, step) if alternative.cost_mm2 <= most_mm2]
-            step = step.parent
 
     def replace(self, node: Node, alternative: Node) -> None:
         """Put another node, alike in cost, in the place of one."""
@@ -72,29 +70,25 @@ class Front:
 
 def front_row(node: Node) -> FrontRow:
     """A node with what it costs, the cuts apart. Every area counts once in the area that needs support."""
-    terms, seams = node.terms, node.seams
-    scars_mm2 = sum(cut.cost.seam_mm2 for cut in node.cuts)
-    seam_mm = sum((seam.length_mm for seam in seams), 0.0)
-    planes = tuple(cut.base for cut in node.cuts)
-    over_mm2 = 0.0 if terms.need is None else _excess_mm2(node) + (node.remainder.risky_mm2 - _plain_mm2(node))
+    scars_mm2, over_mm2 = sum(cut.cost.seam_mm2 for cut in node.cuts), 0.0
+    seam_mm = sum((seam.length_mm for seam in node.seams), 0.0)
+    if node.terms.need is not None:
+        plain_mm2 = float(node.remainder.mesh.areas_mm2[node.remainder.risky].sum())
+        over_mm2 = _excess_mm2(node) + (node.remainder.risky_mm2 - plain_mm2)
     stairs_mm2 = node.stairs_mm2 + sum(cut.cost.stairs_mm2 for cut in node.cuts)
-    return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2 - stairs_mm2, seam_mm, node.cost_mm2, stairs_mm2=stairs_mm2)
+    return FrontRow(
+        tuple(node.planes), node.cost_mm2 - scars_mm2 - over_mm2 - stairs_mm2, seam_mm, node.cost_mm2, stairs_mm2=stairs_mm2
+    )
 
 
 def _excess_mm2(node: Node) -> float:
     """By how much what needs support on the parts cut off counts more than its area."""
-    if node.parent is None:
-        return 0.0
-    before = node.parent.remainder
-    base = node.cuts[-1].base
-    cut = np.ones(len(before.mesh.faces), np.bool_) if base.limbs_mm is None else limb_faces(before, base)
-    here_mm2 = 0.0 if before.pieces is None else excess_mm2(before.mesh, before.pieces, base, cut)
-    return here_mm2 + _excess_mm2(node.parent)
-
-
-def _plain_mm2(node: Node) -> float:
-    """The area of what remains that needs support."""
-    return float(node.remainder.mesh.areas_mm2[node.remainder.risky].sum())
+    total_mm2 = 0.0
+    for whole, base in zip(node.path, node.planes, strict=False):
+        before = whole.remainder
+        cut = np.ones(len(before.mesh.faces), np.bool_) if base.limbs_mm is None else limb_faces(before, base)
+        total_mm2 += 0.0 if before.pieces is None else excess_mm2(before.mesh, before.pieces, base, cut)
+    return total_mm2
 
 
 def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:

@@ -40,6 +40,16 @@ class Node:
     places: SeamPlaces
     parent: "Node | None" = None
 
+    @property
+    def path(self) -> "list[Node]":
+        """The nodes from the whole model to this one: the k-th of them has k cuts."""
+        return [self] if self.parent is None else [*self.parent.path, self]
+
+    @property
+    def planes(self) -> list[Plane]:
+        """The planes of the cuts in the order in which they are made."""
+        return [cut.base for cut in self.cuts]
+
     @cached_property
     def piece(self) -> Piece:
         """The remaining solid, and which faces of the model its own are."""

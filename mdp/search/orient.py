@@ -28,11 +28,10 @@ from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Mesh
 from mdp.overhang import UP
-from mdp.search.coarse import as_it_is, coarse_copy
 from mdp.search.front import EQUAL, Price, Pricing, Worth, charge_mm2, front_row, price_row
 from mdp.search.parts import one_piece
-from mdp.search.problem import Problem
-from mdp.search.search import decompose
+from mdp.search.problem import Problem, with_search
+from mdp.search.search import as_it_is, coarse_copy, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 
@@ -166,7 +165,7 @@ def _most_promising(
     forecasts: Sequence[OrientationForecast], profile: Profile, standing_mm2: float
 ) -> OrientationForecast | None:
     """The cheapest one after a narrow search; None where none comes near the cost of the model as it stands."""
-    quick, chosen = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
+    quick, chosen = with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
     more_mm2, least_mm2 = _scar_mm2(Worth.of(profile)) - 1.0, inf
     able = [forecast for forecast in forecasts if forecast.bare_mm2 < PROMISING * standing_mm2]
     for forecast in able[:SEARCHED]:
@@ -184,7 +183,7 @@ def _whole(
     forecast = min(forecasts, key=lambda forecast: forecast.whole_mm2, default=None)
     if forecast is None or forecast.whole_mm2 > HOPELESS * standing_mm2:
         return None
-    problem = Problem(forecast.mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
+    problem = Problem(forecast.mesh, with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
     row = price_row(front_row(problem.root), (one_piece(forecast.mesh, profile.machine),), pricing(profile))
     total = total_mm2(row, Worth.of(profile)) + forecast.footing_mm2
     return forecast if row.time_s is not None and total < standing_mm2 else None
@@ -206,7 +205,7 @@ def _with_footing(
     mesh: Mesh, profile: Profile, for_person: bool = False, most: int = RANKED
 ) -> list[tuple[Orientation, Footing]]:
     """The model as it stands, then up to `most` of those orientations, each with its footing."""
-    angle_deg, guess_mm2 = profile.process.self_supporting_angle_deg, _guess(profile)
+    angle_deg = profile.process.self_supporting_angle_deg
     upright, *others = *facet_orientations(mesh, angle_deg), *straight_orientations(mesh, angle_deg)
     worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
     plate = Plate.under(mesh, profile)
@@ -216,13 +215,13 @@ def _with_footing(
     on_face = keep and standing.on_face
     others = _along_axis(mesh, others, keep)
     able = _that_may_hold(others, plate, on_face)
-    ranked = _cheapest_first(able, plate, guess_mm2)
+    ranked = _cheapest_first(able, plate, profile)
     firm = (one for one in ranked if one[1].held() and not (on_face and one[1].on_tip))
     first = next(firm, None)
     if first is not None:
         ranked = chain([first], firm)
     elif not held:
-        ranked = _cheapest_first(others, plate, guess_mm2)
+        ranked = _cheapest_first(others, plate, profile)
     known = [upright] if held else []  # else nothing is too near to it
     distinct: list[tuple[Orientation, Footing]] = []
     for orientation, footing in ranked:
@@ -247,14 +246,13 @@ def _that_may_hold(orientations: list[Orientation], plate: Plate, on_face: bool)
     return [orientations[k] for k in np.flatnonzero(able)]
 
 
-def _cheapest_first(
-    orientations: Sequence[Orientation], plate: Plate, guess_mm2: Callable[[Orientation], float]
-) -> Iterator[tuple[Orientation, Footing]]:
+def _cheapest_first(orientations: Sequence[Orientation], plate: Plate, profile: Profile) -> Iterator[tuple[Orientation, Footing]]:
     """Orientations by the sum of their guessed cost and their footing's, equal sums in the order given.
 
     A footing takes a hundred times as long as a guess and never lowers the sum, so it is measured only when the guess comes up.
     """
-    surface_mm2, guesses_mm2 = float(plate.mesh.areas_mm2.sum()), [guess_mm2(orientation) for orientation in orientations]
+    surface_mm2 = float(plate.mesh.areas_mm2.sum())
+    guesses_mm2 = [_guess_mm2(orientation, profile) for orientation in orientations]
     measured: list[tuple[float, int, Footing]] = []
     for k in sorted(range(len(orientations)), key=lambda k: guesses_mm2[k]):
         while measured and measured[0][0] < round(guesses_mm2[k], 6):
@@ -290,15 +288,12 @@ def total_mm2(row: FrontRow | None, worth: Worth) -> float:
     return inf if price_mm2 is None else row.cost_mm2 + price_mm2
 
 
-def _guess(profile: Profile) -> Callable[[Orientation], float]:
-    """What orientations cost in one piece, roughly and but for what is the same in all of them, mm2."""
-    second_mm2, layer_mm, stair_mm2 = Worth.of(profile).second_mm2, profile.process.layer_height_mm, weight_of_stairs(profile)
-
-    def cost_mm2(orientation: Orientation) -> float:
-        seconds = SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * ceil(orientation.height_mm / layer_mm)
-        return orientation.risky_mm2 + stair_mm2 * orientation.stairs_mm2 + second_mm2 * seconds
-
-    return cost_mm2
+def _guess_mm2(orientation: Orientation, profile: Profile) -> float:
+    """What an orientation costs in one piece, roughly and but for what is the same in all of them."""
+    layers = ceil(orientation.height_mm / profile.process.layer_height_mm)
+    seconds = SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * layers
+    stairs_mm2 = weight_of_stairs(profile) * orientation.stairs_mm2
+    return orientation.risky_mm2 + stairs_mm2 + Worth.of(profile).second_mm2 * seconds
 
 
 def _price_bare(mesh: Mesh, profile: Profile, pricing: PricingBy) -> Price | None:
@@ -306,7 +301,3 @@ def _price_bare(mesh: Mesh, profile: Profile, pricing: PricingBy) -> Price | Non
     printed so."""
     bare = profile.model_copy(update={"process": profile.process.model_copy(update={"support": "none"})})
     return pricing(bare)((one_piece(mesh, profile.machine),))
-
-
-def _with_search(profile: Profile, **settings: object) -> Profile:
-    return profile.model_copy(update={"search": profile.search.model_copy(update=settings)})

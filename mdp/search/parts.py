@@ -4,38 +4,35 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from mdp.clearance import allowed_poses
-from mdp.cost.cost import CostTerms
 from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.mesh import Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
-from mdp.plane import PLATFORM, Plane
+from mdp.plane import PLATFORM
 from mdp.pose import Pose, least_rotation, level, poses, rotation
 from mdp.search.node import Node
 from mdp.search.problem import Problem
-from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
 from mdp.sweep.rims import NO_RIM
+from mdp.zone import NOWHERE, ZonesOnModel
 from profiles.machine import Machine
 
 MOST_FEATHERED = 0.1  # share of a seam; a person is told of more
 MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 
-def one_piece(mesh: Mesh, machine: Machine) -> Part:
-    """A model as it stands, uncut; what needs support of it is not looked at."""
+def one_piece(mesh: Mesh, machine: Machine, zones: ZonesOnModel = NOWHERE) -> Part:
+    """A model as it stands, uncut, with its zones; what needs support of it is not looked at."""
     pose = level(machine)
-    return Part(1, mesh, PLATFORM, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
+    whole = Part(1, mesh, PLATFORM, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
+    return replace(whole, no_seam=zones.no_seam, no_support=zones.no_support, support=zones.support, modifiers=zones.modifiers)
 
 
 def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     """Parts in print order: what remains first, then the cuts, last one first."""
     machine, clearance = problem.machine, problem.settings.clearance
-    bases = [PLATFORM, *(cut.base for cut in reversed(node.cuts))]
+    bases = [PLATFORM, *reversed(node.planes)]
     pieces = [node.piece, *(node.places.surface.piece(cut.solid) for cut in reversed(node.cuts))]
-
-    ancestors = [node]  # for each part the node that it was cut off, the first one's is the last
-    while ancestors[-1].parent is not None:
-        ancestors.append(ancestors[-1].parent)
+    before = node.path[::-1]  # for each part but the first the node that it was cut off
 
     def allowed(position: int, near_turn_deg: float | None = None) -> list[Pose]:
         base, mesh = bases[position], pieces[position].mesh
@@ -44,7 +41,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
         reached = allowed_poses(machine, base.normal, mesh.vertices + problem.place_mm, near_turn_deg)
         if base.limbs_mm is None:
             return reached
-        return list(problem.clear_poses(ancestors[position], base, reached))
+        return list(problem.clear_poses(before[position], base, reached))
 
     def fits(position: int, pose: Pose) -> bool:
         return not clearance or pose in allowed(position, pose.turn_deg)
@@ -52,23 +49,27 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     options = [[level(machine)], *(allowed(position) for position in range(1, len(bases)))]
     chosen = least_rotation(machine, options, fits)
     seams = (NO_RIM, *reversed(node.seams))
-    zones, need, parts = node.places.zones, node.terms.need, []
+    zones, terms, parts = node.places.zones, node.terms, []
     for position, (base, piece, pose) in enumerate(zip(bases, pieces, chosen, strict=True)):
-        needs = None if need is None else need.pieces(piece)
-        risky = _needing(piece.mesh, base, needs, node.terms) if position else node.remainder.risky
+        mesh, needs = piece.mesh, None if terms.need is None else terms.need.pieces(piece)
+        risky = risky_above(mesh, base, terms.angle_deg) if position else node.remainder.risky
+        upright: Mask | None = None
+        if needs is not None:
+            risky = risky & (needs.along(base.normal) != CARRIES_ITSELF) if position else risky
+            upright = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces) & needs.upright & (needs.sources >= 0)
         parts.append(
             Part(
                 index=position + 1,
-                mesh=piece.mesh,
+                mesh=mesh,
                 base=base,
                 pose=pose,
                 rotation=rotation(machine, pose),
-                volume_mm3=piece.mesh.volume_mm3,
-                risky_area_mm2=float(piece.mesh.areas_mm2[risky].sum()),
+                volume_mm3=mesh.volume_mm3,
+                risky_area_mm2=float(mesh.areas_mm2[risky].sum()),
                 seam_mm=seams[position].length_mm,
                 feather_share=seams[position].feather_share,
                 needing=None if needs is None else risky,
-                needing_upright=None if needs is None else _needing_upright(piece.mesh, needs, node.terms),
+                needing_upright=upright,  # those of cuts are not the model's
                 no_seam=zones.no_seam.among(piece.sources),
                 no_support=zones.no_support.among(piece.sources),
                 modifiers=zones.modifiers,
@@ -76,31 +77,6 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
             )
         )
     return tuple(parts)
-
-
-def _needing(mesh: Mesh, base: Plane, needs: ModelPieces | None, terms: CostTerms) -> Mask:
-    """(m,) faces of a part that need support."""
-    risky = risky_above(mesh, base, terms.angle_deg)
-    if needs is None:
-        return risky
-    needing: Mask = risky & (needs.along(base.normal) != CARRIES_ITSELF)
-    return needing
-
-
-def _needing_upright(mesh: Mesh, needs: ModelPieces, terms: CostTerms) -> Mask:
-    """(m,) faces of a part that would need it if the model were printed straight up; those of cuts are not the model's."""
-    risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
-    needing: Mask = risky & needs.upright & (needs.sources >= 0)
-    return needing
-
-
-@dataclass(frozen=True, eq=False)
-class Taken:
-    """The parts that are taken, and the front with their row marked; note: what is given up for their time."""
-
-    parts: tuple[Part, ...]
-    front: tuple[FrontRow, ...]
-    note: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -115,16 +91,9 @@ class Outcome:
     notes: tuple[str, ...]
 
 
-def made_of(problem: Problem, taken: Taken, outcome: Outcome) -> Decomposition:
-    """The decomposition that was taken."""
-    mesh, parts, zones = problem.mesh, taken.parts, problem.zones
-    whole = replace(
-        one_piece(mesh, problem.machine),
-        no_seam=zones.no_seam,
-        no_support=zones.no_support,
-        support=zones.support,
-        modifiers=zones.modifiers,
-    )
+def decomposition_of(problem: Problem, parts: tuple[Part, ...], front: Sequence[FrontRow], outcome: Outcome) -> Decomposition:
+    """The decomposition into some parts; front: its rows, that of the parts marked."""
+    mesh, root = problem.mesh, problem.root.remainder
     folded = folded_mm3(mesh, parts)
     return Decomposition(
         name=outcome.name,
@@ -132,21 +101,21 @@ def made_of(problem: Problem, taken: Taken, outcome: Outcome) -> Decomposition:
         parts=parts,
         beam_width=problem.settings.beam_width,
         ranker=outcome.ranker,
-        risky_area_mm2=float(problem.root.remainder.mesh.areas_mm2[problem.root.remainder.risky].sum()),
+        risky_area_mm2=float(root.mesh.areas_mm2[root.risky].sum()),
         residual_area_mm2=sum(part.risky_area_mm2 for part in parts),
         candidates_evaluated=outcome.evaluated,
         rounds=outcome.rounds,
         search_s=outcome.search_s,
-        notes=(*_folded_note(folded), *_feather_notes(parts), *outcome.notes, *taken.note),
+        notes=(*_notes_of_parts(folded, parts), *outcome.notes),
         folded_mm3=folded,
-        front=taken.front,
-        uncut=(whole,),
+        front=tuple(front),
+        uncut=(one_piece(mesh, problem.machine, problem.zones),),
     )
 
 
 def notes_of_search(decomposition: Decomposition) -> tuple[str, ...]:
     """The notes of a decomposition that do not tell of its own parts."""
-    own = (*_folded_note(decomposition.folded_mm3), *_feather_notes(decomposition.parts))
+    own = _notes_of_parts(decomposition.folded_mm3, decomposition.parts)
     return tuple(note for note in decomposition.notes if note not in own)
 
 
@@ -160,15 +129,15 @@ def folded_mm3(mesh: Mesh, parts: Sequence[Part]) -> float:
     return difference if VOLUME_TOLERANCE * mesh.volume_mm3 < difference <= MOST_FOLDED * mesh.volume_mm3 else 0.0
 
 
-def _folded_note(folded: float) -> tuple[str, ...]:
-    text = f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
-    return (text,) if folded > 0 else ()
-
-
-def _feather_notes(parts: Sequence[Part]) -> tuple[str, ...]:
-    """Parts that end in thin edges along much of their seam."""
-    return tuple(
-        f"part {part.index}: {part.feather_share:.0%} of its seam is a feather edge, base and surface meet at less than 20 deg"
-        for part in parts
-        if part.feather_share > MOST_FEATHERED
-    )
+def _notes_of_parts(folded: float, parts: Sequence[Part]) -> list[str]:
+    """That the surface passes through itself, and the parts that end in thin edges along much of their seam."""
+    notes = []
+    if folded > 0:
+        notes.append(
+            f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
+        )
+    for part in parts:
+        if part.feather_share > MOST_FEATHERED:
+            share = f"{part.feather_share:.0%} of its seam is a feather edge"
+            notes.append(f"part {part.index}: {share}, base and surface meet at less than 20 deg")
+    return notes

@@ -5,7 +5,7 @@ plane may still be cut, and where that made room further cuts are added. What co
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from math import cos, radians, sin
@@ -37,43 +37,13 @@ NECK_REACH = 0.06  # of the model's diameter: how far from a plane necks are sou
 TRADE_OFF = 4.0  # of further cuts, as the beam's second slot
 
 
-@dataclass(frozen=True, eq=False)
-class Chain:
-    """A sequence of cuts: the nodes from the uncut model to the last one."""
-
-    nodes: list[Node]
-
-    @classmethod
-    def to(cls, node: Node) -> "Chain":
-        """The sequence that leads to a node."""
-        nodes = [node]
-        while nodes[-1].parent is not None:
-            nodes.append(nodes[-1].parent)
-        return cls(nodes[::-1])
-
-    @property
-    def planes(self) -> list[Plane]:
-        """The planes of the cuts in the order in which they are made."""
-        return [cut.base for cut in self.nodes[-1].cuts]
-
-    @property
-    def cost_mm2(self) -> float:
-        """What the parts cost."""
-        return self.nodes[-1].cost_mm2
-
-
 def polish(problem: Problem, node: Node) -> Node:
     """The node with its cuts polished and, where there is room, further ones."""
-    best = _move_planes(problem, _drop_cuts(problem, Chain.to(node)))
+    best = settle(problem, _drop_cuts(problem, node))
     longer = _add_cuts(problem, best)
-    if len(longer.nodes) > len(best.nodes):
-        longer = _move_planes(problem, _drop_cuts(problem, longer))
-    return min((node, best.nodes[-1], longer.nodes[-1]), key=lambda last: (last.cost_mm2, len(last.cuts)))
-
-
-def settle(problem: Problem, node: Node) -> Node:
-    """The node with every plane moved to where the cost is less, nothing else changed."""
-    return _move_planes(problem, Chain.to(node)).nodes[-1]
+    if longer is not best:
+        longer = settle(problem, _drop_cuts(problem, longer))
+    return min((node, best, longer), key=lambda last: (last.cost_mm2, len(last.cuts)))
 
 
 def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Node:
@@ -81,23 +51,23 @@ def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Nod
     flats, and more symmetric about its mirror planes; planes that lean a little across a mirror stand upright on it, and of two
     that are nearly each other's image one becomes it."""
     most_mm2 = node.cost_mm2 * (1.0 + EQUAL)
-    best = Chain.to(node)
+    best = node
     of_mirrors = [partial(change, mirror=mirror) for change, mirror in product((_stand_upright, _pair), mirrors)]
     along = [partial(_align, problem)] if problem.terms.stair_weight > 0.0 else []
     for change in (partial(_at_neck, problem), *along, *of_mirrors):
         for position in range(len(problem.start.cuts), len(best.planes)):
             for planes in change(best, position):
-                changed = None if problem.late() else _recut(problem, best, position, planes)
+                changed = None if problem.late() else problem.replay(best.path[position], planes)
                 if changed is not None and changed.cost_mm2 <= most_mm2:
                     best = changed
                     break
-    return best.nodes[-1]
+    return best
 
 
-def _at_neck(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane]]:
+def _at_neck(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]:
     """The planes from a position on, the first of them moved to the neck near it."""
-    here, *later = chain.planes[position:]
-    node, face = chain.nodes[position], _cut_face(chain.nodes[position + 1])
+    here, *later = last.planes[position:]
+    node, face = last.path[position], _cut_face(last.path[position + 1])
     mesh, seen = node.remainder.mesh, node.seam_weights
     reach_mm = NECK_REACH * diameter_mm(problem.mesh)
     if here.limbs_mm is not None:  # rims of other limbs do not count
@@ -108,26 +78,26 @@ def _at_neck(problem: Problem, chain: Chain, position: int) -> Iterator[list[Pla
         yield [replace(neck, limbs_mm=here.limbs_mm), *later]
 
 
-def _align(problem: Problem, chain: Chain, position: int) -> Iterator[list[Plane]]:
+def _align(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]:
     """The planes from a position on, the first of them turned to where its part shows fewer stairs on large flats."""
-    here, *later = chain.planes[position:]
-    middle = _cut_face(chain.nodes[position + 1]).mean(axis=0)
+    here, *later = last.planes[position:]
+    middle = _cut_face(last.path[position + 1]).mean(axis=0)
     for normal in problem.flats.beside(here.normal, problem.least_z):
         yield [replace(here, normal=normal, offset_mm=float(normal @ middle)), *later]
 
 
-def _stand_upright(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
+def _stand_upright(last: Node, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
     """The planes from a position on, the first of them upright on a mirror where it nearly is."""
-    here, *later = chain.planes[position:]
-    upright = mirror.upright(here, _cut_face(chain.nodes[position + 1]).mean(axis=0))
+    here, *later = last.planes[position:]
+    upright = mirror.upright(here, _cut_face(last.path[position + 1]).mean(axis=0))
     if upright is not None:
         yield [upright, *later]
 
 
-def _pair(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
+def _pair(last: Node, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
     """The planes from a position on, one that is nearly the first one's image made its image, or the other way round."""
-    here, *later = chain.planes[position:]
-    vertices = chain.nodes[position].remainder.mesh.vertices
+    here, *later = last.planes[position:]
+    vertices = last.path[position].remainder.mesh.vertices
     image = _image(mirror, here, vertices)
     for number, partner in enumerate(later):
         if float(partner.normal @ image.normal) > PARTNER_COSINE and abs(partner.offset_mm - image.offset_mm) < PARTNER_MM:
@@ -147,14 +117,14 @@ def _image(mirror: Mirror, plane: Plane, vertices: Floats) -> Plane:
     return replace(image, limbs_mm=above[nearest])
 
 
-def _drop_cuts(problem: Problem, best: Chain) -> Chain:
-    """The chain without the cuts that save nothing, the one made first tried first."""
+def _drop_cuts(problem: Problem, best: Node) -> Node:
+    """The node without the cuts that save nothing, the one made first tried first."""
     position = len(problem.start.cuts)
     while position < len(best.planes) and not problem.late():
-        surface, planes = _surface(best.nodes[position]), best.planes[position:]
-        shorter = None
+        before, planes = best.path[position], best.planes[position:]
+        surface, shorter = _surface(before), None
         if surface.left_mm2(planes[1:]) <= surface.left_mm2(planes) + SAME_MM2:
-            shorter = _recut(problem, best, position, planes[1:])
+            shorter = problem.replay(before, planes[1:])
         if shorter is not None and shorter.cost_mm2 <= best.cost_mm2 + SAME_MM2:
             best = shorter
         else:
@@ -162,64 +132,55 @@ def _drop_cuts(problem: Problem, best: Chain) -> Chain:
     return best
 
 
-def _move_planes(problem: Problem, best: Chain) -> Chain:
-    """The chain with every plane moved to where the cost is less, the one cut first moved first."""
+def settle(problem: Problem, best: Node) -> Node:
+    """The node with every plane moved to where the cost is less, the one cut first moved first; nothing else is changed."""
     enough_mm2 = ENOUGH * problem.model.risky_mm2
     for position in range(len(problem.start.cuts), len(best.planes)):
         if problem.late():
             break
-        node = best.nodes[position]
-        surface = _surface(node)
+        before = best.path[position]
+        surface = _surface(before)
         ever_better = list(_climb(problem, surface, best, position))
         for planes in ever_better[: -TRIES - 1 : -1]:
-            if problem.late() or node.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
+            if problem.late() or before.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
                 break
-            moved = _recut(problem, best, position, planes)
+            moved = problem.replay(before, planes)
             if moved is not None and moved.cost_mm2 < best.cost_mm2:
                 best = moved
                 break
     return best
 
 
-def _add_cuts(problem: Problem, chain: Chain) -> Chain:
-    """The chain with further cuts, the best one at a time, while they save something."""
-    nodes = list(chain.nodes)
-    while not problem.full(nodes[-1]) and not problem.late():
-        node, table = nodes[-1], problem.table(nodes[-1])
-        cuts = (
-            problem.cut(node, table.plane(candidate.row), table.scored.cost(candidate.row))
-            for candidate in rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
-        )
+def _add_cuts(problem: Problem, node: Node) -> Node:
+    """The node after further cuts, the best one at a time, while they save something."""
+    while not problem.full(node) and not problem.late():
+        table = problem.table(node)
+        ranked = rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
+        cuts = (problem.cut(node, table.plane(found.row), table.scored.cost(found.row)) for found in ranked)
         child = next((child for child in cuts if child is not None), None)
         if child is None or child.cost_mm2 >= node.cost_mm2:
             break
-        nodes.append(child)
-    return Chain(nodes)
-
-
-def _recut(problem: Problem, chain: Chain, position: int, planes: Sequence[Plane]) -> Chain | None:
-    """The chain with other planes from a position on; None when they cannot be cut."""
-    rest = problem.replay(chain.nodes[position], planes)
-    return None if rest is None else Chain([*chain.nodes[:position], *rest])
+        node = child
+    return node
 
 
 def _surface(node: Node) -> Surface:
     return Surface.of(node.remainder, node.terms)
 
 
-def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> Iterator[list[Plane]]:
+def _climb(problem: Problem, surface: Surface, last: Node, position: int) -> Iterator[list[Plane]]:
     """Ever better planes from a position on, the first of them moved, the best ones last. surface: before the cut there."""
-    here, *later = chain.planes[position:]
+    here, *later = last.planes[position:]
     classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own
     reach = surface.reach([here, *later])
     least_mm2 = surface.left_mm2([here, *later], classes, reach)
-    pivots = _pivots(_cut_face(chain.nodes[position + 1]))
+    pivots = _pivots(_cut_face(last.path[position + 1]))
     for share, turn_deg in STEPS:
         for _ in range(ROUNDS):
             before_mm2 = least_mm2
             for plane in _neighbours(problem, here, pivots, share, turn_deg):
                 left_mm2 = surface.left_mm2([plane, *later], classes, reach)
-                if left_mm2 < least_mm2 - SAME_MM2 and problem.allowed(chain.nodes[position], plane):
+                if left_mm2 < least_mm2 - SAME_MM2 and problem.allowed(last.path[position], plane):
                     here, least_mm2 = plane, left_mm2
                     yield [here, *later]
             if least_mm2 == before_mm2 or problem.late():

@@ -14,13 +14,12 @@ from mdp.cut import Solid, below, corners_above, cut, mesh_of, solid_of
 from mdp.directions.flats import Flats
 from mdp.directions.frame import frame_across
 from mdp.directions.orientation import diameter_mm
-from mdp.mesh import Floats, Ints, Mesh
+from mdp.mesh import Floats, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
 from mdp.pose import Pose
 from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import (
-    COPLANAR_MM,
     Bounds,
     Feasibility,
     Reason,
@@ -39,7 +38,6 @@ from mdp.search.front import Worth
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
-from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.cylinders import spoiled_by_cuts
 from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.limbs import LimbGrid, LimbSums, limb_faces, limb_mesh, limb_vertices, sum_limbs
@@ -61,7 +59,8 @@ class Problem:
     """
 
     def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
-        self.settings = settings = profile.search.effective
+        self.profile, self.settings = profile, profile.search.effective
+        settings = self.settings
         self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
         self.place_mm = np.array([*profile.process.place_mm, 0.0])
         self.mesh, self.zones = mesh, zones.on(mesh)
@@ -80,13 +79,9 @@ class Problem:
             feature_mm2=settings.feature_mm2,
             need=need,
         )
+        cylinders = spoiled_by_cuts(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else ()
         places = SeamPlaces.of(
-            surface,
-            solid,
-            settings.hidden_seam_share,
-            self.zones,
-            cylinders=spoiled_by_cuts(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else (),
-            feature_weight=settings.feature_weight,
+            surface, solid, settings.hidden_seam_share, self.zones, cylinders=cylinders, feature_weight=settings.feature_weight
         )
         self.root = self.start = Node(solid, (), self.terms, places)
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
@@ -94,7 +89,10 @@ class Problem:
         self.platform_disc = platform_disc(mesh, settings)
         self.worth = Worth.of(profile)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
-        savable_mm2 = self._savable_mm2()
+        # Gains are shares of the risky area without the faces on the platform, which no cut can save, but as published with them.
+        published, risky = settings.method == "published", self.root.remainder.risky
+        counted = risky if published else risky & ~standing(self.root.remainder.mesh)
+        savable_mm2 = float(self.root.remainder.mesh.areas_mm2[counted].sum())
         self.least_gain_mm2 = settings.least_gain * savable_mm2
         self.bearable_mpa = profile.material.cold_weld_mpa / settings.strength_safety
         self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
@@ -145,12 +143,10 @@ class Problem:
         limit = self.settings.time_limit_s
         return self._stopped or (limit is not None and perf_counter() - self._began >= limit)
 
-    def _savable_mm2(self) -> float:
-        """The risky area that a gain is a share of: without the faces on the platform, which no cut can save, but as published
-        with them."""
-        mesh, risky = self.root.remainder.mesh, self.root.remainder.risky
-        counted = risky if self.settings.method == "published" else risky & ~standing(mesh)
-        return float(mesh.areas_mm2[counted].sum())
+    def continues(self, stage: int) -> bool:
+        """Whether there is a stage after a number of them."""
+        cuts = len(self.start.cuts) + stage
+        return self.model.risky_mm2 > 0 and cuts < self.settings.most_parts - 1 and not self.late()
 
     def full(self, node: Node) -> bool:
         """Whether a node has as many parts as are allowed."""
@@ -162,82 +158,60 @@ class Problem:
         limits = self.limits if limits is None else limits
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
         hopeless = self._hopeless(node) if described else None
-        remainder, step_mm = node.remainder, self.settings.offset_step_mm
-        scored = score_candidates(remainder, limits, self.terms, step_mm=step_mm, least_gain_mm2=least_mm2, hopeless=hopeless)
+        remainder = node.remainder
+        scored = score_candidates(remainder, limits, self.terms, least_mm2, hopeless)
         self._evaluated.append(scored.evaluated)
         if node is self.root and limits is self.limits:
             self._root_scored = scored
-
-        def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
-            return check(remainder, limits, self.settings, direction, offset_mm)
-
-        hopeless_mm2 = 0.0 if hopeless is None else float(remainder.facets.counted_mm2[hopeless].sum())
-        situation = self._situation(node, hopeless_mm2)
-        return CandidateTable(
-            scored,
-            limits,
-            situation,
-            check=check_planes,
-            least_gain_mm2=self.least_gain_mm2,
-            is_weak=partial(self.is_weak, node),
+        situation = Situation(
+            model=self.model,
+            saved_mm2=self.root.cost_mm2 - node.cost_mm2,
+            residual_mm2=node.residual_mm2,
+            lost_mm2=node.lost_mm2,
+            risky_mm2=node.risky_mm2,
+            hopeless_mm2=0.0 if hopeless is None else float(remainder.facets.counted_mm2[hopeless].sum()),
+            volume_mm3=float(node.solid.volume()),
+            cuts=len(node.cuts),
+            last=node.planes[-1].normal if node.cuts else UP,
         )
+        return CandidateTable(scored, situation, self.least_gain_mm2, partial(self.is_weak, node))
 
     def _hopeless(self, node: Node) -> Mask:
         """(m,) the faces of what remains that no cut can save, in the order of its facets."""
         least_mm = np.where(np.isfinite(self.limits.least_height_mm), self.limits.least_offset_mm, np.inf)
         return hopeless_faces(node.remainder.facets, Savers(self.limits.directions, least_mm, threshold(self.terms.angle_deg)))
 
-    def _situation(self, node: Node, hopeless_mm2: float) -> Situation:
-        return Situation(
-            model=self.model,
-            saved_mm2=self.root.cost_mm2 - node.cost_mm2,
-            residual_mm2=node.residual_mm2,
-            lost_mm2=node.lost_mm2,
-            risky_mm2=node.risky_mm2,
-            hopeless_mm2=hopeless_mm2,
-            volume_mm3=float(node.solid.volume()),
-            cuts=len(node.cuts),
-            last=node.cuts[-1].base.normal if node.cuts else UP,
-        )
-
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
         scored, is_weak = self._root_scored or self.table(self.root).scored, partial(self.is_weak, self.root)
-        return refusals(scored, self.limits, self.settings, least_gain_mm2=self.least_gain_mm2, is_weak=is_weak)
+        return refusals(scored, self.least_gain_mm2, is_weak)
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""
-        if plane.limbs_mm is not None:
-            return self.check_limbs(node, plane, self.bounds_along(plane.normal[None])) == Reason.FEASIBLE
-        if 0.0 < abs(plane.offset_mm) < FINEST * self.settings.offset_step_mm:
+        if plane.limbs_mm is None and 0.0 < abs(plane.offset_mm) < FINEST * self.settings.offset_step_mm:
             return False
-        return bool(self.check_plane(node, plane, self.bounds_along(plane.normal[None])).reason[0] == Reason.FEASIBLE)
+        limits = self.bounds_along(plane.normal[None])
+        if plane.limbs_mm is not None:
+            return self.check_limbs(node, plane, limits) == Reason.FEASIBLE
+        return bool(self.check_plane(node, plane, limits).reason[0] == Reason.FEASIBLE)
 
     def bounds_along(self, directions: Floats) -> Bounds:
         """The bounds of (k, 3) directions."""
-        return bounds_of(
-            directions,
-            disc=self.platform_disc,
-            volume_mm3=self.model.volume_mm3,
-            machine=self.machine,
-            search=self.settings,
-            keep=self.zones.keep,
-        )
+        return bounds_of(directions, self.mesh, self.profile, self.platform_disc, self.zones.keep)
 
     def limb_grid(self, limits: Bounds, least_gain_mm2: float) -> LimbGrid:
         """Where the search looks for limbs: along the directions of some bounds, with the least gain that a limb must bring."""
-        step_mm = self.settings.offset_step_mm
         return LimbGrid(
             directions=limits.directions,
-            step_mm=step_mm,
+            step_mm=limits.step_mm,
             least_height_mm=limits.least_height_mm,
             keep_mm=limits.keep_mm,
             seam_mm=self.terms.seam_mm,
             cut_mm2=self.terms.cut_mm2,
             least_gain_mm2=max(self.least_gain_mm2, least_gain_mm2),
             least_volume_mm3=limits.least_volume_mm3,
-            least_interface_mm2=max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2),
-            crumb=limits.crumb_mm / step_mm,
+            least_interface_mm2=limits.contact_area_mm2,
+            crumb=limits.crumb_mm / limits.step_mm,
         )
 
     def limb_sums(self, node: Node, planes: Sequence[Plane]) -> LimbSums:
@@ -248,8 +222,7 @@ class Problem:
         """Why the limbs of a plane cannot be cut off a node; limits: those of its direction. Whether the rest would float, and
         whether the head passes clear, is not checked here."""
         sums, offset_mm, keep_mm = self.limb_sums(node, [plane]), plane.offset_mm, limits.keep_mm[0]
-        least_mm2 = max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2)
-        if not sums.exists[0] or sums.contact_mm2[0] < least_mm2:
+        if not sums.exists[0] or sums.contact_mm2[0] < limits.contact_area_mm2:
             return Reason.INTERFACE
         if not np.isfinite(limits.least_height_mm[0]):
             return Reason.REACH
@@ -259,7 +232,7 @@ class Problem:
             return Reason.VOLUME
         if ((keep_mm[:, 0] < offset_mm) & (offset_mm < keep_mm[:, 1])).any():
             return Reason.KEEP
-        if self.sliver_mm(node, plane) < max(self.settings.fragile_mm, COPLANAR_MM):
+        if self.sliver_mm(node, plane) < limits.fragile_mm:
             return Reason.FRAGILE
         if self.is_weak(node, plane):
             return Reason.WEAK
@@ -277,8 +250,8 @@ class Problem:
 
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
         """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
-        own = self.settings.model_copy(update={"offset_step_mm": self.step_mm(plane.offset_mm)})
-        checked = check(node.remainder, limits, own, np.zeros(1, np.int32), np.array([plane.offset_mm]))
+        step_mm = self.step_mm(plane.offset_mm)
+        checked = check(node.remainder, limits, step_mm, np.zeros(1, np.int32), np.array([plane.offset_mm]))
         if checked.reason[0] == Reason.FEASIBLE and self.is_weak(node, plane):
             checked.reason[0] = Reason.WEAK
         return checked
@@ -357,16 +330,14 @@ class Problem:
         step_mm, size_mm = self.settings.offset_step_mm, abs(offset_mm)
         return size_mm / max(1, round(size_mm / step_mm)) or step_mm
 
-    def replay(self, node: Node, planes: Sequence[Plane]) -> list[Node] | None:
-        """The nodes after cutting with the planes in turn, the given one first; None when one of them may not or cannot be
-        cut."""
-        nodes = [node]
+    def replay(self, node: Node, planes: Sequence[Plane]) -> Node | None:
+        """The node after cutting with the planes in turn; None when one of them may not or cannot be cut."""
         for plane in planes:
-            child = self.cut(nodes[-1], plane) if self.allowed(nodes[-1], plane) else None
+            child = self.cut(node, plane) if self.allowed(node, plane) else None
             if child is None:
                 return None
-            nodes.append(child)
-        return nodes
+            node = child
+        return node
 
 
 def _floats(rest: Solid, plane: Plane) -> bool:
@@ -378,6 +349,11 @@ def _floats(rest: Solid, plane: Plane) -> bool:
             if abs(lowest_mm) > BASE_TOLERANCE_MM:
                 return True
     return False
+
+
+def with_search(profile: Profile, **settings: object) -> Profile:
+    """The profile with other settings of the search."""
+    return profile.model_copy(update={"search": profile.search.model_copy(update=settings)})
 
 
 def without_limits(machine: Machine) -> Machine:

@@ -1,49 +1,52 @@
-"""Search: from a mesh to its ordered parts, by a beam of cuts that is polished or as published in 2020.
+"""Search: from a mesh to its ordered parts, by a beam of cuts that is polished, as published in 2020, or as a plan says.
 
 Otherwise than published: the best node ever seen is the result, the search goes on while any node has a useful child, a
 candidate that can no longer beat it is dropped (what a cut leaves risky above its plane is never repaired later, so that sum
 bounds all descendants), two orders of the same cuts take one slot, the slots of the beam differ in what they look for
 (beam), and the best results are polished off the grid of candidates (polish).
+
+A finely meshed model is searched on a copy with fewer faces, and only the planes that are chosen cut it itself. Whatever the
+search weighs is many layers wide, and the copy's surface lies within a layer of the model's or, where many faces are left, within
+one and a half, nearly all of it within half of one. What the parts need, weigh and take is worked out on the model itself; the
+rows of the front that are not taken stay those of the copy.
 """
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from time import perf_counter
-from typing import Any
 
 from mdp.cost.symmetry import find_mirrors
-from mdp.decomposition import Decomposition, FrontRow
+from mdp.cut import simplify
+from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.joint import is_sound
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.plans.plan_file import PlanFile
+from mdp.plans.plan_file import NO_PLAN, PlanFile, planned_row
 from mdp.ranking.candidates import REASONS
-from mdp.ranking.ranker import Ranker, ranker_named
+from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.ranking.record import Trace
-from mdp.search.beam import Beam, search_limbs
-from mdp.search.by_hand import check_model, check_zones, cut_by_hand
-from mdp.search.coarse import as_it_is, coarse_copy, cut_as_copy
-from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
+from mdp.search.beam import Beam, search_as_published, search_limbs
+from mdp.search.by_hand import check_plan, cut_by_hand, cut_near
+from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
 from mdp.search.node import Node
-from mdp.search.parts import Outcome, Taken, made_of, make_parts
+from mdp.search.parts import Outcome, decomposition_of, make_parts, notes_of_search
 from mdp.search.polish import make_regular, polish, settle
-from mdp.search.problem import Problem
-from mdp.search.published import search_as_published
+from mdp.search.problem import Problem, with_search
+from mdp.sweep.deviation import distances_mm
 from mdp.sweep.limbs import cylinders_cut
+from mdp.zone import Volume, Zones
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
 NEARLY_BEST = 1.02  # times the beam's best that cuts of single limbs may cost to be polished
-WITHOUT_SEAMS = {
-    "hidden_seam_share": 1.0,
-    "feature_mm2": 0.0,
-    "feature_weight": 1.0,
-    "simplify_faces": 0,
-}  # what tells cuts apart
+WORTH = 0.7  # share of the faces above which a copy saves too little
+# How far simplifying may go, and how far the copy's surface may lie from the model's then, in layers: one face after another
+# moves the surface by more than the tolerance. The first goes for copies that keep half as many faces as a model may have.
+COARSEST, *FINER = (0.5, 1.5), (0.25, 1.0), (0.125, 1.0), (0.0625, 1.0)
 
 
 @dataclass(frozen=True)
@@ -56,148 +59,143 @@ class Progress:
     measure: Callable[[], FrontRow]
 
 
-def decompose(
-    mesh: Mesh,
-    name: str,
-    profile: Profile,
-    *,
-    ranker: str = "classic",
-    on_stage: Callable[[Progress], None] | None = None,
-    on_phase: Callable[[str], None] | None = None,
-    on_record: Callable[[bytes], None] | None = None,
-    by_hand: PlanFile | None = None,
-    parts: int | None = None,
-    price: Pricing | None = None,
-) -> Decomposition:
+@dataclass(frozen=True)
+class SearchRequest:
+    """What is asked for beside the profile. plan: planes that are cut first and stay, and zones; parts: the most parts, instead
+    of as many as pay; price: what parts take to print, for the rows of the front and the choice between them: without it nothing
+    is searched for one part. on_phase is told in words what is done while no stage is; on_record is given what the search looked
+    at and what became of it, as the content of an .npz file."""
+
+    plan: PlanFile = NO_PLAN
+    parts: int | None = None
+    ranker: str = CLASSIC
+    price: Pricing | None = None
+    on_stage: Callable[[Progress], None] = lambda progress: None
+    on_phase: Callable[[str], None] = lambda text: None
+    on_record: Callable[[bytes], None] | None = None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the model stays in one part and nobody looks at the front."""
+        return self.parts == 1 and self.price is None and self.on_record is None
+
+
+ANY_PARTS = SearchRequest()
+
+
+def decompose(mesh: Mesh, name: str, profile: Profile, request: SearchRequest = ANY_PARTS) -> Decomposition:
     """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible.
 
-    on_phase is told in words what is done while no stage is; on_record is given what the search looked at and what became of it,
-    as the content of an .npz file. by_hand: planes that are cut first and stay, and zones; parts: the most parts, instead of as
-    many as pay; price: what parts take to print, for the rows of the front and the choice between them: without it nothing is
-    searched for one part. Raises PlanError for a plane by hand that cannot be cut.
+    Raises PlanError for a plane by hand that cannot be cut.
     """
-    began = perf_counter()
+    began, plan, parts = perf_counter(), request.plan, request.parts
     if parts is not None:
         check_part_count(parts)
-        most = max(parts, profile.search.most_parts)
-        profile = profile.model_copy(update={"search": profile.search.model_copy(update={"most_parts": most})})
-    uncut = parts == 1 and price is None and on_record is None  # nobody looks at the front
-    if uncut:
-        profile = profile.model_copy(update={"search": profile.search.model_copy(update=WITHOUT_SEAMS)})
-    given, mesh = mesh, on_pedestal(mesh, profile.search.pedestal_mm)
-    planned = PlanFile("") if by_hand is None else by_hand
-    check_model(planned, mesh, name)
-    check_zones(planned, mesh, name)
-    tell = on_phase or (lambda text: None)
-    measure = cache(partial(_measure, mesh, profile, planned, tell))
-    if planned.parts or profile.search.time_limit_s is not None:  # refused at once, or on time; else a copy is searched before
-        measure()
-    if parts is not None and parts <= len(planned.parts):
-        raise PlanError(f"--parts {parts}: the planes by hand of {planned.name} alone make {len(planned.parts) + 1} parts")
-    copy = None if on_record is not None else _copy_to_search(given, profile, planned, tell)
+        profile = with_search(profile, most_parts=max(parts, profile.search.most_parts))
+    if request.is_whole:  # what tells cuts apart need not be measured
+        profile = with_search(profile, hidden_seam_share=1.0, feature_mm2=0.0, feature_weight=1.0, simplify_faces=0)
+    lifted, problem = on_pedestal(mesh, profile.search.pedestal_mm), None
+    check_plan(plan, lifted, name)
+    if plan.parts or profile.search.time_limit_s is not None:  # refused at once, or on time; else a copy is searched before
+        problem = _measure(lifted, profile, request)
+    if parts is not None and parts <= len(plan.parts):
+        raise PlanError(f"--parts {parts}: the planes by hand of {plan.name} alone make {len(plan.parts) + 1} parts")
+    copy = None
+    if request.on_record is None:
+        if 0 < profile.search.effective.simplify_faces < len(mesh.faces):
+            request.on_phase(f"looking for a copy of {len(mesh.faces):,} faces with fewer of them")
+        copy = coarse_copy(mesh, profile, plan.zones)
     if copy is not None:
-        asked: dict[str, Any] = {"ranker": ranker, "on_stage": on_stage, "on_phase": on_phase, "parts": parts, "price": price}
         with suppress(PlanError):  # of a plane by hand that cuts the mesh and not its copy
-            found = decompose(copy, name, as_it_is(profile), by_hand=replace(planned, sha256=""), **asked)
-            fine = cut_as_copy(measure(), found, price)
+            copy_began, own = perf_counter(), as_it_is(profile)
+            on_copy = _measure(on_pedestal(copy, profile.search.pedestal_mm), own, request)
+            found = _search(on_copy, name, request, copy_began)
+            problem = problem or _measure(lifted, profile, request)
+            fine = _cut_as_copy(problem, found, request.price)
             if fine is not None:
                 return fine
-    problem = measure()
-    trace = None if on_record is None else Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
-    report = on_stage or (lambda progress: None)
-    if uncut:
-        best, front, rounds = problem.root, Front(problem.root), 0
-    elif profile.search.method == "published":
-        _begin(problem, report)
-        continues = partial(_continues, problem)
-        best, rounds = search_as_published(problem, ranker_named(ranker), continues, trace, partial(_report, problem, report))
-        front = Front(problem.start)
-        front.offer(best)
-    else:
-        best, front, rounds = _search_beam(problem, ranker_named(ranker), trace, report)
-    if on_record is not None and trace is not None:
-        on_record(trace.to_bytes())
-    taken = _take(problem, front, best, parts, price, profile)
-    notes = (*_notes(problem, taken, parts), *_zone_notes(problem), *_front_note(planned))
-    return made_of(problem, taken, Outcome(name, ranker, rounds, problem.evaluated, perf_counter() - began, notes))
+    return _search(problem or _measure(lifted, profile, request), name, request, began)
 
 
-def _measure(mesh: Mesh, profile: Profile, planned: PlanFile, tell: Callable[[str], None]) -> Problem:
+def _measure(mesh: Mesh, profile: Profile, request: SearchRequest) -> Problem:
     """The problem of a mesh, cut by a person's planes. Raises PlanError."""
-    tell(f"measuring overhangs and seams of {len(mesh.faces):,} faces")
-    problem = Problem(mesh, profile, planned.zones)
-    problem.start = cut_by_hand(problem, planned)
+    request.on_phase(f"measuring overhangs and seams of {len(mesh.faces):,} faces")
+    problem = Problem(mesh, profile, request.plan.zones)
+    problem.start = cut_by_hand(problem, request.plan)
     return problem
 
 
-def _copy_to_search(mesh: Mesh, profile: Profile, planned: PlanFile, tell: Callable[[str], None]) -> Mesh | None:
-    """See `coarse_copy`."""
-    if 0 < profile.search.effective.simplify_faces < len(mesh.faces):
-        tell(f"looking for a copy of {len(mesh.faces):,} faces with fewer of them")
-    return coarse_copy(mesh, profile, planned.zones)
+def _search(problem: Problem, name: str, request: SearchRequest, began: float) -> Decomposition:
+    """The parts of a problem's mesh. began: when the search did, by perf_counter."""
+    best, front, rounds, trace = problem.start, Front(problem.start), 0, None
+    if request.on_record is not None:
+        trace = Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
+    if problem.settings.method == "published" and not request.is_whole:
+        _begin(problem, request)
+        report = partial(_report, problem, request)
+        best, rounds = search_as_published(problem, ranker_named(request.ranker), trace, report)
+        front.offer(best)
+    elif problem.model.risky_mm2 > 0 and not request.is_whole:
+        best, front, rounds = _search_beam(problem, request, trace)
+    if request.on_record is not None and trace is not None:
+        request.on_record(trace.to_bytes())
+    parts, rows, notes = _take(problem, front, best, request)
+    notes = (*_notes(problem, len(parts), len(rows), request), *notes)
+    outcome = Outcome(name, request.ranker, rounds, problem.evaluated, perf_counter() - began, notes)
+    return decomposition_of(problem, parts, rows, outcome)
 
 
-def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None, profile: Profile) -> Taken:
-    """The decomposition of a front to take: of at most the wanted number of parts, else the cheapest one, with its time
-    where seconds cost anything; best: the one to take where seams cost nothing. Rows that are not sound get no time, so they are
-    taken only where a person asks for them."""
-    nodes, parts_of = front.nodes, cache(partial(make_parts, problem))
+def _take(
+    problem: Problem, front: Front, best: Node, request: SearchRequest
+) -> tuple[tuple[Part, ...], list[FrontRow], tuple[str, ...]]:
+    """The parts of a front to take, the front's rows with theirs marked, and notes on the choice: of at most the wanted number of
+    parts, else the cheapest one, with its time where seconds cost anything; best: the one to take where seams cost nothing. Rows
+    that are not sound get no time, so they are taken only where a person asks for them."""
+    nodes, price, paying = front.nodes, request.price, dict[int, tuple[Part, ...]]()
     rows = [front_row(node) for node in nodes]
     if price is not None:
-        paying = {place: parts_of(nodes[place]) for place, good in enumerate(pays(rows)) if good}
+        paying = {place: make_parts(problem, nodes[place]) for place, good in enumerate(pays(rows)) if good}
         by_hand = len(problem.start.cuts)
-        sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, profile, by_hand)}
+        sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, problem.profile, by_hand)}
         rows = [replace(row, sound=place in sound or place not in paying) for place, row in enumerate(rows)]
         rows = price_rows(rows, sound, price)
     choice = choose(rows, problem.worth, problem.settings.least_saving)
-    if wanted is not None:
-        choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
+    if request.parts is not None:
+        choice = Choice(nodes.index(front.up_to(request.parts)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
         place = next(place for place, node in enumerate(nodes) if len(node.cuts) == len(best.cuts))  # it, or its equal in cost
         choice = Choice(place, "the least risky area")
     node, row = nodes[choice.place], rows[choice.place]
+    parts = paying.get(choice.place) or make_parts(problem, node)
     if price is not None and row.time_s is None:
-        row = price_row(row, parts_of(node), price)
+        row = price_row(row, parts, price)
     rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
-    return Taken(parts_of(node), tuple(rows), (*_feature_notes(node), *choice.note))
+    return parts, rows, (*_feature_notes(node), *choice.note)
 
 
-def check_part_count(parts: int) -> None:
-    """Raise PlanError for a number of parts that cannot be."""
-    if not 1 <= parts <= MOST_PARTS:
-        raise PlanError(f"--parts is {parts}: 1 to {MOST_PARTS} is allowed")
-
-
-def _feature_notes(node: Node) -> tuple[str, ...]:
-    """The bores that the cuts of parts pass askew."""
-    notes, step = [], node
-    while step.parent is not None:
-        plane, before = step.cuts[-1].base, step.parent.remainder
+def _feature_notes(node: Node) -> list[str]:
+    """The bores that the cuts of parts pass askew, those of the part printed second first."""
+    notes = []
+    for number, (whole, plane) in enumerate(reversed(list(zip(node.path, node.planes, strict=False))), start=2):
+        before = whole.remainder
         crossed = [cylinder for cylinder in cylinders_cut(before, before.cylinders, plane) if cylinder.is_crossed(plane)]
         if crossed:
             names = ", ".join(dict.fromkeys(cylinder.in_words for cylinder in crossed))
-            notes.append(f"part {len(node.cuts) - len(step.cuts) + 2}: it is cut askew through {names}")
-        step = step.parent
-    return tuple(notes)
+            notes.append(f"part {number}: it is cut askew through {names}")
+    return notes
 
 
-def _search_beam(
-    problem: Problem, ranker: Ranker, trace: Trace | None, report: Callable[[Progress], None]
-) -> tuple[Node, Front, int]:
+def _search_beam(problem: Problem, request: SearchRequest, trace: Trace | None) -> tuple[Node, Front, int]:
     """The best node of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
-    if problem.model.risky_mm2 <= 0:
-        return problem.start, Front(problem.start), 0
-    beam = Beam(problem, ranker, trace)
-    stage = 0
+    beam, stage = Beam(problem, ranker_named(request.ranker), trace), 0
     try:
-        _begin(problem, report)
-        while any(beam.nodes) and _continues(problem, stage):
+        _begin(problem, request)
+        while any(beam.nodes) and problem.continues(stage):
             stage += 1
             beam.advance()
-            held = sum(node is not None for node in beam.nodes)
-            _report(problem, report, stage, held, beam.best)
+            _report(problem, request, stage, sum(node is not None for node in beam.nodes), beam.best)
         limbs = search_limbs(problem, beam.first) if problem.settings.single_limb else []
-        best = _polish_finalists(problem, beam, limbs, partial(_report, problem, report, stage, 1))
+        best = _polish_finalists(problem, beam, limbs, partial(_report, problem, request, stage, 1))
         if problem.settings.polish and problem.terms.seam_mm > 0.0:
             _polish_rows(problem, beam.front)
         return best, beam.front, stage
@@ -242,51 +240,153 @@ def _paying(problem: Problem, front: Front) -> list[Node]:
     return [node for node, good in zip(nodes, pays(nodes), strict=True) if good and len(node.cuts) > len(problem.start.cuts)]
 
 
-def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:
+def _begin(problem: Problem, request: SearchRequest) -> None:
     """Tell that a search begins, where there is anything to search; its time limit counts from then on."""
-    if _continues(problem, 0):
-        report(Progress(0, 1, 1.0, partial(front_row, problem.start)))
+    if problem.continues(0):
+        request.on_stage(Progress(0, 1, 1.0, partial(front_row, problem.start)))
         problem.begin()
 
 
-def _report(problem: Problem, report: Callable[[Progress], None], stage: int, held: int, best: Node) -> None:
-    report(Progress(stage, held, best.cost_mm2 / problem.root.cost_mm2, partial(front_row, best)))
+def _report(problem: Problem, request: SearchRequest, stage: int, beam: int, best: Node) -> None:
+    request.on_stage(Progress(stage, beam, best.cost_mm2 / problem.root.cost_mm2, partial(front_row, best)))
 
 
-def _continues(problem: Problem, stage: int) -> bool:
-    cuts = len(problem.start.cuts) + stage
-    return problem.model.risky_mm2 > 0 and cuts < problem.settings.most_parts - 1 and not problem.late()
-
-
-def _notes(problem: Problem, taken: Taken, wanted: int | None) -> tuple[str, ...]:
-    """What a person should know of the outcome."""
-    parts = len(taken.parts)
+def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> list[str]:
+    """What a person should know of the outcome, of the zones, and of rows of the plan that were found without its planes."""
+    zones, plan, notes = problem.zones, request.plan, list[str]()
     if problem.model.risky_mm2 <= 0 and parts == 1:
-        return ("no face needs support: the model is printed as one part",)
-    if problem.late():
-        return (f"search.time_limit_s = {problem.settings.time_limit_s:g} ended the search; the best so far is used",)
-    if len(taken.front) > 1 or parts > 1 or wanted == 1:
-        return fewer_parts(wanted, parts, "the search found")
-    counts = problem.refusals()
-    shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
-    return (f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}",)
+        notes.append("no face needs support: the model is printed as one part")
+    elif problem.late():
+        notes.append(f"search.time_limit_s = {problem.settings.time_limit_s:g} ended the search; the best so far is used")
+    elif rows > 1 or parts > 1 or request.parts == 1:
+        notes += _fewer_parts(request.parts, parts, "the search found")
+    else:
+        counts = problem.refusals()
+        shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
+        notes.append(f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}")
+    if zones.no_seam.anywhere and problem.terms.seam_mm <= 0.0:
+        notes.append("[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)")
+    if zones.no_support.anywhere and problem.terms.need is None:
+        notes.append('[[no_support]] changes no cut where all that overhangs counts (search.objective = "risky")')
+    if plan.front:
+        again = "planes by hand have the others found anew, for every number of parts"
+        notes.append(f"the [[front]] of {plan.name} is not kept: {again}")
+    return notes
 
 
-def fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
+def check_part_count(parts: int) -> None:
+    """Raise PlanError for a number of parts that cannot be."""
+    if not 1 <= parts <= MOST_PARTS:
+        raise PlanError(f"--parts is {parts}: 1 to {MOST_PARTS} is allowed")
+
+
+def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
     """That there are fewer parts than were wanted, where there are."""
     return (f"--parts {wanted}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
 
 
-def _front_note(planned: PlanFile) -> tuple[str, ...]:
-    """Rows that were found without these planes."""
-    text = f"the [[front]] of {planned.name} is not kept: planes by hand have the others found anew, for every number of parts"
-    return (text,) if planned.front else ()
+def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
+    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than one layer and a half; None where
+    the mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
+    search, layer_mm = profile.search.effective, profile.process.layer_height_mm
+    fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
+    marked = any(not isinstance(zone, Volume) for zone in (*zones.keep, *zones.no_seam, *zones.no_support, *zones.support))
+    if not fine or marked:
+        return None
+    for tolerance, off in (COARSEST, *FINER):
+        copy = simplify(mesh, tolerance * layer_mm)
+        if len(copy.faces) >= WORTH * len(mesh.faces):
+            break
+        few = tolerance == COARSEST[0] and len(copy.faces) < search.simplify_faces / 2
+        if not few and distances_mm(copy, mesh.vertices, off * layer_mm).max() < off * layer_mm:
+            return copy
+    return None
 
 
-def _zone_notes(problem: Problem) -> tuple[str, ...]:
-    zones, terms, notes = problem.zones, problem.terms, []
-    if zones.no_seam.anywhere and terms.seam_mm <= 0.0:
-        notes.append("[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)")
-    if zones.no_support.anywhere and terms.need is None:
-        notes.append('[[no_support]] changes no cut where all that overhangs counts (search.objective = "risky")')
-    return tuple(notes)
+def as_it_is(profile: Profile) -> Profile:
+    """The profile by which a mesh is searched itself, however fine it is."""
+    return with_search(profile, simplify_faces=0)
+
+
+def _cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) -> Decomposition | None:
+    """A problem's mesh, from where its search goes on, cut by the planes that were chosen for its coarse copy, or by planes next
+    to those where bumps that the copy has not forbid them, then moved a little as the mesh itself wants them; None where there
+    are none. The mesh as the search found it is measured anew as well."""
+    began, rows, start = perf_counter(), list(copy.front), problem.start
+    place = next(place for place, row in enumerate(rows) if row.chosen)
+    node = start
+    for plane in rows[place].planes[len(start.cuts) :]:
+        child = cut_near(problem, node, plane)
+        if child is None:
+            return None
+        node = child
+    node = settle(problem, node)
+    parts, timed = make_parts(problem, node), rows[place].time_s is not None
+    rows[place] = _measured(rows[place], node)
+    if price is not None and timed:
+        rows[place] = price_row(rows[place], parts, price)
+    if place > 0 and len(rows[0].planes) == len(start.cuts):
+        rows[0] = _measured(rows[0], start)
+    searched_s = copy.search_s + perf_counter() - began
+    outcome = Outcome(copy.name, copy.ranker, copy.rounds, copy.candidates_evaluated, searched_s, notes_of_search(copy))
+    return decomposition_of(problem, parts, rows, outcome)
+
+
+def _measured(row: FrontRow, node: Node) -> FrontRow:
+    """A row with the planes and costs of a node, its time as it was."""
+    costs = front_row(node)
+    return replace(costs, chosen=row.chosen, reason=row.reason, time_s=row.time_s, filament_mm=row.filament_mm)
+
+
+def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest) -> Decomposition:
+    """The parts of a closed mesh by the planes of a plan, without a search; request.parts: the most parts of the row taken.
+
+    The rows of the front are those of the plan, its own parts in place of the row of their number, the one that is cut measured
+    anew. Raises PlanError for a plan of another model and for a plane that cannot be cut.
+    """
+    began, plan, wanted = perf_counter(), request.plan, request.parts
+    if wanted is not None:
+        check_part_count(wanted)
+        plan = replace(plan, parts=plan.row(wanted))
+    for number, part in enumerate(plan.parts, start=2):
+        if part.plane is None:
+            missing = "normal" if part.normal is None else "offset_mm"
+            raise PlanError(f"plan {plan.name}: part {number} has no {missing}: decompose --planes {plan.name} has it found")
+    mesh = on_pedestal(mesh, profile.search.pedestal_mm)
+    check_plan(plan, mesh, name)
+    problem = Problem(mesh, profile, plan.zones)
+    node = cut_by_hand(problem, plan)
+    planned = {len(row.parts): row for row in plan.front}
+    own = request.plan.parts  # a person may have changed them: they are the row of their number where they can be cut
+    known = planned.get(len(own))
+    if own != plan.parts and all(part.plane is not None for part in own) and (known is None or known.parts != own):
+        with suppress(PlanError):
+            planned[len(own)] = planned_row(own, front_row(cut_by_hand(problem, request.plan)))
+    rows = {
+        count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2, stairs_mm2=row.stairs_mm2)
+        for count, row in planned.items()
+    }
+    rows[len(node.cuts)] = replace(front_row(node), chosen=True, reason=BY_PLAN)
+    parts, front = make_parts(problem, node), [rows[count] for count in sorted(rows)]
+    if request.price is not None:
+        front = _priced(problem, replace(plan, front=tuple(planned.values())), front, parts, request.price)
+    notes = _fewer_parts(wanted, len(plan.parts) + 1, f"the plan {plan.name} holds")
+    outcome = Outcome(name, request.ranker, 0, problem.evaluated, perf_counter() - began, notes)
+    return decomposition_of(problem, parts, front, outcome)
+
+
+def _priced(
+    problem: Problem, plan: PlanFile, rows: Sequence[FrontRow], chosen: tuple[Part, ...], price: Pricing
+) -> list[FrontRow]:
+    """The rows of a plan's front with their prices, those that cannot be cut again or are not sound as they are."""
+    planned = {len(row.parts) + 1: row.parts for row in plan.front}
+    parts: dict[int, Sequence[Part]] = {}
+    for place, (row, good) in enumerate(zip(rows, pays(rows), strict=True)):
+        with suppress(PlanError):
+            if row.chosen:
+                parts[place] = chosen
+            elif good:
+                parts[place] = make_parts(problem, cut_by_hand(problem, replace(plan, parts=planned[row.parts])))
+    sound = {place for place, of_row in parts.items() if is_sound(problem.mesh, of_row, problem.profile)}
+    rows = [replace(row, sound=place in sound or place not in parts) for place, row in enumerate(rows)]
+    return price_rows(rows, {place: parts[place] for place in parts if place in sound or rows[place].chosen}, price)

@@ -12,24 +12,50 @@ from math import inf
 
 import numpy as np
 
+from mdp.clearance import lowest_body, places_met
 from mdp.cost.part_forecast import ModelForecast, PartForecast
-from mdp.mesh import Mesh
-from mdp.overhang import UP
+from mdp.cut import Solid, above, below, mesh_of, passing_places
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM, UP
 from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
+from mdp.pose import poses, rotation, shift
+from mdp.ranking.candidates import COPLANAR_MM, Reason
 from mdp.search.by_hand import Refusal, cut_or_refuse, name_limbs, planes_near, refusal
 from mdp.search.neck import find_neck
 from mdp.search.node import Node
-from mdp.search.obstacle import Obstacle, find_refused
-from mdp.search.problem import Problem
-from mdp.zone import NO_ZONES, Zones
+from mdp.search.problem import Problem, with_search
+from mdp.sweep.limbs import limb_faces
+from mdp.sweep.slivers import SLIVER_COSINE
+from mdp.zone import NO_ZONES, Zone, Zones
+from profiles.frozen import Vector
 from profiles.profile import Profile
 
 MOST_TRIED = 16  # places for a plane that the sweep finds nothing against
 APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were refused;
 # once a place is found, those passed over on the way to it are searched by bisection
+MOST_PLACES = 20  # of an obstacle that are marked
 
 Key = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The head at the place where one of its bodies would touch the table. All in the workpiece frame, mm: tip_mm; rotation: rows
+    of what turns the workpiece frame into the machine's there; body: its name; touched_mm: the place on the table."""
+
+    body: str
+    tip_mm: Vector
+    rotation: tuple[Vector, ...]
+    touched_mm: Vector
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """places_mm: of the workpiece frame, where what a plane is refused for lies; touch: the head that would meet the table."""
+
+    places_mm: tuple[Vector, ...] = ()
+    touch: Touch | None = None
 
 
 @dataclass(frozen=True)
@@ -53,9 +79,8 @@ class Trials:
     def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
         """A closed mesh standing on the platform. How much less a seam counts where it is hidden is in no figure of a trial, and
         takes longer to work out than all else: here all seams count alike."""
-        alike = profile.search.model_copy(update={"hidden_seam_share": 1.0})
         lifted = on_pedestal(mesh, profile.search.pedestal_mm)
-        self._problem = problem = Problem(lifted, profile.model_copy(update={"search": alike}), zones)
+        self._problem = problem = Problem(lifted, with_search(profile, hidden_seam_share=1.0), zones)
         root = problem.root
         self._forecast = ModelForecast.of(root.remainder, root.seam_weights, problem.terms)
         self._cut: list[tuple[Key, Node]] = []  # of the last trial, in the order of its cuts
@@ -173,3 +198,88 @@ def _are_near(plane: Plane, other: Plane, apart_mm: float) -> bool:
 def _key(plane: Plane) -> Key:
     limbs_mm = () if plane.limbs_mm is None else tuple(plane.limbs_mm.ravel().tolist())
     return *plane.normal.tolist(), plane.offset_mm, *limbs_mm
+
+
+def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -> Obstacle | None:
+    """Where a plane that may not cut a node is in the way; None: nobody knows."""
+    named = name_limbs(node, plane)
+    if isinstance(named, Refusal):
+        return None
+    if refusal.reason == Reason.CLEARANCE:
+        return Obstacle(touch=_touch(problem, node, named))
+    places = _refused_places(problem, node, named, refusal.reason)
+    return Obstacle(tuple(_vector(place) for place in places[:MOST_PLACES])) if len(places) else None
+
+
+def _refused_places(problem: Problem, node: Node, plane: Plane, reason: Reason) -> Sequence[Floats]:
+    """The places that speak against a plane; none where nobody knows."""
+    match reason:
+        case Reason.PLATFORM:
+            centre, radius = problem.platform_disc
+            across = plane.normal[:2] / max(float(np.hypot(*plane.normal[:2])), 1e-12)
+            return [np.array([*(centre + radius * across), 0.0])]
+        case Reason.FLOATING:
+            return _lowest(below(node.solid, plane), UP, PLATFORM_TOLERANCE_MM)
+        case Reason.INTERFACE:
+            return _lowest(above(node.solid, plane), plane.normal, plane.offset_mm + COPLANAR_MM)
+        case Reason.FRAGILE:
+            return _sliver(node.remainder.mesh, plane)
+        case Reason.KEEP:
+            zone = problem.zones.keep[(problem.zones.crossed(plane) or 1) - 1]
+            corners = zone.corners if isinstance(zone, Zone) else zone.points
+            return [0.5 * (corners.min(axis=0) + corners.max(axis=0))]
+        case Reason.WEAK:
+            section = passing_places(node.remainder.mesh, plane)
+            return [0.5 * (section.min(axis=0) + section.max(axis=0))]
+        case Reason.STANDING:  # what asks for a higher tip than the limbs beside it have
+            corners, limb = node.remainder.mesh.vertices[node.remainder.mesh.faces], limb_faces(node.remainder, plane)
+            for pose in poses(problem.machine, plane.normal)[:1]:
+                return list(places_met(problem.machine, pose, corners[limb], corners[~limb], plane.offset_mm))
+        case Reason.REACH:
+            return _outside(problem, problem.corners_cut(node, plane), plane)
+    return []
+
+
+def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
+    """The head at the lowest place of what is cut off, at the pose that needs least."""
+    machine = problem.machine
+    options = [(*lowest_body(machine, pose), pose) for pose in poses(machine, plane.normal)]
+    printed = problem.corners_cut(node, plane)
+    if not options or len(printed) == 0:
+        return None
+    _, body, point, pose = min(options, key=lambda option: option[0])
+    tip, turned = printed[int(np.argmin(printed[:, 2]))], rotation(machine, pose)
+    x, y, _ = tip + np.array(point) @ turned
+    return Touch(body, _vector(tip), tuple(_vector(row) for row in turned), (float(x), float(y), 0.0))
+
+
+def _sliver(mesh: Mesh, plane: Plane) -> list[Floats]:
+    """The place of the surface nearly level with a plane that it comes nearest to on the solid's side: there a sliver is left."""
+    cosines, heights = mesh.normals @ plane.normal, plane.heights_mm(mesh.vertices)[mesh.faces]
+    outward = np.where(cosines > 0.0, 1.0, -1.0)[:, None] * heights
+    outward[(np.abs(cosines) <= SLIVER_COSINE)[:, None] | (outward < 0.0)] = np.inf
+    face, corner = np.unravel_index(int(np.argmin(outward)), outward.shape)
+    return [mesh.vertices[mesh.faces[face, corner]]] if np.isfinite(outward[face, corner]) else []
+
+
+def _lowest(solid: Solid, upward: Floats, base_mm: float) -> list[Floats]:
+    """The lowest place, along a direction, of every piece of a solid that does not reach down to its base."""
+    bodies = [mesh_of(piece).vertices for piece in solid.decompose() if piece.volume() > 0.0]  # the others are voids
+    return [vertices[int(np.argmin(vertices @ upward))] for vertices in bodies if (vertices @ upward).min() > base_mm]
+
+
+def _outside(problem: Problem, points: Floats, plane: Plane) -> list[Floats]:
+    """The places of a part that the axes do not reach, the farthest for each axis and side."""
+    machine, outside = problem.machine, []
+    for pose in poses(machine, plane.normal)[:1] if len(points) else []:
+        reached = (points + problem.place_mm) @ rotation(machine, pose).T + shift(machine, pose)
+        for axis, limits in enumerate(axis.limits_mm for axis in (machine.x, machine.y, machine.z)):
+            low, high = int(np.argmin(reached[:, axis])), int(np.argmax(reached[:, axis]))
+            outside += [points[low]] if reached[low, axis] < limits[0] else []
+            outside += [points[high]] if reached[high, axis] > limits[1] else []
+    return outside
+
+
+def _vector(values: object) -> Vector:
+    x, y, z = (float(value) for value in np.asarray(values, dtype=np.float64))
+    return x, y, z

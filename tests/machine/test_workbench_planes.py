@@ -10,7 +10,7 @@ import pytest
 from machine.app.cli import main
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.save import stl
-from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import SearchRequest, cut_by_plan
 from profiles.profile import load
 from tests.machine.browser import Browser
 from tests.machine.test_workbench_place import pixels
@@ -173,7 +173,7 @@ def test_a_model_on_a_pedestal_is_drawn_on_it_and_has_the_figures_of_the_search(
         trial = page.until(lambda state: state["trial"] and state["trial"]["cuts"])["trial"]
         given = [setting.removeprefix("--set=") for setting in QUICK if setting != "--set"]
         plan = PlanFile("", parts=(PlannedPart((0.0, 0.0, 1.0), 50.0),))
-        row = cut_by_plan(tee(), "tee", load(settings=[*given, "search.pedestal_mm=12"]), plan).chosen
+        row = cut_by_plan(tee(), "tee", load(settings=[*given, "search.pedestal_mm=12"]), SearchRequest(plan=plan)).chosen
         assert row is not None
         assert (trial["support_area_mm2"], trial["seam_mm"]) == pytest.approx((row.support_area_mm2, row.seam_mm))
         looked_at(browser, bench, "tee.stl")

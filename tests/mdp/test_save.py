@@ -10,7 +10,7 @@ from mdp.decomposition import Decomposition
 from mdp.joint import joints_of
 from mdp.plane import PLATFORM
 from mdp.save import COLOURS, glb, json_values, part_file, stl, threemf
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.profile import load
 from tests.shapes import branch, tee
 
@@ -47,7 +47,7 @@ def test_the_values_tell_the_parts_as_they_are(cut: Decomposition) -> None:
 
 
 def test_a_model_in_one_piece_has_nothing_to_reduce() -> None:
-    whole = decompose(tee(), "tee", load(), parts=1)
+    whole = decompose(tee(), "tee", load(), SearchRequest(parts=1))
     values = json_values(whole, (), 0.0, 0.0)
     assert (values["reduction"], len(values["parts"])) == (0.0, 1)
     assert whole.parts[0].base is PLATFORM

@@ -5,7 +5,6 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -42,13 +41,12 @@ from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.model_file import locate
-from mdp.plans.plan_file import PlanFile, plan_of
+from mdp.plans.plan_file import NO_PLAN, PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
 from mdp.read import ReadModel, read_model
-from mdp.search.by_plan import cut_by_plan
 from mdp.search.front import Worth
 from mdp.search.orient import orient_and_decompose
-from mdp.search.search import Progress, decompose
+from mdp.search.search import Progress, SearchRequest, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 from slicer.interface.interface import pin_width_mm, room_around_mm
@@ -145,21 +143,14 @@ class _Search:
 
     def search(self, mesh: Mesh) -> Decomposition:
         """The parts of a mesh."""
-        request, given, cuts = self._request, self._with_marks(mesh), self._request.cuts
-        asked: dict[str, Any] = {"ranker": request.ranker, "parts": cuts.parts, "price": self._price}
-        if given is not None and cuts.plan is not None:
-            return cut_by_plan(mesh, request.name, request.profile, given, **asked)
+        request, cuts, given = self._request, self._request.cuts, self._with_marks(mesh)
+        asked = SearchRequest(given or NO_PLAN, cuts.parts, request.ranker, self._price)
+        if cuts.plan is not None:
+            return cut_by_plan(mesh, request.name, request.profile, asked)
         record: list[bytes] = []
-        decomposition = decompose(
-            mesh,
-            request.name,
-            request.profile,
-            on_stage=self._show,
-            on_phase=self._report,
-            on_record=None if request.outputs.record is None else record.append,
-            by_hand=given,
-            **asked,
-        )
+        on_record = None if request.outputs.record is None else record.append
+        asked = replace(asked, on_stage=self._show, on_phase=self._report, on_record=on_record)
+        decomposition = decompose(mesh, request.name, request.profile, asked)
         self._records.append((decomposition, record))
         return decomposition
 

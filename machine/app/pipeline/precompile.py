@@ -32,7 +32,7 @@ from mdp.kernels.workers import tell
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.limbs import LimbGrid, find_limbs, limb_reach, sum_limbs
@@ -67,7 +67,10 @@ def _judge() -> None:
     """What every model goes through: what needs support, what it takes to print, and where seams would hide."""
     profile = load()
     decompose(
-        mesh_of(m3.Manifold.cube((8.0, 8.0, 3.0), True).translate((0.0, 0.0, 1.5))), "warm", profile, price=pricing(profile)
+        mesh_of(m3.Manifold.cube((8.0, 8.0, 3.0), True).translate((0.0, 0.0, 1.5))),
+        "warm",
+        profile,
+        SearchRequest(price=pricing(profile)),
     )
     mesh = mesh_of(_tee())
     SupportNeed.of(mesh, profile.process, 1.0).along(LEANING[None])

@@ -18,7 +18,7 @@ from mdp.model_file import locate
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.read import read_mesh
 from mdp.save import stl
-from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import SearchRequest, cut_by_plan
 from profiles.profile import load
 from tests.machine import hand
 from tests.machine.pages import opened
@@ -218,7 +218,7 @@ def test_a_page_takes_a_third_of_what_it_may_and_holds_the_path_to_a_hundredth()
     profile = load(settings=["search.fragile_mm=0", "search.nozzle_load_n=0"])
     by_hand = PlanFile("plan.toml", parts=(PlannedPart((0.6, 0.0, 0.8), 21.2),))
     figure = read_mesh(locate("demo:figure"), 0.45)[0]
-    program = build(cut_by_plan(figure, "demo:figure", profile, by_hand), profile)
+    program = build(cut_by_plan(figure, "demo:figure", profile, SearchRequest(plan=by_hand)), profile)
     content = print_page("demo:figure", program, profile)
     header, arrays = opened(content)
     moves = len(program.run.program.line)

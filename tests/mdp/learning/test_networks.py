@@ -16,7 +16,7 @@ from mdp.learning.objective import OBJECTIVES, Padded
 from mdp.learning.training import SCHEDULES, Epoch, train
 from mdp.mesh import Floats
 from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
-from mdp.ranking.network import Network as SearchNetwork
+from mdp.ranking.ranker import Network as SearchNetwork
 from mdp.ranking.ranker import ranker_named
 from profiles.errors import LearningError
 from tests.mdp.learning.records import drawn_list

@@ -12,7 +12,7 @@ from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.save import stl
-from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.zone import Grown, MeshVolume, Modifier, Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
@@ -217,7 +217,9 @@ def test_a_normal_of_another_length_is_a_direction_all_the_same(tmp_path: Path) 
 @pytest.mark.parametrize("z", [1.0000000000001, 1.0000000000000002, 2.0])
 def test_a_plan_whose_normal_is_a_rounding_too_long_is_cut(tmp_path: Path, z: float) -> None:
     (tmp_path / "mine.toml").write_text(f"{FIRST}[[part]]\nnormal = [0.0, 0.0, {z!r}]\noffset_mm = 5.0")
-    decomposition = cut_by_plan(shapes.box(10.0, 10.0, 20.0), "box", load(), read_plan(tmp_path / "mine.toml"))
+    decomposition = cut_by_plan(
+        shapes.box(10.0, 10.0, 20.0), "box", load(), SearchRequest(plan=read_plan(tmp_path / "mine.toml"))
+    )
     assert [part.volume_mm3 for part in decomposition.parts] == pytest.approx([500.0, 1500.0])
 
 

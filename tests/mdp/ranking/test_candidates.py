@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mdp.directions.spread import spread
 from mdp.ranking.candidates import bounds_of, footprint
 from profiles.profile import load
-from tests.shapes import from_manifold
+from tests.shapes import box, from_manifold
 
 PLACES = st.lists(st.tuples(st.integers(-20, 20), st.integers(-20, 20)), min_size=1, max_size=5, unique=True)
 
@@ -38,7 +38,7 @@ def test_a_plane_that_may_cut_has_the_whole_disc_below_it() -> None:
     profile = load(settings=["search.clearance=false"])
     centre, radius = np.array([3.0, -2.0]), 8.0
     directions = spread(40, 0.1)
-    limits = bounds_of(directions, disc=(centre, radius), volume_mm3=1000.0, machine=profile.machine, search=profile.search)
+    limits = bounds_of(directions, box(10.0, 10.0, 10.0), profile, (centre, radius))
     angle = np.linspace(0.0, 2.0 * np.pi, 3601)
     rim = np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle), np.zeros(len(angle))])
     assert limits.least_offset_mm == pytest.approx((rim @ directions.T).max(axis=0), abs=1e-4)

@@ -18,14 +18,13 @@ from profiles.profile import load
 from tests.mdp.solids import random_solid
 from tests.shapes import tee
 
-SEARCH = load(settings=["search.clearance=false", "search.offset_step_mm=2", "search.least_interface_mm2=20"]).search
-MACHINE = load().machine
+PROFILE = load(settings=["search.clearance=false", "search.offset_step_mm=2", "search.least_interface_mm2=20"])
+SEARCH = PROFILE.search
 TERMS = CostTerms(45.0, False)
 
 
 def limits_for(mesh: Mesh, count: int) -> Bounds:
-    disc = platform_disc(mesh, SEARCH)
-    return bounds_of(spread(count, 0.15)[1:], disc=disc, volume_mm3=mesh.volume_mm3, machine=MACHINE, search=SEARCH)
+    return bounds_of(spread(count, 0.15)[1:], mesh, PROFILE, platform_disc(mesh, SEARCH))
 
 
 def reasons(mesh: Mesh, limits: Bounds, row: int, offset_mm: float) -> list[Reason]:
@@ -58,7 +57,7 @@ def test_a_plane_is_refused_for_the_first_reason_that_its_cut_gives(seed: int) -
     for row, direction in enumerate(limits.directions):
         heights = mesh.vertices @ direction
         offsets = 2.0 * np.arange(np.ceil(heights.min() / 2.0), np.ceil(heights.max() / 2.0))
-        checked = check(remainder, limits, SEARCH, np.full(len(offsets), row, np.int32), offsets)
+        checked = check(remainder, limits, 2.0, np.full(len(offsets), row, np.int32), offsets)
         for offset, reason in zip(offsets.tolist(), checked.reason.tolist(), strict=True):
             if np.abs(heights - offset).min() < 1e-6:
                 continue  # a face in the plane belongs to either side
@@ -69,22 +68,20 @@ def test_a_plane_is_refused_for_the_first_reason_that_its_cut_gives(seed: int) -
 def test_every_candidate_is_counted_under_one_reason_and_what_gains_too_little_is_not_scored() -> None:
     mesh = tee()
     limits, remainder = limits_for(mesh, 60), Remainder(mesh, risky_upright(mesh, 45.0))
-    scored = score_candidates(remainder, limits, TERMS, step_mm=2.0, least_gain_mm2=50.0)
-    counts = refusals(scored, limits, SEARCH, least_gain_mm2=50.0, is_weak=lambda _: False)
+    scored = score_candidates(remainder, limits, TERMS, 50.0)
+    counts = refusals(scored, 50.0, lambda _: False)
     assert sum(counts.values()) == scored.evaluated
     assert set(counts) == {Reason.FEASIBLE, *REASONS}
     assert (scored.gain_mm2 >= 50.0).all()
-    feasible = check(remainder, limits, SEARCH, scored.direction, scored.offset_mm).reason == Reason.FEASIBLE
+    feasible = check(remainder, limits, 2.0, scored.direction, scored.offset_mm).reason == Reason.FEASIBLE
     assert counts[Reason.FEASIBLE] == feasible.sum() > 0
-    weak = refusals(scored, limits, SEARCH, least_gain_mm2=50.0, is_weak=lambda _: True)
+    weak = refusals(scored, 50.0, lambda _: True)
     assert (weak[Reason.FEASIBLE], weak[Reason.WEAK]) == (0, counts[Reason.FEASIBLE])
 
 
 @pytest.mark.parametrize(("least_mm2", "scored"), [(-np.inf, True), (1e9, False)])
 def test_what_a_cut_must_gain_decides_what_is_scored(least_mm2: float, scored: bool) -> None:
     mesh = tee()
-    found = score_candidates(
-        Remainder(mesh, risky_upright(mesh, 45.0)), limits_for(mesh, 10), TERMS, step_mm=2.0, least_gain_mm2=least_mm2
-    )
+    found = score_candidates(Remainder(mesh, risky_upright(mesh, 45.0)), limits_for(mesh, 10), TERMS, least_mm2)
     assert (len(found.gain_mm2) > 0) == scored
     assert found.evaluated > 0

@@ -11,13 +11,11 @@ import pytest
 from mdp.mesh import Floats
 from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import CHECKED, COLUMNS, features
-from mdp.ranking.network import Network
-from mdp.ranking.ranker import ByReduction, ranker_named, shipped
+from mdp.ranking.ranker import Network, ranker_named, shipped
 from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, shortlist
-from mdp.search.beam import Beam
+from mdp.search.beam import Beam, search_as_published
 from mdp.search.problem import Problem
-from mdp.search.published import search_as_published
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.errors import RankerError
 from profiles.profile import load
 from tests import shapes
@@ -95,9 +93,10 @@ def test_scores_do_not_change_with_the_order_of_the_candidates_nor_below_the_las
 def test_one_and_two_threads_give_the_same_search() -> None:
     code = (
         "import sys, mdp.kernels.threads as t; t.use_threads(int(sys.argv[1]));"
-        "from mdp.search.search import decompose; from profiles.profile import load; from tests import shapes;"
+        "from mdp.search.search import SearchRequest, decompose; from profiles.profile import load; from tests import shapes;"
         f"p = load(settings={(*SETTINGS, 'search.beam_width=2')!r});"
-        "print([(x.base.normal.tolist(), x.base.offset_mm) for x in decompose(shapes.branch(), 'b', p, ranker='learned').parts])"
+        "found = decompose(shapes.branch(), 'b', p, SearchRequest(ranker='learned'));"
+        "print([(x.base.normal.tolist(), x.base.offset_mm) for x in found.parts])"
     )
     one, two = (subprocess.run([sys.executable, "-c", code, threads], capture_output=True, check=True).stdout for threads in "12")
     assert one == two
@@ -118,28 +117,26 @@ def test_a_wide_beam_holds_the_narrow_one_with_a_learned_ranker_too(shape: str) 
 
 @pytest.mark.parametrize("width", [1, 2])
 def test_the_published_search_follows_the_plain_best_beside_what_a_learned_ranker_chose(width: int) -> None:
-    profile = load(settings=(*SETTINGS, "search.method=published", f"search.beam_width={width}"))
+    profile = load(settings=(*SETTINGS, "search.method=published", f"search.beam_width={width}", "search.most_parts=2"))
     problem = Problem(shapes.branch(), profile)
     table = problem.table(problem.root, described=True)
-    plain, *_ = rank_classic([table], problem.model.risky_mm2, np.inf)
+    plain, *_ = rank_classic([table], np.inf)
     told: list[tuple[int, int]] = []
-    best, _ = search_as_published(problem, LastFirst(), lambda stage: stage < 1, None, lambda *given: told.append(given[:2]))
+    best, _ = search_as_published(problem, LastFirst(shipped().file), None, lambda *given: told.append(given[:2]))
     assert told == [(1, width + 1)]
     assert (best.cuts[-1].base.normal @ table.plane(plain.row).normal) == pytest.approx(1.0)
     assert best.cuts[-1].base.offset_mm == pytest.approx(table.plane(plain.row).offset_mm)
 
 
-class LastFirst(ByReduction):
+class LastFirst(Network):
     """A learned ranker that likes best what the classic ranking likes least."""
-
-    learned = True
 
     def rank(self, offered: Iterable[RankedCandidate], tables: Sequence[CandidateTable]) -> Iterator[RankedCandidate]:
         return reversed(list(offered))
 
 
 def test_a_single_slot_is_polished_where_a_learned_ranker_saved_the_time() -> None:
-    for ranker, finalists in ((shipped(), 1), (ByReduction(), 0)):
+    for ranker, finalists in ((shipped(), 1), (None, 0)):
         beam = Beam(_problem(1), ranker, None)
         beam.advance()
         assert len(beam.finalists()) == finalists
@@ -210,6 +207,8 @@ def test_a_network_with_other_names_or_another_shape_is_a_sentence(
 
 
 def test_a_decomposition_names_its_ranker_and_a_learned_one_is_not_worse_than_the_uncut_model() -> None:
-    found = decompose(shapes.branch(), "branch", load(settings=(*SETTINGS, "search.beam_width=1")), ranker="learned")
+    found = decompose(
+        shapes.branch(), "branch", load(settings=(*SETTINGS, "search.beam_width=1")), SearchRequest(ranker="learned")
+    )
     assert found.ranker == "learned"
     assert found.reduction > 0.5

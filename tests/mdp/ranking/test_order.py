@@ -77,7 +77,7 @@ def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
     """The table of the same candidates; a check answers for a candidate by its direction and offset."""
     rows = dict(zip(zip(own.direction.tolist(), own.offset.tolist(), strict=True), own.same.tolist(), strict=True))
 
-    def check(direction: Ints, offset: Floats) -> Feasibility:
+    def answer(remainder: None, limits: Bounds, step_mm: float, direction: Ints, offset: Floats) -> Feasibility:
         at = np.array([rows[int(d), float(o)] for d, o in zip(direction, offset, strict=True)], np.int64)
         reason = np.where(own.can_be_cut[at], Reason.FEASIBLE, Reason.FLOATING).astype(np.int32)
         return Feasibility(reason, own.volume[at], *np.zeros((3, len(at))))
@@ -89,12 +89,14 @@ def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
     n = len(own.gain)
     costs = {"gain_mm2": own.gain, "residual_mm2": own.residual, "lost_mm2": own.lost}
     unused = dict.fromkeys(("above_mm2", "stairs_mm2", "seam_mm2", "hopeless_mm2"), np.zeros(n))
+    limits = Bounds(DIRECTIONS, np.zeros(40), np.zeros(40), 0.0, 0.0, np.zeros((40, 0, 2)), 0.0, 0.0, 1.0)
     scored = ScoredCandidates(
-        None, own.direction, own.offset, **costs, **unused, first=own.direction, columns=own.direction, step_mm=1.0
+        None, limits, own.direction, own.offset, **costs, **unused, first=own.direction, columns=own.direction
     )  # type: ignore[arg-type]
-    limits = Bounds(DIRECTIONS, np.zeros(40), np.zeros(40), 0.0, 0.0, np.zeros((40, 0, 2)), 0.0)
     situation = Situation(Model(RISKY_MM2, 1.0, 1.0), own.saved, own.left, own.lost_before, 0.0, 0.0, 1.0, 0, DIRECTIONS[0])
-    return CandidateTable(scored, limits, situation, check=check, least_gain_mm2=least_gain_mm2, is_weak=is_weak)
+    table = CandidateTable(scored, situation, least_gain_mm2, is_weak)
+    table.check = answer
+    return table
 
 
 def without_alike(
@@ -190,7 +192,7 @@ def test_the_order_of_the_paper_is_the_one_worked_out_round_by_round(
     seed: int, count: int, preferred: float, least: float
 ) -> None:
     own = [drawn(seed + k, 120) for k in range(count)]
-    ranked = list(rank_classic([table_of(one) for one in own], RISKY_MM2, BOUND_MM2, least, preferred))
+    ranked = list(rank_classic([table_of(one) for one in own], BOUND_MM2, least, preferred))
     assert places(ranked) == classic(own, preferred, least)
     assert [c.round for c in ranked] == [_round(own[c.table].lost[c.row]) for c in ranked]
 
@@ -203,4 +205,4 @@ def test_the_threshold_of_the_paper_rises_from_a_ten_thousandth_by_factors_of_fi
 def test_of_no_candidates_nothing_is_ranked() -> None:
     none = table_of(drawn(0, 1))
     assert list(rank_by_trade_off([none], 1.0, BOUND_MM2)) == list(shortlist([none], BOUND_MM2)) == []
-    assert list(rank_classic([none], RISKY_MM2, BOUND_MM2)) == list(rank_by_trade_off([], 1.0, BOUND_MM2)) == []
+    assert list(rank_classic([none], BOUND_MM2)) == list(rank_by_trade_off([], 1.0, BOUND_MM2)) == []

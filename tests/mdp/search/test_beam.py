@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mdp.ranking.candidate_table import CandidateTable, nearly_equal, relaxation_round
-from mdp.ranking.ranker import ByReduction
+from mdp.ranking.candidate_table import CandidateTable, nearly_equal, relaxation_rounds
 from mdp.ranking.ranking import rank_by_trade_off, rank_classic
 from mdp.search.beam import Beam
 from mdp.search.problem import Problem
@@ -20,7 +19,7 @@ def _problem(width: int, shape: str = "tee") -> Problem:
 
 
 def _beam(width: int, stages: int, shape: str = "tee") -> Beam:
-    beam = Beam(_problem(width, shape), ByReduction(), None)
+    beam = Beam(_problem(width, shape), None, None)
     for _ in range(stages):
         beam.advance()
     return beam
@@ -86,15 +85,15 @@ def test_candidates_that_leave_too_much_for_ever_are_left_out() -> None:
 def test_the_round_is_the_one_whose_residual_threshold_lets_a_candidate_in() -> None:
     problem = _problem(1, "ball")
     table = problem.table(problem.root)
-    for candidate in rank_classic([table], problem.model.risky_mm2, np.inf):
+    for candidate in rank_classic([table], np.inf):
         lost = float(table.scored.lost_mm2[candidate.row]) / problem.model.risky_mm2
-        assert relaxation_round(lost) == candidate.round
+        assert relaxation_rounds(np.array([lost])) == [candidate.round]
 
 
 def test_parts_of_the_preferred_volume_come_first_and_all_others_after_them() -> None:
     problem = _problem(1, "branch")
     table, tenth = problem.table(problem.root), 0.1 * problem.model.volume_mm3
-    classic = rank_classic([table], problem.model.risky_mm2, np.inf, preferred_mm3=tenth)
+    classic = rank_classic([table], np.inf, preferred_mm3=tenth)
     volumes = [table.volume_mm3[candidate.row] for candidate in classic]
     large = [volume >= tenth for volume in volumes]
     assert large == sorted(large, reverse=True)
@@ -105,7 +104,7 @@ def test_what_gains_too_little_is_for_large_parts_of_the_classic_ranking_only() 
     problem = Problem(shapes.branch(), load(settings=("search.directions=150", "search.least_gain=0.2")))
     table, least_mm2 = problem.table(problem.root, large=True), problem.least_gain_mm2
     small = {row for row in range(len(table.reason)) if table.scored.gain_mm2[row] < least_mm2}
-    classic = rank_classic([table], problem.model.risky_mm2, np.inf, preferred_mm3=problem.preferred_mm3)
+    classic = rank_classic([table], np.inf, preferred_mm3=problem.preferred_mm3)
     gaining_little = [candidate.row for candidate in classic if candidate.row in small]
     assert gaining_little
     assert (table.volume_mm3[gaining_little] >= problem.preferred_mm3).all()

@@ -17,8 +17,7 @@ from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.save import stl
-from mdp.search.by_plan import cut_by_plan
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
@@ -40,7 +39,7 @@ def _by_hand(*parts: tuple[Vector | None, float | None], zones: Zones | None = N
 
 
 def _cut(mesh: Mesh, *parts: tuple[Vector | None, float | None], profile: Profile | None = None) -> Decomposition:
-    return cut_by_plan(mesh, "shape", profile or _profile(), _by_hand(*parts))
+    return cut_by_plan(mesh, "shape", profile or _profile(), SearchRequest(plan=_by_hand(*parts)))
 
 
 def _refusal(mesh: Mesh, *parts: tuple[Vector | None, float | None], profile: Profile | None = None) -> str:
@@ -59,7 +58,7 @@ def test_the_plan_of_a_search_gives_its_parts_again_bit_by_bit(tmp_path: Path, n
     mesh = getattr(shapes, name)()
     searched = decompose(mesh, "shape", _profile("search.pedestal_mm=5"))
     (tmp_path / "plan.toml").write_text(plan_text(plan_of(searched)))
-    again = cut_by_plan(mesh, "shape", _profile("search.pedestal_mm=5"), read_plan(tmp_path / "plan.toml"))
+    again = cut_by_plan(mesh, "shape", _profile("search.pedestal_mm=5"), SearchRequest(plan=read_plan(tmp_path / "plan.toml")))
     assert [stl(part.mesh) for part in again.parts] == [stl(part.mesh) for part in searched.parts]
     assert [part.pose for part in again.parts] == [part.pose for part in searched.parts]
     assert again.candidates_evaluated == again.rounds == 0
@@ -87,8 +86,8 @@ def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
     plan = plan_of(searched)
     assert len(searched.parts) > 2
     for count in range(1, len(searched.front) + 1):
-        assert len(cut_by_plan(_two_arms(), "shape", _profile(), plan, parts=count).parts) == count
-    many = cut_by_plan(_two_arms(), "shape", _profile(), plan, parts=50)
+        assert len(cut_by_plan(_two_arms(), "shape", _profile(), SearchRequest(plan=plan, parts=count)).parts) == count
+    many = cut_by_plan(_two_arms(), "shape", _profile(), SearchRequest(plan=plan, parts=50))
     assert len(many.parts) == len(searched.front)
     assert many.notes == (f"--parts 50: the plan plan.toml holds no more than {len(searched.front)}",)
 
@@ -97,26 +96,31 @@ def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_ro
     searched = plan_of(_searched_arms())
     mine = replace(searched, parts=_by_hand((UP, 35.0), (UP, 40.0)).parts)
     for front in (searched.front, tuple(row for row in searched.front if len(row.parts) < 2)):
-        saved = plan_of(cut_by_plan(_two_arms(), "shape", _profile(), replace(mine, front=front), parts=2))
+        saved = plan_of(cut_by_plan(_two_arms(), "shape", _profile(), SearchRequest(plan=replace(mine, front=front), parts=2)))
         assert saved.row(3) == mine.parts
-        assert saved.front[2].cost_mm2 == pytest.approx(cut_by_plan(_two_arms(), "shape", _profile(), mine).cost_mm2)
+        assert saved.front[2].cost_mm2 == pytest.approx(
+            cut_by_plan(_two_arms(), "shape", _profile(), SearchRequest(plan=mine)).cost_mm2
+        )
 
 
 def test_a_search_for_so_many_parts_takes_that_row_of_the_front() -> None:
-    free, (two, many) = _searched_arms(), (decompose(_two_arms(), "shape", _profile(), parts=parts) for parts in (2, 50))
+    free, (two, many) = (
+        _searched_arms(),
+        (decompose(_two_arms(), "shape", _profile(), SearchRequest(parts=parts)) for parts in (2, 50)),
+    )
     assert len(free.parts) > len(two.parts) == 2
     assert len(many.parts) == len(many.front)
     assert many.notes == (f"--parts 50: the search found no more than {len(many.front)}",)
     assert [row.cost_mm2 for row in two.front] == [row.cost_mm2 for row in free.front]
-    assert len(decompose(_two_arms(), "shape", _profile(), parts=1).parts) == 1
+    assert len(decompose(_two_arms(), "shape", _profile(), SearchRequest(parts=1)).parts) == 1
 
 
 @pytest.mark.parametrize("parts", [0, -1, 1001])
 def test_no_parts_at_all_or_too_many_are_refused(parts: int) -> None:
     with pytest.raises(PlanError, match=f"--parts is {parts}: 1 to 1000 is allowed"):
-        decompose(shapes.box(), "shape", _profile(), parts=parts)
+        decompose(shapes.box(), "shape", _profile(), SearchRequest(parts=parts))
     with pytest.raises(PlanError, match=f"--parts is {parts}: 1 to 1000 is allowed"):
-        cut_by_plan(shapes.box(), "shape", _profile(), _by_hand(), parts=parts)
+        cut_by_plan(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand(), parts=parts))
 
 
 def test_a_plane_by_hand_may_gain_nothing_and_make_a_small_part() -> None:
@@ -127,10 +131,13 @@ def test_a_plane_by_hand_may_gain_nothing_and_make_a_small_part() -> None:
 def test_a_plan_of_another_model_is_refused() -> None:
     plan = plan_of(decompose(shapes.tee(), "tee.stl", _profile()))
     with pytest.raises(PlanError, match=r"was made of another model: tee.stl is not new.stl as it is read now"):
-        cut_by_plan(shapes.tee(arm=41.0), "new.stl", _profile(), plan)
+        cut_by_plan(shapes.tee(arm=41.0), "new.stl", _profile(), SearchRequest(plan=plan))
     with pytest.raises(PlanError, match="was made of another model"):
-        decompose(shapes.tee(arm=41.0), "new.stl", _profile(), by_hand=plan)
-    assert len(cut_by_plan(shapes.tee(arm=40.5), "new.stl", _profile(), replace(plan, sha256="")).parts) == len(plan.parts) + 1
+        decompose(shapes.tee(arm=41.0), "new.stl", _profile(), SearchRequest(plan=plan))
+    assert (
+        len(cut_by_plan(shapes.tee(arm=40.5), "new.stl", _profile(), SearchRequest(plan=replace(plan, sha256=""))).parts)
+        == len(plan.parts) + 1
+    )
 
 
 def test_a_plane_beside_the_model_is_refused_with_what_it_could_be() -> None:
@@ -201,7 +208,7 @@ def test_a_plan_with_a_plane_left_open_is_sent_to_the_search() -> None:
 def test_an_open_offset_is_found_where_the_most_becomes_safe() -> None:
     by_hand = _by_hand((LEANING, None))
     profile = _profile("search.most_parts=2")
-    completed = decompose(shapes.branch(), "shape", profile, by_hand=by_hand)
+    completed = decompose(shapes.branch(), "shape", profile, SearchRequest(plan=by_hand))
     ((normal, offset_mm),) = _planes(completed)
     assert normal == list(LEANING)
     assert offset_mm == round(offset_mm)
@@ -209,61 +216,61 @@ def test_an_open_offset_is_found_where_the_most_becomes_safe() -> None:
 
 
 def test_an_open_direction_is_found_for_its_offset() -> None:
-    found = decompose(shapes.branch(), "shape", _profile("search.most_parts=2"), by_hand=_by_hand((None, 20.25)))
+    found = decompose(shapes.branch(), "shape", _profile("search.most_parts=2"), SearchRequest(plan=_by_hand((None, 20.25))))
     assert [plane[1] for plane in _planes(found)] == [20.25]
     assert found.reduction > 0.5
 
 
 def test_a_plane_that_nothing_can_complete_says_why() -> None:
     with pytest.raises(PlanError, match=r"part 2: no offset_mm can be found for it among \d+: .*\d+ because "):
-        decompose(shapes.box(z=8.0), "shape", _profile(), by_hand=_by_hand(((0.98, 0.0, 0.2), None)))
+        decompose(shapes.box(z=8.0), "shape", _profile(), SearchRequest(plan=_by_hand(((0.98, 0.0, 0.2), None))))
     with pytest.raises(PlanError, match="no normal can be found for it, every such plane misses what is left of the model"):
-        decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((None, 99999.0)))
+        decompose(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand((None, 99999.0))))
     with pytest.raises(PlanError, match=r"part 2: offset_mm is 1e-05: 0 or at least 0.03125 is allowed"):
-        decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((None, 1e-5)))
+        decompose(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand((None, 1e-5))))
     with pytest.raises(PlanError, match="part 2 has neither normal nor offset_mm: leave it out"):
-        decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((None, None)))
+        decompose(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand((None, None))))
 
 
 def test_planes_by_hand_stay_and_the_others_are_found() -> None:
     arms, profile = _two_arms(), _profile()
     by_hand = _by_hand((LEANING, 28.25))
-    both = decompose(arms, "shape", profile, by_hand=by_hand)
+    both = decompose(arms, "shape", profile, SearchRequest(plan=by_hand))
     assert _planes(both)[-1] == (list(LEANING), 28.25)
     assert len(both.parts) == 3
     assert both.reduction > 0.9
     assert [row.parts for row in both.front] == list(range(2, len(both.front) + 2))
-    again = decompose(arms, "shape", profile, by_hand=replace(by_hand, front=plan_of(both).front))
+    again = decompose(arms, "shape", profile, SearchRequest(plan=replace(by_hand, front=plan_of(both).front)))
     kept = "the [[front]] of mine.toml is not kept: planes by hand have the others found anew, for every number of parts"
     assert again.notes == (*both.notes, kept)
     with pytest.raises(PlanError, match=r"--parts 1: the planes by hand of mine.toml alone make 2 parts"):
-        decompose(arms, "shape", profile, by_hand=by_hand, parts=1)
+        decompose(arms, "shape", profile, SearchRequest(plan=by_hand, parts=1))
 
 
 def test_planes_by_hand_cut_a_model_that_needs_no_support() -> None:
-    assert _planes(decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((UP, 10.0)))) == [(list(UP), 10.0)]
+    assert _planes(decompose(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand((UP, 10.0))))) == [(list(UP), 10.0)]
 
 
 def test_no_plane_passes_through_a_zone_that_stays_whole() -> None:
     tee = shapes.tee()
     zone = Zone((-20.0, -5.0, 30.0), (-6.0, 5.0, 40.0))
-    kept = decompose(tee, "shape", _profile(), by_hand=_by_hand(zones=Zones(keep=(zone,))))
+    kept = decompose(tee, "shape", _profile(), SearchRequest(plan=_by_hand(zones=Zones(keep=(zone,)))))
     free = decompose(tee, "shape", _profile())
     for part in kept.parts[1:]:
         low, high = zone.spans_mm(part.base.normal[None])[0, 0]
         assert not low < part.base.offset_mm < high
     assert len(free.parts) > len(kept.parts) or kept.cost_mm2 >= free.cost_mm2
     with pytest.raises(PlanError, match=r"its plane would pass through zone 1 of \[\[keep\]\], which stays whole"):
-        cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0), zones=Zones(keep=(zone,))))
+        cut_by_plan(tee, "shape", _profile(), SearchRequest(plan=_by_hand((UP, 35.0), zones=Zones(keep=(zone,)))))
 
 
 def test_seams_keep_out_of_a_zone_where_they_weigh_a_hundred_times() -> None:
     tee = shapes.tee()
     everywhere = Zone((-50.0, -50.0, 0.0), (50.0, 50.0, 50.0))
     assert len(decompose(tee, "shape", _profile()).parts) > 1
-    assert len(decompose(tee, "shape", _profile(), by_hand=_by_hand(zones=Zones(no_seam=(everywhere,)))).parts) == 1
-    by_hand = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0), zones=Zones(no_seam=(everywhere,))))
-    free = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0)))
+    assert len(decompose(tee, "shape", _profile(), SearchRequest(plan=_by_hand(zones=Zones(no_seam=(everywhere,))))).parts) == 1
+    by_hand = cut_by_plan(tee, "shape", _profile(), SearchRequest(plan=_by_hand((UP, 35.0), zones=Zones(no_seam=(everywhere,)))))
+    free = cut_by_plan(tee, "shape", _profile(), SearchRequest(plan=_by_hand((UP, 35.0))))
     assert by_hand.seam_mm == free.seam_mm == pytest.approx(100.0)
     assert by_hand.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.8 * np.linalg.norm([25.0, 10.0, 40.0]) / 100.0 * 100.0)
 
@@ -279,14 +286,14 @@ def _painted_tee() -> Mesh:
 def test_no_plane_passes_through_faces_of_a_colour_that_stay_whole() -> None:
     tee = _painted_tee()
     zones = Zones(keep=(Painted(RED),))
-    kept = decompose(tee, "shape", _profile(), by_hand=_by_hand(zones=zones))
+    kept = decompose(tee, "shape", _profile(), SearchRequest(plan=_by_hand(zones=zones)))
     red = tee.vertices[tee.faces[tee.colours == RED]]
     assert len(kept.parts) > 1
     for part in kept.parts[1:]:
         heights = red @ part.base.normal - part.base.offset_mm
         assert not ((heights.min(axis=1) < -1e-5) & (heights.max(axis=1) > 1e-5)).any()
     with pytest.raises(PlanError, match=r"its plane would pass through zone 1 of \[\[keep\]\], which stays whole"):
-        cut_by_plan(tee, "shape", _profile(), _by_hand(((-0.6, 0.0, 0.8), 31.2), zones=zones))
+        cut_by_plan(tee, "shape", _profile(), SearchRequest(plan=_by_hand(((-0.6, 0.0, 0.8), 31.2), zones=zones)))
 
 
 def test_seams_weigh_a_hundred_times_on_faces_of_a_colour_alone_whatever_earlier_cuts_left_of_them() -> None:
@@ -298,8 +305,8 @@ def test_seams_weigh_a_hundred_times_on_faces_of_a_colour_alone_whatever_earlier
     green_half = (corners[faces].mean(axis=1)[:, 0] < 0.0) & (np.arange(20) >= 8)
     painted = Mesh(corners, faces, np.where(green_half, GREEN, BLUE).astype(np.int32))
     profile, planes = _profile("search.hidden_seam_share=1", "search.seam_mm=0.6"), ((UP, 7.0), (UP, 13.0))
-    green = cut_by_plan(painted, "shape", profile, _by_hand(*planes, zones=Zones(no_seam=(Painted(GREEN),))))
-    free = cut_by_plan(painted, "shape", profile, _by_hand(*planes))
+    green = cut_by_plan(painted, "shape", profile, SearchRequest(plan=_by_hand(*planes, zones=Zones(no_seam=(Painted(GREEN),)))))
+    free = cut_by_plan(painted, "shape", profile, SearchRequest(plan=_by_hand(*planes)))
     assert green.seam_mm == free.seam_mm == pytest.approx(160.0)
     assert green.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.6 * 80.0 * np.linalg.norm([20.0, 20.0, 20.0]) / 100.0)
 
@@ -309,21 +316,21 @@ def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
     with pytest.raises(
         PlanError, match=r"^plan mine.toml: no_seam 1: colour is #00ff00, but shape paints no face: a 3MF, PLY, GLB or STEP"
     ):
-        decompose(shapes.tee(), "shape", _profile(), by_hand=_by_hand(zones=zones))
+        decompose(shapes.tee(), "shape", _profile(), SearchRequest(plan=_by_hand(zones=zones)))
     unknown = "no_seam 2: colour is #abcdef, but no face of shape is painted so; its colours are #0000ff, #00ff00, #ff0000$"
     with pytest.raises(PlanError, match=unknown):
-        cut_by_plan(_painted_tee(), "shape", _profile(), _by_hand((UP, 35.0), zones=zones))
+        cut_by_plan(_painted_tee(), "shape", _profile(), SearchRequest(plan=_by_hand((UP, 35.0), zones=zones)))
 
 
 def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:
     zones = Zones(no_seam=(Zone((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),))
-    found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), by_hand=_by_hand(zones=zones))
+    found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), SearchRequest(plan=_by_hand(zones=zones)))
     assert "[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)" in found.notes
 
 
 def test_the_published_search_starts_from_planes_by_hand_too() -> None:
     profile = _profile("search.method=published", FREE)
-    found = decompose(shapes.tee(), "shape", profile, by_hand=_by_hand((LEANING, 30.0)))
+    found = decompose(shapes.tee(), "shape", profile, SearchRequest(plan=_by_hand((LEANING, 30.0))))
     assert np.allclose(found.parts[-1].base.normal, LEANING)
 
 

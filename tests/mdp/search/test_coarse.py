@@ -11,11 +11,10 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.by_hand import Refusal, cut_near, cut_or_refuse
-from mdp.search.coarse import coarse_copy
 from mdp.search.front import Price
 from mdp.search.orient import orient_and_decompose
 from mdp.search.problem import Problem
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, coarse_copy, decompose
 from mdp.zone import NO_ZONES, Painted, Zone, Zones
 from profiles.profile import Profile, load
 from tests import shapes
@@ -100,7 +99,7 @@ def test_the_model_itself_is_cut_for_about_the_cost_that_its_own_search_finds() 
 
 def test_a_plane_by_hand_stays_where_it_was_laid(fine: Mesh) -> None:
     by_hand = PlanFile("mine", parts=(PlannedPart((0.6, 0.0, 0.8), 32.0),))
-    parts = decompose(fine, "shape", _profile(2000), by_hand=by_hand).parts
+    parts = decompose(fine, "shape", _profile(2000), SearchRequest(plan=by_hand)).parts
     assert ((0.6, 0.0, 0.8), 32.0) in [(tuple(part.base.normal), part.base.offset_mm) for part in parts[1:]]
 
 
@@ -115,7 +114,7 @@ def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itse
 
     def search(mesh: Mesh) -> Decomposition:
         searched.append(mesh)
-        return decompose(mesh, "tee", profile, price=lambda parts: Price(100.0, 1000.0))
+        return decompose(mesh, "tee", profile, SearchRequest(price=lambda parts: Price(100.0, 1000.0)))
 
     oriented = orient_and_decompose(mesh, profile, lambda profile: lambda parts: Price(100.0, 1000.0), search)
     assert oriented.orientation is not None
@@ -125,7 +124,9 @@ def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itse
 
 def test_a_search_that_is_recorded_is_one_of_the_model_itself(fine: Mesh) -> None:
     records = list[bytes]()
-    decompose(fine, "shape", _profile(2000, "search.directions=10", "search.beam_width=1"), on_record=records.append)
+    decompose(
+        fine, "shape", _profile(2000, "search.directions=10", "search.beam_width=1"), SearchRequest(on_record=records.append)
+    )
     assert len(records) == 1
 
 
@@ -151,8 +152,9 @@ def test_a_copy_is_searched_before_the_mesh_itself_is_measured_and_every_phase_i
         fine,
         "post",
         _profile(2000, "search.beam_width=2"),
-        on_stage=lambda progress: heard.append("stage"),
-        on_phase=lambda text: heard.append(text.partition(" of ")[0]),
+        SearchRequest(
+            on_stage=lambda progress: heard.append("stage"), on_phase=lambda text: heard.append(text.partition(" of ")[0])
+        ),
     )
     measured = [k for k, text in enumerate(heard) if text == "measuring overhangs and seams"]
     assert heard[0] == "looking for a copy"

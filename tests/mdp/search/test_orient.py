@@ -19,7 +19,7 @@ from mdp.pose import about
 from mdp.search import orient
 from mdp.search.front import Price, Pricing, Worth
 from mdp.search.orient import Oriented, distinct_orientations, forecast_orientations, orient_and_decompose, total_mm2
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.profile import Profile, load
 from tests.shapes import box, branch, tee
 
@@ -37,7 +37,10 @@ def by_height(profile: Profile) -> Pricing:
 
 def found(mesh: Mesh) -> Oriented:
     return orient_and_decompose(
-        mesh, PROFILE, by_height, partial(decompose, name="mesh", profile=PROFILE, price=by_height(PROFILE))
+        mesh,
+        PROFILE,
+        by_height,
+        partial(decompose, name="mesh", profile=PROFILE, request=SearchRequest(price=by_height(PROFILE))),
     )
 
 
@@ -61,13 +64,13 @@ def test_what_lies_best_stays_as_it_stands() -> None:
 
 @pytest.mark.parametrize("mesh", [tee(), branch(), box(10, 20, 60)], ids=["tee", "branch", "box"])
 def test_laid_down_it_costs_no_more_than_in_one_piece_as_it_stands(mesh: Mesh) -> None:
-    whole = decompose(mesh, "mesh", PROFILE, price=by_height(PROFILE)).front[0]
+    whole = decompose(mesh, "mesh", PROFILE, SearchRequest(price=by_height(PROFILE))).front[0]
     footing_mm2 = forecast_orientations(mesh, PROFILE, by_height)[0].footing_mm2
     assert found(mesh).total_mm2 <= total_mm2(whole, Worth.of(PROFILE)) + footing_mm2
 
 
 def test_a_model_stays_where_turning_it_saves_less_than_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    standing = decompose(tee(), "mesh", PROFILE, price=by_height(PROFILE)).front[0]
+    standing = decompose(tee(), "mesh", PROFILE, SearchRequest(price=by_height(PROFILE))).front[0]
     footing_mm2 = forecast_orientations(tee(), PROFILE, by_height)[0].footing_mm2
     saved_mm2 = total_mm2(standing, Worth.of(PROFILE)) + footing_mm2 - 110.0  # of 100 s and a metre
     for share, turned in ((0.9, True), (1.1, False)):
@@ -95,7 +98,7 @@ def searches(mesh: Mesh, price_by: Callable[[Profile], Pricing]) -> tuple[Orient
 
     def search(mesh: Mesh) -> Decomposition:
         searched.append(mesh)
-        return decompose(mesh, "mesh", PROFILE, price=price_by(PROFILE))
+        return decompose(mesh, "mesh", PROFILE, SearchRequest(price=price_by(PROFILE)))
 
     return orient_and_decompose(mesh, PROFILE, price_by, search), len(searched)
 
@@ -145,7 +148,7 @@ def on_a_small_plate(profile: Profile) -> Pricing:
 
 def test_no_orientation_is_taken_that_the_machine_has_no_room_for() -> None:
     price = on_a_small_plate(PROFILE)
-    search = partial(decompose, name="mesh", profile=PROFILE, price=price)
+    search = partial(decompose, name="mesh", profile=PROFILE, request=SearchRequest(price=price))
     assert orient_and_decompose(tee(), PROFILE, on_a_small_plate, search).orientation is None
 
 
@@ -279,7 +282,9 @@ def test_a_rounded_model_is_offered_straight_along_the_sides_of_its_file() -> No
 
 def test_every_further_part_is_charged_a_share_of_what_one_piece_costs() -> None:
     flat = box(40, 30, 10)
-    halves = decompose(flat, "box", PROFILE, by_hand=PlanFile("", parts=(PlannedPart.of(Plane(np.array([0.0, 0.0, 1.0]), 5.0)),)))
+    halves = decompose(
+        flat, "box", PROFILE, SearchRequest(plan=PlanFile("", parts=(PlannedPart.of(Plane(np.array([0.0, 0.0, 1.0]), 5.0)),)))
+    )
     one = FrontRow((), 1000.0, 0.0, 1000.0, time_s=1000.0, filament_mm=1000.0)  # with time and filament 1200 mm2
     two = FrontRow((), 800.0, 0.0, 800.0, chosen=True, time_s=500.0, filament_mm=1000.0)
     oriented = orient_and_decompose(flat, PROFILE, by_height, lambda mesh: replace(halves, front=(one, two)))

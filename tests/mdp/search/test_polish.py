@@ -12,7 +12,7 @@ from mdp.plane import Plane
 from mdp.search.node import Node
 from mdp.search.polish import make_regular, polish
 from mdp.search.problem import Problem
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.profile import load
 from tests import shapes
 
@@ -32,9 +32,9 @@ def _problem(*settings: str) -> Problem:
 
 
 def _after(problem: Problem, *planes: Plane) -> Node:
-    nodes = problem.replay(problem.root, planes)
-    assert nodes is not None
-    return nodes[-1]
+    node = problem.replay(problem.root, planes)
+    assert node is not None
+    return node
 
 
 def _through(height_mm: float, x_mm: float, normal: Floats = ALONG_X) -> Plane:
@@ -144,5 +144,5 @@ def test_the_plane_at_a_concave_edge_costs_no_more_than_the_best_of_a_grid() -> 
     for elevation_rad in np.radians([0.0, 3.0, 6.0, 9.0]):
         normal = np.array([np.cos(elevation_rad), 0.0, np.sin(elevation_rad)])
         nodes = [problem.replay(problem.root, [Plane(normal, offset_mm)]) for offset_mm in np.arange(-6.0, 6.0, 0.5)]
-        tried += [node[-1].cost_mm2 for node in nodes if node is not None]
-    assert decompose(shapes.branch(), "branch", profile, parts=2).cost_mm2 <= min(tried)
+        tried += [node.cost_mm2 for node in nodes if node is not None]
+    assert decompose(shapes.branch(), "branch", profile, SearchRequest(parts=2)).cost_mm2 <= min(tried)

@@ -22,7 +22,7 @@ from mdp.ranking.candidates import directions
 from mdp.ranking.features import COLUMNS
 from mdp.search.front import Front, Price
 from mdp.search.parts import folded_mm3
-from mdp.search.search import Progress, decompose
+from mdp.search.search import Progress, SearchRequest, decompose
 from profiles.errors import DecompositionError
 from profiles.profile import load
 from tests import shapes
@@ -116,14 +116,14 @@ def test_a_box_is_one_part_and_says_why() -> None:
 
 
 def test_one_part_that_is_asked_for_needs_no_search() -> None:
-    whole = decompose(shapes.branch(), "shape", load(), parts=1)
+    whole = decompose(shapes.branch(), "shape", load(), SearchRequest(parts=1))
     assert (len(whole.parts), whole.rounds, whole.candidates_evaluated) == (1, 0, 0)
     assert whole.chosen is not None
     assert whole.residual_area_mm2 == whole.risky_area_mm2 > 0
 
 
 def test_one_part_that_is_asked_for_costs_what_the_search_counts_for_the_uncut_model() -> None:
-    whole, searched = decompose(shapes.branch(), "shape", load(), parts=1).front[0], _found("branch").front[0]
+    whole, searched = decompose(shapes.branch(), "shape", load(), SearchRequest(parts=1)).front[0], _found("branch").front[0]
     assert (whole.support_area_mm2, whole.cost_mm2) == (searched.support_area_mm2, searched.cost_mm2)
     assert whole.support_area_mm2 > 0.0
 
@@ -157,7 +157,7 @@ def test_a_pedestal_makes_low_cuts_printable() -> None:
 def test_a_record_holds_the_search_and_changes_nothing() -> None:
     profile = load(settings=["search.directions=100", "search.beam_width=2", "search.polish=false"])
     records: list[bytes] = []
-    decomposition = decompose(shapes.tee(), "tee", profile, on_record=records.append)
+    decomposition = decompose(shapes.tee(), "tee", profile, SearchRequest(on_record=records.append))
     record = np.load(io.BytesIO(records[0]))
     assert decomposition.residual_area_mm2 == decompose(shapes.tee(), "tee", profile).residual_area_mm2
     assert record["node_outcome"][0] * decomposition.risky_area_mm2 == pytest.approx(decomposition.cost_mm2, abs=1e-6)
@@ -211,7 +211,12 @@ def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr("mdp.search.beam.ahead", note)
     with pytest.raises(KeyboardInterrupt):
-        decompose(shapes.branch(), "branch", load(settings=["search.beam_width=8", "search.directions=200"]), on_stage=interrupt)
+        decompose(
+            shapes.branch(),
+            "branch",
+            load(settings=["search.beam_width=8", "search.directions=200"]),
+            SearchRequest(on_stage=interrupt),
+        )
     assert len(begun) > 2
     assert wait(begun, timeout=60).not_done == set()
 
@@ -259,7 +264,7 @@ def test_directions_are_spread_over_the_cap() -> None:
 def test_the_least_outcome_on_record_is_the_result(method: str) -> None:
     words = (f"search.method={method}", "search.objective=risky", "search.polish=false", "search.directions=100")
     records: list[bytes] = []
-    decomposition = decompose(shapes.ball(), "ball", load(settings=words), on_record=records.append)
+    decomposition = decompose(shapes.ball(), "ball", load(settings=words), SearchRequest(on_record=records.append))
     with np.load(io.BytesIO(records[0])) as record:
         outcomes = record["node_outcome"]
     assert outcomes.min() == outcomes[0] == pytest.approx(decomposition.residual_area_mm2 / decomposition.risky_area_mm2)
@@ -269,7 +274,7 @@ def test_the_least_outcome_on_record_is_the_result(method: str) -> None:
 def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
     words = ("search.method=published", "search.objective=risky", "search.directions=100", "search.beam_width=3")
     records: list[bytes] = []
-    decompose(shapes.tee(), "tee", load(settings=words), on_record=records.append)
+    decompose(shapes.tee(), "tee", load(settings=words), SearchRequest(on_record=records.append))
     with np.load(io.BytesIO(records[0])) as record:
         assert record["stage"].tolist() == [1, 1, 1]
         assert record["child"].tolist() == [1, 2, 3]
@@ -288,10 +293,15 @@ def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best(method:
 
 def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_needs_support_tells_nothing() -> None:
     told: list[int] = []
-    decompose(shapes.tee(), "tee", load(settings=["search.directions=60"]), on_stage=lambda progress: told.append(progress.stage))
+    decompose(
+        shapes.tee(),
+        "tee",
+        load(settings=["search.directions=60"]),
+        SearchRequest(on_stage=lambda progress: told.append(progress.stage)),
+    )
     assert told[:2] == [0, 1]
     told.clear()
-    decompose(shapes.box(10.0, 10.0, 10.0), "box", load(), on_stage=lambda progress: told.append(progress.stage))
+    decompose(shapes.box(10.0, 10.0, 10.0), "box", load(), SearchRequest(on_stage=lambda progress: told.append(progress.stage)))
     assert told == []
 
 
@@ -304,16 +314,16 @@ def test_a_cut_through_the_bulk_of_a_model_is_made_only_on_demand() -> None:
     def price(parts: Sequence[Part]) -> Price:
         return Price(10.0 * len(parts), 100.0)
 
-    chosen = decompose(shapes.from_manifold(rimmed), "rimmed", profile, price=price)
+    chosen = decompose(shapes.from_manifold(rimmed), "rimmed", profile, SearchRequest(price=price))
     assert len(chosen.parts) == 1
-    asked = decompose(shapes.from_manifold(rimmed), "rimmed", profile, price=price, parts=2)
+    asked = decompose(shapes.from_manifold(rimmed), "rimmed", profile, SearchRequest(price=price, parts=2))
     assert len(asked.parts) == 2
 
 
 @pytest.mark.parametrize(("solid", "parts"), [(shapes.tee(), 2), (shapes.branch(), 2), (random_solid(3), 4)])
 def test_a_model_costs_the_same_within_2_percent_however_it_is_turned_about_z(solid: Mesh, parts: int) -> None:
     profile, turns = load(settings=("search.directions=150",)), [about(UP, np.radians(deg)) for deg in (0.0, 37.0, 211.0)]
-    costs = [decompose(standing_still(solid, turn), "", profile, parts=parts).cost_mm2 for turn in turns]
+    costs = [decompose(standing_still(solid, turn), "", profile, SearchRequest(parts=parts)).cost_mm2 for turn in turns]
     assert costs[1:] == pytest.approx([costs[0]] * 2, rel=0.02)
 
 

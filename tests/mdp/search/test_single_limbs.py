@@ -16,10 +16,9 @@ from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
-from mdp.search.by_plan import cut_by_plan
 from mdp.search.polish import make_regular
 from mdp.search.problem import Problem
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.search.trial import Trials
 from profiles.errors import PlanError
 from profiles.profile import Profile, load
@@ -37,7 +36,7 @@ def _profile(**search: object) -> Profile:
 
 
 def _by_hand(mesh: Mesh, part: PlannedPart) -> Decomposition:
-    return cut_by_plan(mesh, "bar", _profile(), PlanFile("plan.toml", parts=(part,)))
+    return cut_by_plan(mesh, "bar", _profile(), SearchRequest(plan=PlanFile("plan.toml", parts=(part,))))
 
 
 @cache
@@ -65,7 +64,7 @@ def test_a_plan_brings_back_the_same_limb(tmp_path: Path) -> None:
     mesh, found = shapes.bar_beside_a_tower(), _searched()
     (tmp_path / "plan.toml").write_text(plan_text(plan_of(found)))
     plan = read_plan(tmp_path / "plan.toml")
-    again = cut_by_plan(mesh, "bar", _profile(), plan)
+    again = cut_by_plan(mesh, "bar", _profile(), SearchRequest(plan=plan))
     assert again.cost_mm2 == pytest.approx(found.cost_mm2)
     assert [part.volume_mm3 for part in again.parts] == pytest.approx([part.volume_mm3 for part in found.parts])
     assert plan.front == plan_of(again).front
@@ -93,7 +92,7 @@ def test_a_point_far_from_the_only_piece_above_the_plane_is_refused_too() -> Non
 def test_a_limb_that_is_cut_off_already_is_not_taken_for_another_one() -> None:
     twice = PlanFile("plan.toml", parts=(BAR, BAR))
     with pytest.raises(PlanError, match="part 2 cannot be cut off: no piece above its plane lies at 27, 0, 54"):
-        cut_by_plan(shapes.bar_beside_a_tower(), "bar", _profile(), twice)
+        cut_by_plan(shapes.bar_beside_a_tower(), "bar", _profile(), SearchRequest(plan=twice))
 
 
 def test_a_trial_refuses_a_limb_that_would_leave_something_in_the_air() -> None:
@@ -119,7 +118,7 @@ def test_a_limb_may_be_cut_off_in_the_plane_of_the_plate_that_the_others_stand_o
     mesh = shapes.bar_beside_a_tower(gap=27.0)
     at_the_plate = PlannedPart((0.0, 0.0, 1.0), 4.0, limbs_mm=((0.0, 33.0, 75.0),))
     anything = _profile(fragile_mm=0.0, clearance=False)
-    parts = cut_by_plan(mesh, "bar", anything, PlanFile("plan.toml", parts=(at_the_plate,))).parts
+    parts = cut_by_plan(mesh, "bar", anything, SearchRequest(plan=PlanFile("plan.toml", parts=(at_the_plate,)))).parts
     assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 71)
 
 
@@ -139,13 +138,15 @@ def test_a_limb_out_of_reach_of_the_axes_is_refused_for_that_and_not_for_what_st
     axes = {axis: getattr(profile.machine, axis).model_copy(update=limits) for axis in ("x", "y")}
     narrow = profile.model_copy(update={"machine": profile.machine.model_copy(update=axes)})
     with pytest.raises(PlanError, match="would go from"):
-        cut_by_plan(shapes.bar_beside_a_tower(), "bar", narrow, PlanFile("p", parts=(BAR,)))
+        cut_by_plan(shapes.bar_beside_a_tower(), "bar", narrow, SearchRequest(plan=PlanFile("p", parts=(BAR,))))
 
 
 def test_a_point_at_the_foot_of_a_limb_means_that_limb() -> None:
     foot = PlannedPart((0.0, 0.0, 1.0), 40.0, limbs_mm=((-6.0, 33.0, 40.0),))
     anything = _profile(fragile_mm=0.0, clearance=False)
-    parts = cut_by_plan(shapes.bar_beside_a_tower(gap=27.0), "bar", anything, PlanFile("p", parts=(foot,))).parts
+    parts = cut_by_plan(
+        shapes.bar_beside_a_tower(gap=27.0), "bar", anything, SearchRequest(plan=PlanFile("p", parts=(foot,)))
+    ).parts
     assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 35)
 
 
@@ -154,7 +155,7 @@ def test_a_limb_with_many_voids_is_one_limb() -> None:
     hollow = shapes.from_manifold(solid_of(shapes.bar_beside_a_tower(gap=27.0)) - m3.Manifold.batch_boolean(voids, m3.OpType.Add))
     tower = PlannedPart((0.0, 0.0, 1.0), 10.0, limbs_mm=((0.0, 39.0, 75.0),))
     anything = _profile(fragile_mm=0.0, clearance=False, nozzle_load_n=0.0)
-    parts = cut_by_plan(hollow, "bar", anything, PlanFile("p", parts=(tower,))).parts
+    parts = cut_by_plan(hollow, "bar", anything, SearchRequest(plan=PlanFile("p", parts=(tower,)))).parts
     assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 65 - 7 * 8)
 
 
@@ -211,8 +212,8 @@ def test_limbs_that_are_nearly_each_other_s_mirror_image_become_it() -> None:
     mesh = shapes.from_manifold(solid)
     problem = Problem(mesh, _profile())
     planes = [limb(mesh, [(x, 0.0, 24.0)], (0.0, 0.0, z)) for x, z in ((-35.0, 10.0), (35.0, 10.3))]
-    nodes = problem.replay(problem.root, planes)
-    assert nodes is not None
-    even = make_regular(problem, nodes[-1], find_mirrors(mesh))
+    node = problem.replay(problem.root, planes)
+    assert node is not None
+    even = make_regular(problem, node, find_mirrors(mesh))
     assert [cut.base.offset_mm for cut in even.cuts] == [10.0, 10.0]
-    assert even.remainder.mesh.volume_mm3 == pytest.approx(nodes[-1].remainder.mesh.volume_mm3, abs=20.0)
+    assert even.remainder.mesh.volume_mm3 == pytest.approx(node.remainder.mesh.volume_mm3, abs=20.0)

@@ -7,7 +7,7 @@ import pytest
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
-from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.search.trial import Trials
 from profiles.profile import load
 from tests.shapes import box, hollow_tee, standing, tee
@@ -23,7 +23,7 @@ def trials(mesh: Mesh) -> Trials:
 def test_figures_are_those_of_the_cuts_themselves() -> None:
     mesh, tried = tee(), trials(tee()).attempt(ARMS)
     plan = PlanFile("", parts=tuple(PlannedPart(tuple(plane.normal.tolist()), plane.offset_mm) for plane in ARMS))
-    cut = cut_by_plan(mesh, "tee", PROFILE, plan)
+    cut = cut_by_plan(mesh, "tee", PROFILE, SearchRequest(plan=plan))
     assert [part.volume_mm3 for part in tried.parts if part] == pytest.approx([part.volume_mm3 for part in cut.parts[1:]])
     assert tried.seam_mm == pytest.approx(sum(part.rim_mm for part in tried.parts if part)) == pytest.approx(cut.seam_mm)
     assert cut.chosen is not None
@@ -34,7 +34,7 @@ def test_figures_on_a_pedestal_are_those_of_the_cuts_too() -> None:
     lifted = PROFILE.model_copy(update={"search": PROFILE.search.model_copy(update={"pedestal_mm": 12.0})})
     low = Plane(np.array([0.0, 0.0, 1.0]), 16.0)  # 4 mm above the pedestal
     tried = Trials(tee(), lifted).attempt((low,))
-    cut = cut_by_plan(tee(), "tee", lifted, PlanFile("", parts=(PlannedPart((0.0, 0.0, 1.0), 16.0),)))
+    cut = cut_by_plan(tee(), "tee", lifted, SearchRequest(plan=PlanFile("", parts=(PlannedPart((0.0, 0.0, 1.0), 16.0),))))
     assert [part.volume_mm3 for part in tried.parts if part] == pytest.approx([100.0 * 26.0 + 400.0 * 10.0])
     assert tried.seam_mm == pytest.approx(cut.seam_mm) == pytest.approx(40.0)
     assert cut.chosen is not None
@@ -46,7 +46,7 @@ def test_cuts_that_meet_each_other_have_their_own_figures_too() -> None:
     planes = [Plane(np.array(normal) / np.linalg.norm(normal), offset_mm) for normal, offset_mm in leaning]
     tried = trials(tee()).attempt(planes)
     plan = PlanFile("", parts=tuple(PlannedPart(tuple(plane.normal.tolist()), plane.offset_mm) for plane in planes))
-    cut = cut_by_plan(tee(), "tee", PROFILE, plan)
+    cut = cut_by_plan(tee(), "tee", PROFILE, SearchRequest(plan=plan))
     assert [part.volume_mm3 for part in tried.parts if part] == pytest.approx([part.volume_mm3 for part in cut.parts[1:]])
     assert [part.support_mm2 for part in tried.parts if part] == pytest.approx([part.risky_area_mm2 for part in cut.parts[1:]])
     assert (tried.support_area_mm2, tried.seam_mm) == pytest.approx((cut.residual_area_mm2, cut.seam_mm))

@@ -53,12 +53,6 @@ def test_a_part_with_a_piece_on_a_thread_is_refused() -> None:
     profile = load(settings=["search.clearance=false", "search.least_volume_share=0"])
     for side, reason in ((1.5, Reason.INTERFACE), (2.5, Reason.FEASIBLE)):
         mesh = _two_towers(side, 15)
-        limits = bounds_of(
-            UP,
-            disc=platform_disc(mesh, profile.search),
-            volume_mm3=mesh.volume_mm3,
-            machine=profile.machine,
-            search=profile.search,
-        )
-        checked = check(_remainder(mesh), limits, profile.search, np.zeros(1, np.int32), np.array([14.0]))
+        limits = bounds_of(UP, mesh, profile, platform_disc(mesh, profile.search))
+        checked = check(_remainder(mesh), limits, profile.search.offset_step_mm, np.zeros(1, np.int32), np.array([14.0]))
         assert (checked.reason[0], checked.contact_area_mm2[0]) == (reason, pytest.approx(side**2))

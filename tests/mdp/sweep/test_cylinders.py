@@ -13,7 +13,7 @@ from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.pose import about, unit
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from mdp.sweep.cylinders import Cylinder, crossings, find_cylinders, spoiled_by_cuts
 from profiles.profile import load
 
@@ -131,7 +131,10 @@ def test_a_cut_askew_through_a_bore_costs_what_the_settings_say_and_is_told() ->
     for planned, sine in ((askew, 0.8), (level, float(np.sqrt(1.0 - across**2)))):
         free, dear = (
             decompose(
-                post, "post", load(settings=[f"search.feature_mm2={cost_mm2}"]), by_hand=PlanFile("", parts=(planned,)), parts=2
+                post,
+                "post",
+                load(settings=[f"search.feature_mm2={cost_mm2}"]),
+                SearchRequest(plan=PlanFile("", parts=(planned,)), parts=2),
             )
             for cost_mm2 in (0.0, 300.0)
         )

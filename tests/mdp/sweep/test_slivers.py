@@ -9,7 +9,7 @@ from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.ranking.candidate_table import CandidateTable, Model, Situation
-from mdp.ranking.candidates import Reason, bounds_of, check, platform_disc, score_candidates
+from mdp.ranking.candidates import Reason, bounds_of, platform_disc, score_candidates
 from mdp.sweep.slivers import SLIVER_COSINE, least_distance_mm
 from mdp.sweep.sweep import Remainder, sweep
 from profiles.profile import load
@@ -110,16 +110,8 @@ def _table(mesh: Mesh, fragile_mm: float = 1.0) -> CandidateTable:
     """All candidates of a solid along the upright direction."""
     words = ("clearance=false", "least_interface_mm2=0", "least_volume_share=0", f"fragile_mm={fragile_mm}")
     profile = load(settings=[f"search.{word}" for word in words])
-    limits = bounds_of(
-        UP[None],
-        disc=platform_disc(mesh, profile.search),
-        volume_mm3=mesh.volume_mm3,
-        machine=profile.machine,
-        search=profile.search,
-    )
-    step_mm, terms = profile.search.offset_step_mm, CostTerms(45.0, False)
-    scored = score_candidates(_remainder(mesh), limits, terms, step_mm=step_mm, least_gain_mm2=-np.inf)
+    limits = bounds_of(UP[None], mesh, profile, platform_disc(mesh, profile.search))
+    terms = CostTerms(45.0, False)
+    scored = score_candidates(_remainder(mesh), limits, terms, -np.inf)
     situation = Situation(Model(1.0, mesh.volume_mm3, 1.0), 0.0, 0.0, 0.0, 1.0, 0.0, mesh.volume_mm3, 0, UP)
-    return CandidateTable(
-        scored, limits, situation, check=lambda *planes: check(scored.remainder, limits, profile.search, *planes)
-    )
+    return CandidateTable(scored, situation)

@@ -12,8 +12,7 @@ from machine.app.workbench.session.base import SessionBase, asking
 from machine.app.workbench.session.readiness import Readiness
 from mdp.plane import Plane
 from mdp.search.neck import REACH_DEG, REACH_SHARE
-from mdp.search.obstacle import Obstacle
-from mdp.search.trial import Trial
+from mdp.search.trial import Obstacle, Trial
 from profiles.errors import PlanError
 
 REST_S = 0.1  # how long a hand must rest before what it holds is tried more closely

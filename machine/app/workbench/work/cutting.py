@@ -28,9 +28,8 @@ from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
-from mdp.search.by_plan import cut_by_plan
 from mdp.search.orient import orient_and_decompose
-from mdp.search.search import Progress, decompose
+from mdp.search.search import Progress, SearchRequest, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
 
@@ -92,7 +91,9 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
             tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
 
         by_hand = with_shapes(bench, locked, candidate)
-        return decompose(candidate, name, profile, ranker=way.ranker, on_stage=show, on_phase=say, by_hand=by_hand, price=price)
+        return decompose(
+            candidate, name, profile, SearchRequest(ranker=way.ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
+        )
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if way.orient and untouched and lies_freely(profile):
@@ -167,7 +168,9 @@ def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decompositi
     mesh, name = turned_mesh(bench, plan), _name(bench)
     compilers.wait_for(compilers.JUDGE)
     marked = with_shapes(bench, plan, mesh)
-    return cut_by_plan(mesh, name, bench.profile, marked, price=pricing(bench.profile.of_all_parts) if prices else None)
+    return cut_by_plan(
+        mesh, name, bench.profile, SearchRequest(plan=marked, price=pricing(bench.profile.of_all_parts) if prices else None)
+    )
 
 
 def with_shapes(bench: Bench, plan: PlanFile, mesh: Mesh) -> PlanFile:

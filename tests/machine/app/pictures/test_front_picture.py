@@ -8,7 +8,7 @@ from machine.app.pictures.front_picture import BORDER, front_picture
 from machine.view.parts import part_colours
 from mdp.decomposition import FrontRow
 from mdp.plans.plan_file import PlanFile, PlannedPart
-from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import SearchRequest, cut_by_plan
 from tests.machine.app.pictures.test_picture import PROFILE, share_like
 from tests.shapes import branch
 
@@ -17,7 +17,7 @@ ARM = PlannedPart((1.0, 0.0, 0.0), 10.0)
 
 
 def test_every_row_has_a_frame_with_its_parts_in_colour_and_the_one_taken_a_border() -> None:
-    tree = cut_by_plan(branch(70.0), "branch", PROFILE, PlanFile("", parts=(ARM,)))
+    tree = cut_by_plan(branch(70.0), "branch", PROFILE, SearchRequest(plan=PlanFile("", parts=(ARM,))))
     rows = (FrontRow((), 100.0, 0.0, 100.0), replace(tree.front[-1], chosen=True))
     sheet = front_picture(replace(tree, front=rows), PROFILE, PIXELS)
     assert sheet.shape == (PIXELS + TITLE, 2 * PIXELS, 3)

@@ -19,7 +19,7 @@ from machine.app.pipeline.plate import on_one_plate
 from machine.program import Alternative, Program, joints_of_print
 from mdp.cut import mesh_of
 from mdp.plans.plan_file import PlanFile
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from mdp.zone import Modifier, Zone, Zones
 from profiles.profile import Profile, load
 from tests.machine.app.terminal.test_report import alone
@@ -63,10 +63,10 @@ def test_an_alternative_that_the_machine_cannot_print_stays_in_the_list_with_the
 def test_marks_and_modifiers_hold_for_the_model_in_one_part_too_as_it_lies() -> None:
     profile, over_arm = load(settings=COARSE), Zone((5.5, -99.0, 24.0), (99.0, 99.0, 99.0))
     zones = Zones(no_support=(over_arm,), modifiers=(Modifier(Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)), {"walls": 3}),))
-    marked = decompose(tee(), "tee", profile, by_hand=PlanFile("plan.toml", zones=zones), parts=1)
+    marked = decompose(tee(), "tee", profile, SearchRequest(plan=PlanFile("plan.toml", zones=zones), parts=1))
     ways = in_one_part(marked, profile)
-    plain = in_one_part(decompose(tee(), "tee", profile, parts=1), profile)
-    thick = in_one_part(decompose(tee(), "tee", profile, parts=1), load(settings=[*COARSE, "process.walls=3"]))
+    plain = in_one_part(decompose(tee(), "tee", profile, SearchRequest(parts=1)), profile)
+    thick = in_one_part(decompose(tee(), "tee", profile, SearchRequest(parts=1)), load(settings=[*COARSE, "process.walls=3"]))
     own_mm = [[way.filament_mm - way.support_mm3 / FILAMENT_MM2 for way in each] for each in (ways, plain, thick)]
     assert own_mm[0] == pytest.approx(own_mm[2], rel=0.02)
     assert min(many / few for many, few in zip(own_mm[0], own_mm[1], strict=True)) > 1.2
@@ -76,7 +76,7 @@ def test_marks_and_modifiers_hold_for_the_model_in_one_part_too_as_it_lies() -> 
 def test_copies_are_laid_down_each_for_itself() -> None:
     profile = load(settings=COARSE)
     cross = Manifold.cube((8, 8, 30), True) + Manifold.cube((30, 8, 8), True)  # nothing of it overhangs where it lies on its side
-    single = decompose(standing(cross), "cross", profile, parts=1)
+    single = decompose(standing(cross), "cross", profile, SearchRequest(parts=1))
     many, plated = on_one_plate([single] * 2, profile)
     one, two = in_one_part(single, profile)[1], in_one_part(many, plated)[1]
     assert (two.message, two.orientation) == ("", one.orientation)

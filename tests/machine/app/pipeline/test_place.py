@@ -14,7 +14,7 @@ from machine.planning.fit import places_on_plate, standing_at
 from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.plans.plan_file import PlanFile, PlannedPart
-from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.zone import Marked, Zone
 from profiles.errors import MoveError, PlanError
 from profiles.profile import Profile, load
@@ -33,7 +33,7 @@ def at(x: float, y: float, *settings: str) -> Profile:
 
 
 def in_arms(profile: Profile) -> Decomposition:
-    return cut_by_plan(tee(), "T", profile, ARM)
+    return cut_by_plan(tee(), "T", profile, SearchRequest(plan=ARM))
 
 
 @cache

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from machine.app.pipeline.pricing import pricing
 from mdp.mesh import Mesh
-from mdp.search.search import decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.profile import load
 from tests import shapes
 
@@ -13,7 +13,7 @@ COARSE = ("search.directions=200", "process.layer_height_mm=0.3")
 
 def test_every_row_that_costs_less_than_those_with_fewer_parts_has_a_price() -> None:
     profile = load(settings=COARSE)
-    front = decompose(shapes.branch(), "branch", profile, price=pricing(profile)).front
+    front = decompose(shapes.branch(), "branch", profile, SearchRequest(price=pricing(profile))).front
     assert [row.parts for row in front] == [1, 2]
     assert all(row.time_s is not None and row.time_s > 60.0 and row.filament_mm is not None for row in front)
 
@@ -30,7 +30,7 @@ def test_the_dearer_a_second_the_quicker_the_print() -> None:
     for second_mm2 in (0.0, 1.0, 100.0):
         own = ["search.metre_mm2=0", f"search.second_mm2={second_mm2}"]
         profile = load(settings=[*COARSE, *own])
-        chosen = decompose(shapes.branch(), "branch", profile, price=pricing(profile)).chosen
+        chosen = decompose(shapes.branch(), "branch", profile, SearchRequest(price=pricing(profile))).chosen
         times_s.append(0.0 if chosen is None or chosen.time_s is None else chosen.time_s)
     assert times_s == sorted(times_s, reverse=True)
     assert times_s[0] > times_s[-1]

@@ -18,8 +18,8 @@ from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, PlannedPart
-from mdp.search.by_plan import cut_by_plan
 from mdp.search.parts import one_piece
+from mdp.search.search import SearchRequest, cut_by_plan
 from profiles.errors import MoveError, ProfileError
 from profiles.profile import Profile, load
 from slicer.estimate.estimate import estimate
@@ -41,7 +41,7 @@ def coarse(*settings: str) -> Profile:
 def printed(*settings: str) -> Program:
     """A T in two parts, the second printed sideways."""
     profile = coarse(*settings)
-    return build(cut_by_plan(tee(), "T", profile, ARM), profile)
+    return build(cut_by_plan(tee(), "T", profile, SearchRequest(plan=ARM)), profile)
 
 
 def alone(mesh: Mesh, profile: Profile) -> Decomposition:
@@ -150,7 +150,7 @@ def test_a_raft_and_a_pedestal_are_refused_together() -> None:
 
 def test_what_is_lifted_and_lowered_is_what_it_was() -> None:
     profile = coarse()
-    model = cut_by_plan(tee(), "T", profile, ARM)
+    model = cut_by_plan(tee(), "T", profile, SearchRequest(plan=ARM))
     back = standing_at(standing_at(model, (0.0, 0.0), 0.75), (0.0, 0.0), -0.75)
     assert [part.on_platform for part in back.parts] == [True, False]
     assert back.mesh.vertices == pytest.approx(model.mesh.vertices)
