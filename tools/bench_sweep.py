@@ -17,18 +17,9 @@ from mdp.read import read_mesh
 from mdp.search.problem import Problem
 from mdp.sweep.components import View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
-from mdp.sweep.integrals import (
-    Areas,
-    Needs,
-    OffsetGrid,
-    Overhangs,
-    find_heights,
-    find_lowest,
-    integrate_risky_area,
-    integrate_volume,
-)
+from mdp.sweep.integrals import OffsetGrid, find_heights, find_lowest, integrate_risky_area, integrate_volume
 from mdp.sweep.slivers import find_slivers
-from mdp.sweep.sweep import NeedsTable, Remainder, gains, sweep
+from mdp.sweep.sweep import Remainder, gains, scars_of, sweep
 from profiles.profile import Profile, load
 from tools.bench_search import on_cores, sampled_bounds
 
@@ -64,21 +55,18 @@ def pieces_of_work(
     remainder: Remainder, watched: Floats, directions: Floats, step: float, angle: float
 ) -> dict[str, Callable[[], object]]:
     """Every kernel for all directions, on one thread."""
-    facets, columns, rows, topology = remainder.facets, remainder.most_columns(step), remainder.rows, remainder.topology
-    heights, counts = _all_heights(rows.points, directions, step)
-    cosines = np.ascontiguousarray(directions @ rows.vertex_normals)
-    areas, lost = facets.mesh.areas_mm2, np.zeros(0, np.bool_)
-    surface = Overhangs(facets.points, facets.corners, facets.normals, areas, facets.risky, angle, lost)
-    needs = NeedsTable(facets.sources, remainder.classes(directions), remainder.weight)
+    layout, columns = remainder.layout, remainder.most_columns(step)
+    heights, counts = _all_heights(layout.faces.points, directions, step)
+    cosines, scars = np.ascontiguousarray(directions @ layout.vertex_normals), scars_of(remainder, directions, angle)
     grids = (directions, heights, counts, step, columns)
     return {
-        "heights": lambda: _all_heights(rows.points, directions, step),
-        "risky areas (gains)": lambda: _risks(surface, needs, grids),
-        "section and volume": lambda: _volumes(rows, grids),
-        "lowest point": lambda: _lowest(rows, grids, watched),
-        "slivers": lambda: _slivers(rows, grids, cosines),
-        "pieces below": lambda: _pieces(rows, topology, grids, cosines, False),
-        "pieces below and contact areas above": lambda: _pieces(rows, topology, grids, cosines, True),
+        "heights": lambda: _all_heights(layout.faces.points, directions, step),
+        "risky areas (gains)": lambda: _risks(scars, grids),
+        "section and volume": lambda: _volumes(layout, grids),
+        "lowest point": lambda: _lowest(layout, grids, watched),
+        "slivers": lambda: _slivers(layout, grids, cosines),
+        "pieces below": lambda: _pieces(layout, grids, cosines, False),
+        "pieces below and contact areas above": lambda: _pieces(layout, grids, cosines, True),
         "gains, whole": lambda: gains(remainder, directions, step, angle),
         "sweep, whole": lambda: sweep(remainder, directions, step, watched),
     }
@@ -98,55 +86,54 @@ def _all_heights(points, directions, step):  # type: ignore[no-untyped-def]
 
 
 @numba.njit
-def _risks(surface, needs, grids):  # type: ignore[no-untyped-def]
+def _risks(scars, grids):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, columns = grids
-    areas = Areas(np.zeros(columns), np.zeros(columns), np.zeros(columns))
-    scratch = np.zeros((2, len(surface.risky) + 1), np.int32)
+    areas = np.zeros(columns), np.zeros(columns), np.zeros(columns)
+    scratch = np.zeros((2, len(scars.faces.risky) + 1), np.int32)
     for k in range(len(directions)):
-        grid = OffsetGrid(directions[k], heights[k], counts[k], step)
-        integrate_risky_area(surface, Needs(needs.sources, needs.classes[k], needs.weight), grid, scratch, areas)
+        integrate_risky_area(scars, k, OffsetGrid(directions[k], heights[k], counts[k], step), scratch, areas)
 
 
 @numba.njit
-def _volumes(rows, grids):  # type: ignore[no-untyped-def]
+def _volumes(layout, grids):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, columns = grids
     section, volume = np.zeros(columns), np.zeros(columns)
     for k in range(len(directions)):
-        integrate_volume(rows, OffsetGrid(directions[k], heights[k], counts[k], step), section, volume)
+        integrate_volume(layout, OffsetGrid(directions[k], heights[k], counts[k], step), section, volume)
 
 
 @numba.njit
-def _lowest(rows, grids, watched):  # type: ignore[no-untyped-def]
+def _lowest(layout, grids, watched):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, columns = grids
     lowest = np.empty(columns)
     for k in range(len(directions)):
         lowest[:] = np.inf
         grid = OffsetGrid(directions[k], heights[k], counts[k], step)
-        find_lowest(rows.points[2], rows.rising_edges, grid, watched[k], lowest)
+        find_lowest(layout.faces.points[2], layout.rising_edges, grid, watched[k], lowest)
 
 
 @numba.njit
-def _slivers(rows, grids, cosines):  # type: ignore[no-untyped-def]
+def _slivers(layout, grids, cosines):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, columns = grids
-    normals, fragile = rows.vertex_normals, np.zeros(columns)
+    normals, fragile = layout.vertex_normals, np.zeros(columns)
     for k in range(len(directions)):
         dot(normals[0], normals[1], normals[2], directions[k], cosines[k])
-        find_slivers(rows, OffsetGrid(directions[k], heights[k], counts[k], step), cosines[k], fragile)
+        find_slivers(layout, OffsetGrid(directions[k], heights[k], counts[k], step), cosines[k], fragile)
 
 
 @numba.njit
-def _pieces(rows, topology, grids, cosines, above):  # type: ignore[no-untyped-def]
+def _pieces(layout, grids, cosines, above):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, columns = grids
     pieces, contact_area = np.zeros(columns, np.int32), np.zeros(columns)
-    scratch, wanted = np.empty(rows.points.shape[1], np.int32), np.zeros(columns, np.int32)
+    scratch, wanted = np.empty(layout.faces.points.shape[1], np.int32), np.zeros(columns, np.int32)
     for k in range(len(directions)):
-        critical = scratch[: find_critical(cosines[k], rows.flatness, heights[k], topology.rings, scratch)]
+        critical = scratch[: find_critical(cosines[k], layout.flatness, heights[k], layout.rings, scratch)]
         view = View(OffsetGrid(directions[k], heights[k], counts[k], step), cosines[k], critical)
-        count_pieces(topology, view, pieces)
+        count_pieces(layout, view, pieces)
         if above:
             for column in range(counts[k]):
                 wanted[column] = pieces[column] == 0
-            find_contact_areas(rows, topology, view, 2.0, wanted[: counts[k]], contact_area)
+            find_contact_areas(layout, view, 2.0, wanted[: counts[k]], contact_area)
 
 
 if __name__ == "__main__":

@@ -169,7 +169,7 @@ class Problem:
             residual_mm2=node.residual_mm2,
             lost_mm2=node.lost_mm2,
             risky_mm2=node.risky_mm2,
-            hopeless_mm2=0.0 if hopeless is None else float(remainder.facets.counted_mm2[hopeless].sum()),
+            hopeless_mm2=0.0 if hopeless is None else float(remainder.facets.faces.counted_mm2[hopeless].sum()),
             volume_mm3=float(node.solid.volume()),
             cuts=len(node.cuts),
             last=node.planes[-1].normal if node.cuts else UP,

@@ -13,7 +13,8 @@ from math import inf
 import numpy as np
 
 from mdp.clearance import lowest_body, places_met
-from mdp.cost.part_forecast import ModelForecast, PartForecast
+from mdp.cost.forecast import Surface
+from mdp.cost.part_forecast import PartForecast, forecast_parts
 from mdp.cut import Solid, above, below, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP
@@ -82,7 +83,7 @@ class Trials:
         lifted = on_pedestal(mesh, profile.search.pedestal_mm)
         self._problem = problem = Problem(lifted, with_search(profile, hidden_seam_share=1.0), zones)
         root = problem.root
-        self._forecast = ModelForecast.of(root.remainder, root.seam_weights, problem.terms)
+        self._surface = Surface.of(root.remainder, problem.terms, root.seam_weights)
         self._cut: list[tuple[Key, Node]] = []  # of the last trial, in the order of its cuts
 
     def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
@@ -179,13 +180,13 @@ class Trials:
         return child if isinstance(child, Refusal) else None
 
     def _allowed(self, order: Sequence[Plane], unchecked: int) -> Trial:
-        parts, left_mm2 = self._forecast.parts(self._named(order))
+        parts, left_mm2 = forecast_parts(self._surface, self._named(order))
         support_mm2, seam_mm = left_mm2 + sum(part.support_mm2 for part in parts), sum(part.rim_mm for part in parts)
         return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=unchecked)
 
     def _refused(self, order: Sequence[Plane], done: int, why: Refusal) -> Trial:
         """What is known where the plane after the first `done` cannot be cut."""
-        parts, _ = self._forecast.parts(self._named(order[:done]))
+        parts, _ = forecast_parts(self._surface, self._named(order[:done]))
         obstacle = find_refused(self._problem, self._node, order[done], why)
         return Trial((*[None] * (len(order) - done), *parts[::-1]), len(order) + 1 - done, why.text, obstacle=obstacle)
 

@@ -12,28 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import int_table, ints
+from mdp.kernels.arrays import floats, int_table, ints
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.overhang import PLATFORM_TOLERANCE_MM
-from mdp.sweep.facets import Rings
+from mdp.sweep.facets import UNKNOWN, Layout, Rings
 from mdp.sweep.integrals import OffsetGrid, column_over
-from mdp.sweep.rays import TriangleTree, first_hit
+from mdp.sweep.rays import ANY_FACE, first_hit
 from mdp.topology.union_find import root, singletons
-
-UNKNOWN = -2
-
-
-class Topology(NamedTuple):
-    """What the components need of a solid: its triangles, (n, 3) normals of the vertices and the rings around them, the vertices
-    on the platform, (n,) the face that a ray from each vertex into the solid meets (-1: none, UNKNOWN: not looked up)."""
-
-    triangles: TriangleTree
-    vertex_normals: Floats
-    rings: Rings
-    standing: Ints
-    anchors: Ints
 
 
 class View(NamedTuple):
@@ -145,26 +132,28 @@ def join_at_saddles(tree: MergeTree) -> Ints:
 
 
 @helper
-def anchor_of(topology: Topology, v: int) -> int:
+def anchor_of(layout: Layout, v: int) -> int:
     """The face that a ray from a vertex into the solid meets; below 0: none."""
-    if topology.anchors[v] == UNKNOWN:
+    if layout.anchors[v] == UNKNOWN:
         # Threads may look up the same vertex twice; the answer does not depend on the direction.
-        triangles, inward = topology.triangles, -topology.vertex_normals[v]
-        topology.anchors[v] = first_hit(triangles, triangles.vertices[v], inward, np.inf, v, -2.0)
-    return int(topology.anchors[v])
+        triangles, inward = layout.triangles, floats(3, 0.0)
+        for axis in range(3):
+            inward[axis] = -layout.vertex_normals[axis, v]
+        layout.anchors[v] = first_hit(triangles, triangles.vertices[v], inward, np.inf, v, ANY_FACE)
+    return int(layout.anchors[v])
 
 
 @helper
-def join_to_anchors(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floats) -> Ints:
+def join_to_anchors(tree: MergeTree, leaves: Ints, layout: Layout, cosines: Floats) -> Ints:
     """(j, 3): the leaf at a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
-    heights, faces, up = tree.heights, topology.triangles.faces, tree.up
+    heights, faces, up = tree.heights, layout.triangles.faces, tree.up
     joins = int_table(len(leaves), 3)
     size = 0
     for leaf in range(len(leaves)):
         v = leaves[leaf]
         if cosines[v] == 0.0 or (cosines[v] < 0.0) != up:
             continue
-        anchor = anchor_of(topology, int(v))
+        anchor = anchor_of(layout, int(v))
         if anchor < 0:
             continue
         w = faces[anchor, 0]
@@ -179,9 +168,9 @@ def join_to_anchors(tree: MergeTree, leaves: Ints, topology: Topology, cosines: 
 
 
 @helper
-def join_leaves(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floats) -> Ints:
+def join_leaves(tree: MergeTree, leaves: Ints, layout: Layout, cosines: Floats) -> Ints:
     """(j, 3): two leaves whose components join, at a saddle or through solid, and the vertex at which they do."""
-    saddles, anchored = join_at_saddles(tree), join_to_anchors(tree, leaves, topology, cosines)
+    saddles, anchored = join_at_saddles(tree), join_to_anchors(tree, leaves, layout, cosines)
     joins = int_table(len(saddles) + len(anchored), 3)
     for k in range(len(saddles)):
         for which in range(3):
@@ -213,19 +202,19 @@ def _stands_on(tree: MergeTree, v: int, vertices: Floats) -> bool:
 
 
 @helper
-def count_pieces(topology: Topology, view: View, pieces: Ints) -> None:
+def count_pieces(layout: Layout, view: View, pieces: Ints) -> None:
     """Components below each offset that do not reach the platform."""
     heights, n = view.grid.heights, view.grid.columns
-    tree = grow_tree(view, topology.rings, n < 0)  # a constant would have all these functions compiled once for every value of it
+    tree = grow_tree(view, layout.rings, n < 0)  # a constant would have all these functions compiled once for every value of it
     leaves = number_leaves(tree)
-    joins = join_leaves(tree, leaves, topology, view.cosines)
+    joins = join_leaves(tree, leaves, layout, view.cosines)
     size = len(leaves)
     begun, standing_from = ints(size, 0), ints(size, n + 1)
     for leaf in range(size):
         begun[leaf] = min(column_over(heights[leaves[leaf]]), n)
-    for k in range(len(topology.standing)):
-        v = int(topology.standing[k])
-        if not _stands_on(tree, v, topology.triangles.vertices):
+    for k in range(len(layout.standing)):
+        v = int(layout.standing[k])
+        if not _stands_on(tree, v, layout.triangles.vertices):
             leaf = find_leaf(tree, v)
             standing_from[leaf] = min(standing_from[leaf], min(column_over(heights[v]), n))
     _count(begun, standing_from, joins, join_columns(joins, view.grid), pieces[:n])

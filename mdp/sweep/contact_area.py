@@ -12,17 +12,8 @@ from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
-from mdp.sweep.components import (
-    Topology,
-    View,
-    before,
-    find_leaf,
-    grow_tree,
-    join_columns,
-    join_leaves,
-    number_leaves,
-)
-from mdp.sweep.facets import Rows
+from mdp.sweep.components import View, before, find_leaf, grow_tree, join_columns, join_leaves, number_leaves
+from mdp.sweep.facets import Layout
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.topology.union_find import root, singletons
 
@@ -30,19 +21,19 @@ LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, 
 
 
 @helper
-def find_contact_areas(rows: Rows, topology: Topology, view: View, crumb: float, wanted: Ints, contact_area: Floats) -> None:
+def find_contact_areas(layout: Layout, view: View, crumb: float, wanted: Ints, contact_area: Floats) -> None:
     """Lower each offset's contact area, given as its section, to the least section of a piece above it that is at least `crumb`
     steps high.
 
     Only at the wanted (n,) offsets.
     """
-    grid, corners = view.grid, rows.corners
+    grid, corners = view.grid, layout.faces.corners
     heights, n = grid.heights, grid.columns
-    tree = grow_tree(view, topology.rings, n >= 0)
+    tree = grow_tree(view, layout.rings, n >= 0)
     leaves = number_leaves(tree)
     if len(leaves) == 1:
         return
-    joins = join_leaves(tree, leaves, topology, view.cosines)
+    joins = join_leaves(tree, leaves, layout, view.cosines)
     begun, ended, elder = _find_lifetimes(leaves, joins, grid)
     several = _count_several(begun, ended, wanted)
     if several[n] == 0:
@@ -73,7 +64,7 @@ def find_contact_areas(rows: Rows, topology: Topology, view: View, crumb: float,
                 piece = leaf
                 while ended[piece] > column:
                     piece = elder[piece]
-                areas[starts[piece] + column - ended[piece]] += _section(rows.points, (i, j, k), grid, column, ends)
+                areas[starts[piece] + column - ended[piece]] += _section(layout.faces.points, (i, j, k), grid, column, ends)
     for piece in range(len(leaves)):
         for column in range(ended[piece], min(begun[piece], int(heights[leaves[piece]] - crumb) + 1)):
             if several[column] < several[column + 1]:

@@ -1,11 +1,10 @@
-"""Facets: a solid's surface laid out for sweeping: structure of arrays, near faces and vertices near in memory.
+"""Facets: the table of a solid's faces, and its surface laid out for sweeping: near faces and vertices near in memory.
 
 What a sweep reads in a row lies in a row: a face's corner numbers, its normal and its area vector each as three long arrays, and
 around every vertex its neighbours in cyclic order.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +15,73 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
-from mdp.stairs import step_shares
+from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
+from mdp.sweep.rays import TriangleTree, triangle_tree
 
 LEAST_ALTITUDE = 1e-8  # of a triangle, as a share of the largest coordinate: below, rounding may decide which corner is higher
 COSINE_MARGIN = 1e-6
 GRID_BITS = 16  # of the space-filling curve's cells along each axis
+UNKNOWN = -2  # anchor of a vertex that has not been looked up
 
 Indices = NDArray[np.uint32]
+
+
+class FaceTable(NamedTuple):
+    """The faces of a solid, each coordinate in a row of its own: points (3, n) of its vertices, corners (3, m), unit normals
+    (3, m).
+
+    For each face (m,): its area; sources, the face of the model that it is a piece of, below 0: a cut laid it open, it needs
+    support wherever it is risky; whether it is risky upright; counts, how many times an area counts that needs support;
+    seam_weights, how much a mm of rim counts, (0,): seams do not count; stair_weights, how much an area counts whose steps are
+    as high as a layer, (0,): stairs do not count.
+    """
+
+    points: Floats
+    corners: Indices
+    normals: Floats
+    areas_mm2: Floats
+    sources: Ints
+    risky: Mask
+    counts: Floats
+    seam_weights: Floats
+    stair_weights: Floats
+
+    @property
+    def counted_mm2(self) -> Floats:
+        """(m,) what each face counts where it needs support."""
+        return self.areas_mm2 * self.counts
+
+    def of_faces(self, chosen: NDArray[np.int64]) -> "FaceTable":
+        """The table of some of the faces, given by their numbers."""
+        columns = (np.take(column, chosen, axis=-1) if column.size else column for column in self[1:])
+        return FaceTable(self.points, *columns)
+
+
+class Scars(NamedTuple):
+    """What blemishes a solid along each of k directions: its faces, the cosine of normal and direction below which one is risky,
+    what the faces of the model need (k, n), how many times an area over air counts, by how much more a rim does on a feather
+    edge, and the faces that no cut can save (m,), (0,): not asked for."""
+
+    faces: FaceTable
+    risky_below: float
+    classes: Classes
+    weight: float
+    feather: float
+    hopeless: Mask
+
+
+@no_nrt
+def class_along(scars: Scars, row: int, f: int) -> int:
+    """What a face needs that is risky along a direction."""
+    source = scars.faces.sources[f]
+    return int(scars.classes[row, source]) if source >= 0 else NEEDS_SUPPORT
+
+
+@no_nrt
+def times_along(scars: Scars, row: int, f: int) -> float:
+    """How many times the area of a face counts that is risky along a direction."""
+    needed = class_along(scars, row, f)
+    return scars.weight if needed == UNSUPPORTABLE else 1.0 if needed == NEEDS_SUPPORT else 0.0
 
 
 class Rings(NamedTuple):
@@ -32,137 +91,76 @@ class Rings(NamedTuple):
     neighbours: Ints
 
 
-class Rows(NamedTuple):
-    """What every direction's sweep reads of a surface of m faces, n vertices and e edges, each coordinate in a row of its own.
+class Layout(NamedTuple):
+    """A solid laid out for sweeps along any direction: its faces and boxes over them; vectors_mm2 (3, m), their normals times
+    areas; rising_edges (2, e), each with its lower end first, those with the lowest lower end first.
 
-    points (3, n), corners (3, m), unit normals (3, m), vectors_mm2 (3, m) normals times areas, rising_edges (2, e),
-    vertex_normals (3, n), flatness (n,), sharp: numbers 3 f + k of the face corners at edges.
+    For the vertices: the rings around them; unit angle-weighted normals (3, n), whose sign tells on which side the solid lies
+    (Baerentzen, Aanaes); flatness (n,), see _flatness; sharp: numbers 3 f + k of the face corners where the normal of the vertex
+    does not tell where the surface looks; those standing on the platform; anchors (n,): the face that a ray into the solid meets,
+    -1: none, UNKNOWN: not looked up, which the sweep does when needed.
     """
 
-    points: Floats
-    corners: Indices
-    normals: Floats
+    faces: FaceTable
+    triangles: TriangleTree
     vectors_mm2: Floats
     rising_edges: Indices
+    rings: Rings
     vertex_normals: Floats
     flatness: Floats
     sharp: Ints
+    standing: Ints
+    anchors: Ints
 
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Made once a solid. mesh has its vertices and faces in spatial order; risky (m,) tells which faces are risky upright,
-    seam_weights (m,) how much a mm of rim counts on each, (0,): not at all; sources (m,) of which face of the model each is a
-    piece, below 0: of none; counted_mm2 (m,) what each counts where it needs support; stair_areas_mm2 (m,) what each counts where
-    its steps are as high as a layer, (0,): stairs do not count; order (m,): the number of each face in
-    the solid's own mesh."""
+    """The surface of a solid along a space-filling curve: its mesh, its faces, and (m,) their numbers in the solid's."""
 
     mesh: Mesh
-    risky: Mask
-    seam_weights: Floats
-    sources: Ints
-    counted_mm2: Floats
-    stair_areas_mm2: Floats
+    faces: FaceTable
     order: NDArray[np.int64]
 
-    @cached_property
-    def points(self) -> Floats:
-        """(3, n) coordinates."""
-        return np.ascontiguousarray(self.mesh.vertices.T)
+    @classmethod
+    def of(cls, mesh: Mesh, faces: FaceTable) -> "Facets":
+        """The surface of a mesh, whose faces are in its own order."""
+        low = mesh.bounds_mm[0]
+        scale = (2**GRID_BITS - 1) / max(float((mesh.bounds_mm[1] - low).max()), 1e-12)
+        order = np.argsort(_morton(mesh.vertices, low, scale), kind="stable")
+        number = np.empty(len(order), np.int32)
+        number[order] = np.arange(len(order), dtype=np.int32)
+        turn = np.argsort(_morton(mesh.vertices[mesh.faces].mean(axis=1), low, scale), kind="stable")
+        laid = Mesh(mesh.vertices[order], number[mesh.faces[turn]])
+        points, corners = np.ascontiguousarray(laid.vertices.T), np.ascontiguousarray(laid.faces.T.astype(np.uint32))
+        return cls(laid, faces.of_faces(turn)._replace(points=points, corners=corners), turn)
 
-    @cached_property
-    def corners(self) -> Indices:
-        """(3, m) vertices of the faces."""
-        return np.ascontiguousarray(self.mesh.faces.T.astype(np.uint32))
-
-    @cached_property
-    def normals(self) -> Floats:
-        """(3, m) unit normals."""
-        return np.ascontiguousarray(self.mesh.normals.T)
-
-    @cached_property
-    def stairs_up_mm2(self) -> Floats:
-        """(m,) what the stairs of each face count printed straight up, (0,): stairs do not count."""
-        return self.stair_areas_mm2 * step_shares(self.mesh.normals[: len(self.stair_areas_mm2), 2])
-
-    @property
-    def rings(self) -> Rings:
-        """The neighbours of every vertex."""
-        return self._rings[0]
-
-    @cached_property
-    def _rings(self) -> tuple[Rings, Mask]:
-        """Rings, and whether a vertex' neighbours form a single ring."""
-        starts, neighbours, single = _link(self.mesh.faces.flatten(), len(self.mesh.vertices))
-        return Rings(starts.astype(np.int32), neighbours), single
-
-    @cached_property
-    def flatness(self) -> Floats:
-        """(n,) least cosine between a vertex' normal m and those of its faces, 0 if rounding decides, -1 without a single ring.
-
-        A vertex with |d . m| below it is regular for the direction d: around it the surface is a graph over the plane across m
-        whose slope cannot outweigh d's part in that plane.
-        """
-        _, single = self._rings
-        least_mm = LEAST_ALTITUDE * float(np.abs(self.mesh.bounds_mm).max())
-        flat = _flatness(self.mesh.vertices, self.mesh.faces, self.mesh.normals, self.vertex_normals, least_mm)
-        return np.where(single, flat, -1.0)
-
-    @cached_property
-    def rising_edges(self) -> Indices:
-        """(2, e) the edges, each with its lower end first, those with the lowest lower end first."""
-        faces, z = self.mesh.faces, self.points[2]
-        starts, ends = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
-        once = (z[starts] < z[ends]) | ((z[starts] == z[ends]) & (starts < ends))
-        starts, ends = starts[once], ends[once]
-        order = np.argsort(z[starts], kind="stable")
-        return np.ascontiguousarray(np.stack([starts[order], ends[order]]).astype(np.uint32))
-
-    @cached_property
-    def standing(self) -> Ints:
-        """Vertices on the platform."""
-        return np.flatnonzero(self.points[2] <= PLATFORM_TOLERANCE_MM).astype(np.int32)
-
-    @cached_property
-    def vertex_normals(self) -> Floats:
-        """(n, 3) unit angle-weighted normals; their sign tells on which side of a vertex the solid lies (Baerentzen, Aanaes)."""
-        return _vertex_normals(self.mesh.vertices, self.mesh.faces, self.mesh.normals)
-
-    def rows(self, cosine: float) -> Rows:
-        """The rows of a sweep; sharp: corners at vertices some face of which leans further than that from the vertex' normal."""
-        return Rows(
-            points=self.points,
-            corners=self.corners,
-            normals=self.normals,
-            vectors_mm2=np.ascontiguousarray((self.mesh.normals * self.mesh.areas_mm2[:, None]).T),
-            rising_edges=self.rising_edges,
-            vertex_normals=np.ascontiguousarray(self.vertex_normals.T),
-            flatness=self.flatness,
-            sharp=np.flatnonzero(self.flatness[self.mesh.faces] <= cosine).astype(np.int32),
+    def layout(self, cosine: float) -> Layout:
+        """The surface laid out; sharp: corners at vertices with a face that leans further than that from the vertex' normal."""
+        mesh, z = self.mesh, self.faces.points[2]
+        starts, neighbours, single = _link(mesh.faces.flatten(), len(mesh.vertices))
+        normals = _vertex_normals(mesh.vertices, mesh.faces, mesh.normals)
+        least_mm = LEAST_ALTITUDE * float(np.abs(mesh.bounds_mm).max())
+        flatness = np.where(single, _flatness(mesh.vertices, mesh.faces, mesh.normals, normals, least_mm), -1.0)
+        return Layout(
+            faces=self.faces,
+            triangles=triangle_tree(mesh),
+            vectors_mm2=np.ascontiguousarray((mesh.normals * mesh.areas_mm2[:, None]).T),
+            rising_edges=_rising_edges(mesh.faces, z),
+            rings=Rings(starts.astype(np.int32), neighbours),
+            vertex_normals=np.ascontiguousarray(normals.T),
+            flatness=flatness,
+            sharp=np.flatnonzero(flatness[mesh.faces] <= cosine).astype(np.int32),
+            standing=np.flatnonzero(z <= PLATFORM_TOLERANCE_MM).astype(np.int32),
+            anchors=np.full(len(mesh.vertices), UNKNOWN, np.int32),
         )
 
 
-def lay_out(
-    mesh: Mesh,
-    risky: Mask,
-    seam_weights: Floats | None,
-    sources: Ints,
-    counts: Floats,
-    stair_weights: Floats | None = None,
-) -> Facets:
-    """The surface of a solid along a space-filling curve; its values as in Facets, counts: how many times an area on each face
-    counts, stair_weights: how much each does where its steps are as high as a layer."""
-    low = mesh.bounds_mm[0]
-    scale = (2**GRID_BITS - 1) / max(float((mesh.bounds_mm[1] - low).max()), 1e-12)
-    order = np.argsort(_morton(mesh.vertices, low, scale), kind="stable")
-    number = np.empty(len(order), np.int32)
-    number[order] = np.arange(len(order), dtype=np.int32)
-    turn = np.argsort(_morton(mesh.vertices[mesh.faces].mean(axis=1), low, scale), kind="stable")
-    weights = np.zeros(0) if seam_weights is None else np.ascontiguousarray(seam_weights[turn])
-    laid = Mesh(mesh.vertices[order], number[mesh.faces[turn]])
-    stairs_mm2 = np.zeros(0) if stair_weights is None else laid.areas_mm2 * stair_weights[turn]
-    counted_mm2 = laid.areas_mm2 * counts[turn]
-    return Facets(laid, risky[turn], weights, np.ascontiguousarray(sources[turn]), counted_mm2, stairs_mm2, turn)
+def _rising_edges(faces: Ints, z: Floats) -> Indices:
+    starts, ends = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
+    once = (z[starts] < z[ends]) | ((z[starts] == z[ends]) & (starts < ends))
+    starts, ends = starts[once], ends[once]
+    order = np.argsort(z[starts], kind="stable")
+    return np.ascontiguousarray(np.stack([starts[order], ends[order]]).astype(np.uint32))
 
 
 @kernel
@@ -204,6 +202,11 @@ def _link(corners: Ints, size: int) -> tuple[NDArray[np.int64], Ints, Mask]:
 
 @kernel
 def _flatness(vertices: Floats, faces: Ints, normals: Floats, vertex_normals: Floats, least: float) -> Floats:
+    """(n,) least cosine between a vertex' normal m and those of its faces, 0 if rounding decides; to be -1 without a single ring.
+
+    A vertex with |d . m| below it is regular for the direction d: around it the surface is a graph over the plane across m
+    whose slope cannot outweigh d's part in that plane.
+    """
     flat = floats(len(vertices), 1.0)
     for f in range(len(faces)):
         altitude = _altitude(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]])
@@ -230,6 +233,7 @@ def _altitude(p: Floats, q: Floats, r: Floats) -> float:
 
 @kernel
 def _vertex_normals(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
+    """(n, 3) unit normals, those of the faces around each vertex weighted by their angles there."""
     total = table(len(vertices), 3)
     for f in range(len(faces)):
         for k in range(3):

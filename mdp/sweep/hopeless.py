@@ -11,7 +11,7 @@ from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats
 from mdp.overhang import Mask
-from mdp.sweep.facets import Facets, Indices
+from mdp.sweep.facets import FaceTable, Facets
 
 
 class Savers(NamedTuple):
@@ -23,24 +23,16 @@ class Savers(NamedTuple):
     risky_below: float
 
 
-class Surface(NamedTuple):
-    """(3, n) points, (3, m) corners and unit normals of the faces."""
-
-    points: Floats
-    corners: Indices
-    normals: Floats
-
-
 def hopeless_faces(facets: Facets, savers: Savers) -> Mask:
     """(m,) the risky faces that no direction saves; an infinite least offset: the direction is out of reach."""
-    lost: Mask = facets.risky.copy()
-    in_threads(_find_hopeless, len(lost), Surface(facets.points, facets.corners, facets.normals), savers, lost)
+    lost: Mask = facets.faces.risky.copy()
+    in_threads(_find_hopeless, len(lost), facets.faces, savers, lost)
     return lost
 
 
 @kernel
-def _find_hopeless(begin: int, end: int, surface: Surface, savers: Savers, lost: Mask) -> None:
-    points, corners, normals = surface.points, surface.corners, surface.normals
+def _find_hopeless(begin: int, end: int, faces: FaceTable, savers: Savers, lost: Mask) -> None:
+    points, corners, normals = faces.points, faces.corners, faces.normals
     directions, count = savers.directions, len(savers.directions)
     last = 0  # neighbours are mostly saved by the same direction
     for f in range(begin, end):

@@ -12,10 +12,8 @@ import numpy as np
 from mdp.kernels.arrays import dot, floats, int_table, table
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
-from mdp.overhang import Mask
-from mdp.support_need.patches import NEEDS_SUPPORT, Classes
 from mdp.sweep.crossing import THIRD, moment_above, share_above, slopes
-from mdp.sweep.facets import Indices, Rows
+from mdp.sweep.facets import FaceTable, Indices, Layout, Scars, class_along
 
 BLOCK = 128
 AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
@@ -30,38 +28,6 @@ class OffsetGrid(NamedTuple):
     heights: Floats
     columns: int
     step_mm: float
-
-
-class Overhangs(NamedTuple):
-    """What the risky areas need of a surface: points (3, n), corners (3, m), unit normals (3, m), areas (m,), faces risky upright
-    (m,), the cosine of normal and direction below which a face is risky along that direction, and the faces that no cut can save
-    (m,), (0,): not asked for."""
-
-    points: Floats
-    corners: Indices
-    normals: Floats
-    areas_mm2: Floats
-    risky: Mask
-    risky_below: float
-    hopeless: Mask
-
-
-class Areas(NamedTuple):
-    """Where the areas above each offset of one direction go, (n,) each, see sweep.Gains."""
-
-    up: Floats
-    residual: Floats
-    hopeless: Floats
-
-
-class Needs(NamedTuple):
-    """The risky faces that need support along a direction: of which face of the model each is a piece (m,), below 0: of
-    none, it needs it; the classes (n,) of the model's faces, and how many times the
-    unsupportable count."""
-
-    sources: Ints
-    classes: Classes
-    weight: float
 
 
 class Block(NamedTuple):
@@ -173,9 +139,9 @@ def _add_volumes(block: Block, shares: Floats, integrals: Floats) -> None:
 
 
 @helper
-def integrate_volume(rows: Rows, grid: OffsetGrid, section: Floats, volume: Floats) -> None:
+def integrate_volume(layout: Layout, grid: OffsetGrid, section: Floats, volume: Floats) -> None:
     """Cross-section at (mm2) and volume above (mm3) each offset, by the divergence theorem."""
-    corners, vectors, d, n = rows.corners, rows.vectors_mm2, grid.direction, grid.columns
+    corners, vectors, d, n = layout.faces.corners, layout.vectors_mm2, grid.direction, grid.columns
     integrals = table(n + AHEAD + 1, 4)
     values, shares, places = table(6, BLOCK), table(2 * AHEAD, BLOCK), int_table(2, BLOCK)
     for begin in range(0, corners.shape[1], BLOCK):
@@ -197,41 +163,34 @@ def integrate_volume(rows: Rows, grid: OffsetGrid, section: Floats, volume: Floa
 
 
 @helper
-def _select(surface: Overhangs, needs: Needs, d: Floats, chosen: Ints, kind: Ints) -> int:
+def _select(scars: Scars, row: int, d: Floats, chosen: Ints, kind: Ints) -> int:
     """The faces that need support either way, with 1: upright only, 2: along d only, 3: both, 4 and 5: as 2 and 3, and along d
     they are unsupportable, 6 and 7: as 3 and 5, and no cut can save them; returns how many."""
-    normals, risky, risky_below, hopeless = surface.normals, surface.risky, surface.risky_below, surface.hopeless
-    told = len(hopeless) > 0
+    normals, risky, hopeless = scars.faces.normals, scars.faces.risky, scars.hopeless
+    with_hopeless = len(hopeless) > 0
     cosines = floats(BLOCK, 0.0)
-    many = 0
+    count = 0
     for begin in range(0, normals.shape[1], BLOCK):
         end = min(begin + BLOCK, normals.shape[1])
         dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], d, cosines[: end - begin])
         for f in range(begin, end):
-            code = int(risky[f]) + 2 * (_class(needs, f) if cosines[f - begin] < risky_below else 0)
-            if told and hopeless[f]:
+            code = int(risky[f]) + 2 * (class_along(scars, row, f) if cosines[f - begin] < scars.risky_below else 0)
+            if with_hopeless and hopeless[f]:
                 code = 6 if code == 3 else 7 if code == 5 else code
-            chosen[many], kind[many] = f, code
-            many += int(code > 0)
-    return many
+            chosen[count], kind[count] = f, code
+            count += int(code > 0)
+    return count
 
 
 @no_nrt
-def _class(needs: Needs, f: int) -> int:
-    """What a face that is risky along the direction needs."""
-    source = needs.sources[f]
-    return int(needs.classes[source]) if source >= 0 else NEEDS_SUPPORT
-
-
-@no_nrt
-def _pick(chosen: Ints, surface: Overhangs, picked: Indices, weight: Floats) -> None:
-    """Corners (3, k) and areas of the chosen faces."""
-    corners, areas = surface.corners, surface.areas_mm2
+def _pick(chosen: Ints, faces: FaceTable, picked: Indices, weight: Floats) -> None:
+    """Corners (3, k) and areas of the chosen faces as they count."""
+    corners, areas, counts = faces.corners, faces.areas_mm2, faces.counts
     for k in range(len(chosen)):
         f = np.uint32(chosen[k])
         picked[0, k], picked[1, k], picked[2, k] = corners[0, f], corners[1, f], corners[2, f]
     for k in range(len(chosen)):
-        weight[k] = areas[chosen[k]]
+        weight[k] = areas[chosen[k]] * counts[chosen[k]]
 
 
 @no_nrt
@@ -244,7 +203,8 @@ def share_columns(ahead: float, block: Block, share: Floats) -> None:
 
 
 @no_nrt
-def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> None:
+def add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> None:
+    """Add weights of faces to two sums for each kind: of those wholly above, and of the shares of those crossed."""
     low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
     column, crossed = block.column, block.crossed
     for k in range(len(low)):
@@ -259,27 +219,28 @@ def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> N
 
 
 @helper
-def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scratch: Ints, out: Areas) -> None:
-    """Risky areas above each offset: printed straight up, and along the direction, there weighted by what the faces need.
+def integrate_risky_area(scars: Scars, row: int, grid: OffsetGrid, scratch: Ints, out: tuple[Floats, Floats, Floats]) -> None:
+    """Risky areas above each offset of a direction: printed straight up, along it, weighted by what the faces need, and what no
+    cut can save.
 
     scratch: (2, m + 1) whole numbers to work in.
     """
-    n = grid.columns
+    (up, residual, hopeless), n = out, grid.columns
     integrals = table(n + AHEAD + 1, 2 * KINDS)
     chosen, kind = scratch[0], scratch[1]
-    many = _select(surface, needs, grid.direction, chosen, kind)
+    count = _select(scars, row, grid.direction, chosen, kind)
     values, shares, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
     picked = np.empty((3, BLOCK), np.uint32)
-    for begin in range(0, many, BLOCK):
-        end = min(begin + BLOCK, many)
+    for begin in range(0, count, BLOCK):
+        end = min(begin + BLOCK, count)
         size = end - begin
         block = cut_block(values, places, size)
-        _pick(chosen[begin:end], surface, picked, block.weight)
+        _pick(chosen[begin:end], scars.faces, picked, block.weight)
         sort_heights(picked[0, :size], picked[1, :size], picked[2, :size], grid.heights, block)
         find_ramps(block)
         for ahead in range(AHEAD):
             share_columns(float(ahead), block, shares[ahead, :size])
-        _add_areas(kind[begin:end], block, shares, integrals)
+        add_areas(kind[begin:end], block, shares, integrals)
     whole = floats(KINDS, 0.0)
     for column in range(n - 1, -1, -1):
         for which in range(1, KINDS):
@@ -287,10 +248,10 @@ def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scr
         lost, airy_lost = integrals[column, 13] + whole[6], integrals[column, 15] + whole[7]
         both = integrals[column, 7] + whole[3] + lost
         airy_both = integrals[column, 11] + whole[5] + airy_lost
-        out.up[column] = integrals[column, 3] + whole[1] + both + airy_both
+        up[column] = integrals[column, 3] + whole[1] + both + airy_both
         airy = integrals[column, 9] + whole[4] + airy_both
-        out.residual[column] = integrals[column, 5] + whole[2] + both + needs.weight * airy
-        out.hopeless[column] = lost + airy_lost
+        residual[column] = integrals[column, 5] + whole[2] + both + scars.weight * airy
+        hopeless[column] = lost + airy_lost
 
 
 @helper

@@ -15,10 +15,10 @@ from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
-from mdp.sweep.components import Topology, before
+from mdp.sweep.components import before
 from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.cylinders import Cylinder, crossings
-from mdp.sweep.facets import Rings
+from mdp.sweep.facets import Layout, Rings, Scars
 from mdp.sweep.integrals import OffsetGrid, find_heights
 from mdp.sweep.pieces import (
     AREAS,
@@ -38,7 +38,7 @@ from mdp.sweep.pieces import (
     value,
     volume,
 )
-from mdp.sweep.sweep import Remainder, Scars, scars_of
+from mdp.sweep.sweep import Remainder, scars_of
 from mdp.topology.union_find import root
 
 MOST_JOINED = 6  # limbs that one plane cuts off together
@@ -111,7 +111,7 @@ def find_limbs(remainder: Remainder, grid: LimbGrid, risky_below: float) -> Limb
         key=np.zeros((count, MOST_ROWS)),
         tops=np.full((count, MOST_ROWS, MOST_JOINED), NONE, np.int32),
     )
-    in_threads(_find_limbs, count, scars_of(remainder, grid.directions, risky_below), remainder.topology, grid, rows)
+    in_threads(_find_limbs, count, scars_of(remainder, grid.directions, risky_below), remainder.layout, grid, rows)
     used = np.arange(MOST_ROWS) < rows.filled[:, None]
     direction, place = np.nonzero(used)
     order = np.lexsort((place, direction, rows.key[used]))
@@ -144,7 +144,7 @@ def sum_limbs(remainder: Remainder, planes: Sequence[Plane], risky_below: float,
     pointed = _pointed(planes, crumb_mm, SAME_MM2)
     sums = np.zeros((len(planes), ALONE + 1))
     scars = scars_of(remainder, pointed.normals, risky_below)
-    in_threads(_sum_limbs, len(planes), scars, remainder.topology, pointed, sums)
+    in_threads(_sum_limbs, len(planes), scars, remainder.layout, pointed, sums)
     return LimbSums(
         up_mm2=sums[:, UP],
         residual_mm2=sums[:, RESIDUAL],
@@ -184,7 +184,7 @@ def limb_vertices(remainder: Remainder, plane: Plane) -> Mask:
         marked: Mask = plane.heights_mm(remainder.facets.mesh.vertices) > 0.0
     else:
         scars = scars_of(remainder, plane.normal[None], 0.0)
-        marked = _mark_limbs(scars, remainder.topology, _pointed([plane], 0.0, np.inf))
+        marked = _mark_limbs(scars, remainder.layout, _pointed([plane], 0.0, np.inf))
     marked.setflags(write=False)
     return marked
 
@@ -207,7 +207,7 @@ def limb_reach(remainder: Remainder, plane: Plane) -> Mask:
         return np.ones(len(remainder.mesh.faces), np.bool_)
     facets = remainder.facets
     heights, marked = plane.heights_mm(facets.mesh.vertices), limb_vertices(remainder, plane).copy()
-    _spread_down(np.argsort(-heights, kind="stable"), heights, facets.rings, marked)
+    _spread_down(np.argsort(-heights, kind="stable"), heights, remainder.layout.rings, marked)
     return _faces_with(remainder, marked)
 
 
@@ -235,7 +235,7 @@ def cylinders_cut(remainder: Remainder, cylinders: tuple[Cylinder, ...], plane: 
     """Those of some cylinders that have a face in what a plane cuts off."""
     if plane.limbs_mm is None or not cylinders:
         return cylinders
-    sources = np.unique(remainder.sources[limb_faces(remainder, plane)])
+    sources = np.unique(remainder.faces.sources[limb_faces(remainder, plane)])
     return tuple(cylinder for cylinder in cylinders if np.isin(cylinder.faces, sources).any())
 
 
@@ -338,9 +338,9 @@ def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: L
 
 
 @kernel
-def _find_limbs(begin_row: int, end_row: int, scars: Scars, topology: Topology, grid: LimbGrid, out: LimbRows) -> None:
+def _find_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, grid: LimbGrid, out: LimbRows) -> None:
     """Fill the candidates of some directions."""
-    points, corners, step_mm = scars.overhangs.points, scars.overhangs.corners, grid.step_mm
+    points, corners, step_mm = layout.faces.points, layout.faces.corners, grid.step_mm
     pieces, tops = make_pieces(points.shape[1], corners.shape[1]), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE))
     for row in range(begin_row, end_row):
         direction, heights = grid.directions[row], pieces.heights
@@ -348,20 +348,20 @@ def _find_limbs(begin_row: int, end_row: int, scars: Scars, topology: Topology, 
         out.first[row] = first
         if n == 0 or not np.isfinite(grid.least_height_mm[row]):
             continue
-        order = begin(pieces, scars, row, OffsetGrid(direction, heights, n, step_mm), topology)
+        order = begin(pieces, scars, row, OffsetGrid(direction, heights, n, step_mm), layout)
         for column in range(n - 1, -1, -1):
-            descend(pieces, column, order, topology)
+            descend(pieces, column, order, layout)
             if pieces.counts[0] > 1 and _is_allowed(grid, row, (first + column) * step_mm):
                 _offer_pieces(out, (row, column), pieces, grid, tops)
 
 
 @kernel
-def _sum_limbs(begin_row: int, end_row: int, scars: Scars, topology: Topology, planes: PointedPlanes, out: Floats) -> None:
+def _sum_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, planes: PointedPlanes, out: Floats) -> None:
     """Fill the rows of some planes with the SUMS over their limbs and what else LimbSums has."""
-    pieces = make_pieces(scars.overhangs.points.shape[1], scars.overhangs.corners.shape[1])
+    pieces = make_pieces(layout.faces.points.shape[1], layout.faces.corners.shape[1])
     chosen = ints(MOST_JOINED, NONE)
     for row in range(begin_row, end_row):
-        many = _find_chosen(scars, row, topology, planes, pieces, chosen)
+        many = _find_chosen(scars, row, layout, planes, pieces, chosen)
         contact, lowest = np.inf, np.inf
         for limb in range(many):
             piece = chosen[limb]
@@ -378,11 +378,11 @@ def _sum_limbs(begin_row: int, end_row: int, scars: Scars, topology: Topology, p
 
 
 @kernel
-def _mark_limbs(scars: Scars, topology: Topology, planes: PointedPlanes) -> Mask:
+def _mark_limbs(scars: Scars, layout: Layout, planes: PointedPlanes) -> Mask:
     """(n,) the vertices of the limbs of one plane."""
-    size, chosen = scars.overhangs.points.shape[1], ints(MOST_JOINED, NONE)
-    pieces, marked = make_pieces(size, scars.overhangs.corners.shape[1]), flags(size)
-    many = _find_chosen(scars, 0, topology, planes, pieces, chosen)
+    size, chosen = layout.faces.points.shape[1], ints(MOST_JOINED, NONE)
+    pieces, marked = make_pieces(size, layout.faces.corners.shape[1]), flags(size)
+    many = _find_chosen(scars, 0, layout, planes, pieces, chosen)
     for v in range(size):
         if pieces.parent[v] >= 0:
             own = root(pieces.parent, v)
@@ -392,14 +392,14 @@ def _mark_limbs(scars: Scars, topology: Topology, planes: PointedPlanes) -> Mask
 
 
 @helper
-def _find_chosen(scars: Scars, row: int, topology: Topology, planes: PointedPlanes, pieces: Pieces, chosen: Ints) -> int:
+def _find_chosen(scars: Scars, row: int, layout: Layout, planes: PointedPlanes, pieces: Pieces, chosen: Ints) -> int:
     """Lower a plane to its offset and fill `chosen` with the pieces that its points lie on. Returns how many there are, 0 where
     any of the points lies on none."""
-    d, points, heights = planes.normals[row], scars.overhangs.points, pieces.heights
+    d, points, heights = planes.normals[row], layout.faces.points, pieces.heights
     dot(points[0], points[1], points[2], d, heights)
     for v in range(len(heights)):
         heights[v] -= planes.offsets_mm[row]
-    descend(pieces, 0, begin(pieces, scars, row, OffsetGrid(d, heights, 1, 1.0), topology), topology)
+    descend(pieces, 0, begin(pieces, scars, row, OffsetGrid(d, heights, 1, 1.0), layout), layout)
     many = 0
     for limb in range(planes.points.shape[1]):
         if not np.isfinite(planes.points[row, limb, 0]):

@@ -16,12 +16,11 @@ from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
-from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE
-from mdp.sweep.components import Topology, anchor_of, before
+from mdp.sweep.components import anchor_of, before
 from mdp.sweep.crossing import chord_at, moment_above, share_above, slopes
+from mdp.sweep.facets import Layout, Scars, times_along
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rims import weigh_chord
-from mdp.sweep.sweep import Scars
 from mdp.topology.union_find import root
 
 NONE = -1
@@ -84,12 +83,12 @@ def make_pieces(size: int, faces: int) -> Pieces:
 
 
 @helper
-def begin(pieces: Pieces, scars: Scars, row: int, grid: OffsetGrid, topology: Topology) -> Order:
+def begin(pieces: Pieces, scars: Scars, row: int, grid: OffsetGrid, layout: Layout) -> Order:
     """Lay out vertices and faces along a direction, the plane above all of them. grid.heights are those of the pieces."""
-    normals, corners, d = topology.vertex_normals, scars.overhangs.corners, grid.direction
+    normals, corners, d = layout.vertex_normals, layout.faces.corners, grid.direction
     for v in range(len(pieces.over)):
         pieces.over[v] = min(column_over(grid.heights[v]), grid.columns)
-        pieces.cosines[v] = normals[v, 0] * d[0] + normals[v, 1] * d[1] + normals[v, 2] * d[2]
+        pieces.cosines[v] = normals[0, v] * d[0] + normals[1, v] * d[1] + normals[2, v] * d[2]
         pieces.parent[v] = NONE
     for f in range(len(pieces.face_over)):
         pieces.face_over[f] = max(pieces.over[corners[0, f]], pieces.over[corners[1, f]], pieces.over[corners[2, f]])
@@ -101,13 +100,13 @@ def begin(pieces: Pieces, scars: Scars, row: int, grid: OffsetGrid, topology: To
 
 
 @helper
-def descend(pieces: Pieces, column: int, order: Order, topology: Topology) -> None:
+def descend(pieces: Pieces, column: int, order: Order, layout: Layout) -> None:
     """Move the plane down to a column from the one above it."""
-    _enter(pieces, order.vertices[order.starts[column + 1] : order.starts[column + 2]], topology)
+    _enter(pieces, order.vertices[order.starts[column + 1] : order.starts[column + 2]], layout)
     for at in range(order.face_starts[column + 1], order.face_starts[column + 2]):
         pieces.active[pieces.counts[1]] = order.faces[at]
         pieces.counts[1] += 1
-    _cross(pieces, column, topology)
+    _cross(pieces, column, layout)
 
 
 @no_nrt
@@ -145,12 +144,12 @@ def _join(pieces: Pieces, a: int, b: int) -> None:
 
 
 @helper
-def _enter(pieces: Pieces, vertices: NDArray[np.int64], topology: Topology) -> None:
+def _enter(pieces: Pieces, vertices: NDArray[np.int64], layout: Layout) -> None:
     """Begin a piece at each vertex that comes to lie above the plane, and join it to its neighbours there."""
-    starts, neighbours = topology.rings.starts, topology.rings.neighbours
+    starts, neighbours = layout.rings.starts, layout.rings.neighbours
     for v in vertices:
         pieces.parent[v], pieces.top[v] = v, v
-        pieces.low[v, 0] = topology.triangles.vertices[v, 2]
+        pieces.low[v, 0] = layout.triangles.vertices[v, 2]
         for which in range(len(SUMS)):
             pieces.whole[v, which] = 0.0
         pieces.live[pieces.counts[0]] = v
@@ -163,10 +162,10 @@ def _enter(pieces: Pieces, vertices: NDArray[np.int64], topology: Topology) -> N
                 highest = highest and not before(pieces.heights, w, v, True)
                 _join(pieces, v, w)
         if highest and pieces.cosines[v] < 0.0:
-            face = anchor_of(topology, int(v))
+            face = anchor_of(layout, int(v))
             if face >= 0:
                 for corner in range(3):
-                    w = topology.triangles.faces[face, corner]
+                    w = layout.triangles.faces[face, corner]
                     if pieces.parent[w] >= 0:
                         _join(pieces, v, w)
 
@@ -174,30 +173,25 @@ def _enter(pieces: Pieces, vertices: NDArray[np.int64], topology: Topology) -> N
 @helper
 def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
     """What each face, when it lies wholly above, adds to the SUMS of its piece; MOMENT is left out, RIM is a weight."""
-    surface, needs, rims = scars.overhangs, scars.needs, scars.rims
-    normals, classes, sources = surface.normals, needs.classes, needs.sources
-    for f in range(len(surface.areas_mm2)):
-        cosine = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
-        area = surface.areas_mm2[f]
-        weights[f, UP] = area if surface.risky[f] else 0.0
-        weights[f, RESIDUAL] = 0.0
-        if cosine < surface.risky_below:
-            kind = classes[row, sources[f]] if sources[f] >= 0 else NEEDS_SUPPORT
-            if kind != CARRIES_ITSELF:
-                weights[f, RESIDUAL] = area * (needs.weight if kind == UNSUPPORTABLE else 1.0)
-        weights[f, SECTION] = rims.areas_mm2[f] * cosine
+    faces = scars.faces
+    normals, areas = faces.normals, faces.areas_mm2
+    for f in range(len(areas)):
+        cosine, counted = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2], areas[f] * faces.counts[f]
+        weights[f, UP] = counted if faces.risky[f] else 0.0
+        weights[f, RESIDUAL] = counted * times_along(scars, row, f) if cosine < scars.risky_below else 0.0
+        weights[f, SECTION] = areas[f] * cosine
         weights[f, STAIRS_UP], weights[f, STAIRS], weights[f, RIM] = 0.0, 0.0, 0.0
-        if len(rims.weights) > 0:
-            weights[f, RIM] = 2.0 * rims.areas_mm2[f] * rims.weights[f] * weigh_chord(cosine, rims.feather)
-        if len(rims.stair_areas_mm2) > 0:
-            weights[f, STAIRS_UP] = rims.stairs_up_mm2[f]
-            weights[f, STAIRS] = rims.stair_areas_mm2[f] * step_share(cosine)
+        if len(faces.seam_weights) > 0:
+            weights[f, RIM] = 2.0 * areas[f] * faces.seam_weights[f] * weigh_chord(cosine, scars.feather)
+        if len(faces.stair_weights) > 0:
+            weights[f, STAIRS_UP] = areas[f] * faces.stair_weights[f] * step_share(normals[2, f])
+            weights[f, STAIRS] = areas[f] * faces.stair_weights[f] * step_share(cosine)
 
 
 @no_nrt
-def _cross(pieces: Pieces, column: int, topology: Topology) -> None:
+def _cross(pieces: Pieces, column: int, layout: Layout) -> None:
     """Add the faces that have come to lie wholly above a column to their pieces, and the shares of those that cross it."""
-    faces, points, heights, c = topology.triangles.faces, topology.triangles.vertices, pieces.heights, float(column)
+    faces, points, heights, c = layout.triangles.faces, layout.triangles.vertices, pieces.heights, float(column)
     _forget_crossing(pieces)
     still = 0
     for at in range(pieces.counts[1]):

@@ -14,35 +14,13 @@ from mdp.kernels.arrays import dot, floats, int_table, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
-from mdp.sweep.crossing import chord_at, share_above, slopes
-from mdp.sweep.facets import Indices
-from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, cut_block, find_ramps, share_columns, sort_heights
+from mdp.sweep.crossing import chord_at, slopes
+from mdp.sweep.facets import Scars
+from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, add_areas, cut_block, find_ramps, share_columns, sort_heights
 
 COT_30 = 3.0**0.5
 FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is so thin that it is reported
 ROUNDING_MM = 1e-9  # a corner that a cut has made lies in its plane
-
-
-class Rims(NamedTuple):
-    """What the rims of cuts and the stairs need of a surface: corners (3, m), unit normals (3, m), areas (m,), how much a mm of
-    rim counts on each face (m,), and by how much more on a feather edge; (m,) the area of each face as its steps count when they
-    are as high as a layer, and its stairs printed straight up, mm2, both (0,): stairs do not count."""
-
-    corners: Indices
-    normals: Floats
-    areas_mm2: Floats
-    weights: Floats
-    feather: float
-    stair_areas_mm2: Floats
-    stairs_up_mm2: Floats
-
-
-class ScarsAbove(NamedTuple):
-    """Where the scars of cuts at each offset of one direction go, (n,) each, see sweep.Gains."""
-
-    rim: Floats
-    stairs_up: Floats
-    stairs: Floats
 
 
 @no_nrt
@@ -88,61 +66,46 @@ def _add_rims(block: Block, lengths: Floats, rim: Floats) -> None:
 
 
 @no_nrt
-def _weigh_stairs(cosines: Floats, areas: Floats, out: Floats) -> None:
+def _weigh_stairs(cosines: Floats, areas: Floats, weights: Floats, out: Floats) -> None:
     for k in range(len(out)):
-        out[k] = areas[k] * step_share(cosines[k])
-
-
-@no_nrt
-def _add_stairs(block: Block, shares: Floats, up: Floats, along: Floats, sums: Floats) -> None:
-    """Add stairs printed straight up and along the direction: those of faces wholly above, and of the shares of those crossed."""
-    low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
-    column, crossed = block.column, block.crossed
-    for k in range(len(low)):
-        b, p, q = np.uint32(column[k]), up[k], along[k]
-        sums[b, 0] += p
-        sums[b, 1] += q
-        sums[b, 2] += p * shares[0, k]
-        sums[b, 3] += q * shares[0, k]
-        sums[b + 1, 2] += p * shares[1, k]
-        sums[b + 1, 3] += q * shares[1, k]
-        sums[b + 2, 2] += p * shares[2, k]
-        sums[b + 2, 3] += q * shares[2, k]
-        for ahead in range(AHEAD, crossed[k]):
-            share = share_above(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
-            sums[b + ahead, 2] += p * share
-            sums[b + ahead, 3] += q * share
+        out[k] = areas[k] * weights[k] * step_share(cosines[k])
 
 
 @helper
-def integrate_scars(surface: Rims, grid: OffsetGrid, out: ScarsAbove) -> None:
-    """Weighted length of the rim that a cut at each offset leaves on the surface, mm, and the stairs above it, mm2."""
-    corners, normals, n, counted = surface.corners, surface.normals, grid.columns, len(surface.stair_areas_mm2) > 0
-    rims, stairs, cosines = floats(n + AHEAD + 1, 0.0), table(n + AHEAD + 1, 4), floats(BLOCK, 0.0)
-    values, shares, places, along = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK), floats(BLOCK, 0.0)
+def integrate_scars(scars: Scars, grid: OffsetGrid, out: tuple[Floats, Floats, Floats]) -> None:
+    """Weighted length of the rim that a cut at each offset leaves on the surface, mm, and the stairs above it printed straight up
+    and along the direction, mm2."""
+    faces, (rim, stairs_up, stairs_along), n = scars.faces, out, grid.columns
+    corners, normals, areas, stair_weights = faces.corners, faces.normals, faces.areas_mm2, faces.stair_weights
+    rims, stairs, cosines, kinds = floats(n + AHEAD + 1, 0.0), table(n + AHEAD + 1, 4), floats(BLOCK, 0.0), int_table(2, BLOCK)
+    values, shares, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
+    for k in range(BLOCK):
+        kinds[1, k] = 1
     for begin in range(0, corners.shape[1], BLOCK):
         end = min(begin + BLOCK, corners.shape[1])
         size = end - begin
         block = cut_block(values, places, size)
         sort_heights(corners[0, begin:end], corners[1, begin:end], corners[2, begin:end], grid.heights, block)
         dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], grid.direction, cosines[:size])
-        _weigh_rims(cosines[:size], surface.areas_mm2[begin:end], surface.weights[begin:end], surface.feather, block.weight)
+        _weigh_rims(cosines[:size], areas[begin:end], faces.seam_weights[begin:end], scars.feather, block.weight)
         find_ramps(block)
         for ahead in range(AHEAD):
             _measure_chords(float(ahead), block, shares[ahead, :size])
         _add_rims(block, shares, rims)
-        if counted:
-            _weigh_stairs(cosines[:size], surface.stair_areas_mm2[begin:end], along[:size])
+        if len(stair_weights) > 0:
             for ahead in range(AHEAD):
                 share_columns(float(ahead), block, shares[ahead, :size])
-            _add_stairs(block, shares, surface.stairs_up_mm2[begin:end], along, stairs)
+            _weigh_stairs(normals[2, begin:end], areas[begin:end], stair_weights[begin:end], block.weight)
+            add_areas(kinds[0, :size], block, shares, stairs)
+            _weigh_stairs(cosines[:size], areas[begin:end], stair_weights[begin:end], block.weight)
+            add_areas(kinds[1, :size], block, shares, stairs)
     up_mm2, along_mm2 = 0.0, 0.0
     for column in range(n - 1, -1, -1):
         up_mm2 += stairs[column + 1, 0]
-        along_mm2 += stairs[column + 1, 1]
-        out.rim[column] = rims[column] / grid.step_mm
-        out.stairs_up[column] = stairs[column, 2] + up_mm2
-        out.stairs[column] = stairs[column, 3] + along_mm2
+        along_mm2 += stairs[column + 1, 2]
+        rim[column] = rims[column] / grid.step_mm
+        stairs_up[column] = stairs[column, 1] + up_mm2
+        stairs_along[column] = stairs[column, 3] + along_mm2
 
 
 class Rim(NamedTuple):

@@ -12,7 +12,7 @@ from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats
 from mdp.overhang import Mask
 from mdp.plane import Plane
-from mdp.sweep.facets import Facets, Rows
+from mdp.sweep.facets import Facets, Layout
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rays import TriangleTree, first_hit
 
@@ -31,19 +31,19 @@ def _note(cosine: float, height: float, n: int, above: Floats, below: Floats) ->
 
 
 @helper
-def find_slivers(rows: Rows, grid: OffsetGrid, cosines: Floats, fragile: Floats) -> None:
+def find_slivers(layout: Layout, grid: OffsetGrid, cosines: Floats, fragile: Floats) -> None:
     """Distance from each offset up to the next surface looking along the direction and down to the next one looking against it.
 
     Where the surface is smooth the normal of a vertex tells where it looks, at an edge or corner those of its faces do. cosines:
     (n,) of vertex normals and the direction.
     """
     d, heights, n, step = grid.direction, grid.heights, grid.columns, grid.step_mm
-    corners, normals, flatness = rows.corners, rows.normals, rows.flatness
+    corners, normals, flatness = layout.faces.corners, layout.faces.normals, layout.flatness
     above, below = floats(n + 1, np.inf), floats(n + 1, -np.inf)
     for v in range(len(heights)):
         if abs(cosines[v]) > SLIVER_COSINE and flatness[v] > SLIVER_COSINE:
             _note(cosines[v], heights[v], n, above, below)
-    for corner in rows.sharp:
+    for corner in layout.sharp:
         f = corner // 3
         cosine = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
         if abs(cosine) > SLIVER_COSINE:

@@ -41,22 +41,12 @@ from mdp.plane import Plane
 from mdp.stairs import step_shares
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import Classes
-from mdp.sweep.components import UNKNOWN, Topology, View, count_pieces, find_critical
+from mdp.sweep.components import View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
 from mdp.sweep.cylinders import Cylinder, crossings
-from mdp.sweep.facets import Facets, Rows, lay_out
-from mdp.sweep.integrals import (
-    Areas,
-    Needs,
-    OffsetGrid,
-    Overhangs,
-    find_heights,
-    find_lowest,
-    integrate_risky_area,
-    integrate_volume,
-)
-from mdp.sweep.rays import TriangleTree, triangle_tree
-from mdp.sweep.rims import Rims, ScarsAbove, integrate_scars
+from mdp.sweep.facets import FaceTable, Facets, Layout, Scars
+from mdp.sweep.integrals import OffsetGrid, find_heights, find_lowest, integrate_risky_area, integrate_volume
+from mdp.sweep.rims import integrate_scars
 from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
 
 
@@ -112,14 +102,6 @@ class Sweep(NamedTuple):
     contact_area_mm2: Floats
 
 
-class NeedsTable(NamedTuple):
-    """integrals.Needs with a row of classes (k, n) for each direction."""
-
-    sources: Ints
-    classes: Classes
-    weight: float
-
-
 @dataclass(frozen=True, eq=False)
 class Remainder:
     """What the sweep needs to know of a solid, made once for all directions: its mesh, which faces are risky upright, and how
@@ -137,16 +119,6 @@ class Remainder:
     cylinders: tuple[Cylinder, ...] = ()
 
     @property
-    def sources(self) -> Ints:
-        """(m,) of which face of the model each is a piece, below 0: of none, it needs support wherever it is risky."""
-        return np.full(len(self.risky), -1, np.int32) if self.pieces is None else self.pieces.sources
-
-    @property
-    def counts(self) -> Floats:
-        """(m,) how many times an area on each counts that needs support."""
-        return np.ones(len(self.risky)) if self.pieces is None or self.pieces.counts is None else self.pieces.counts
-
-    @property
     def weight(self) -> float:
         """How many times an area counts that is over air."""
         return 1.0 if self.pieces is None else self.pieces.need.weight
@@ -156,14 +128,30 @@ class Remainder:
         return np.zeros((len(directions), 0), np.uint8) if self.pieces is None else self.pieces.need.along(directions)
 
     @cached_property
+    def faces(self) -> FaceTable:
+        """The faces, in the order of the mesh."""
+        pieces, count = self.pieces, len(self.risky)
+        return FaceTable(
+            points=np.ascontiguousarray(self.mesh.vertices.T),
+            corners=np.ascontiguousarray(self.mesh.faces.T.astype(np.uint32)),
+            normals=np.ascontiguousarray(self.mesh.normals.T),
+            areas_mm2=self.mesh.areas_mm2,
+            sources=np.full(count, -1, np.int32) if pieces is None else pieces.sources,
+            risky=self.risky,
+            counts=np.ones(count) if pieces is None or pieces.counts is None else pieces.counts,
+            seam_weights=np.zeros(0) if self.seam_weights is None else self.seam_weights,
+            stair_weights=np.zeros(0) if self.stair_weights is None else self.stair_weights,
+        )
+
+    @cached_property
     def facets(self) -> Facets:
-        """The surface laid out for sweeping."""
-        return lay_out(self.mesh, self.risky, self.seam_weights, self.sources, self.counts, self.stair_weights)
+        """The surface in spatial order."""
+        return Facets.of(self.mesh, self.faces)
 
     @cached_property
     def risky_mm2(self) -> float:
         """What is risky upright, as it counts."""
-        return float((self.mesh.areas_mm2 * self.counts)[self.risky].sum())
+        return float(self.faces.counted_mm2[self.risky].sum())
 
     @cached_property
     def stairs_mm2(self) -> float:
@@ -175,26 +163,15 @@ class Remainder:
         )
 
     @cached_property
-    def triangles(self) -> TriangleTree:
-        """The faces and boxes over them, for rays."""
-        return triangle_tree(self.facets.mesh)
-
-    @cached_property
-    def rows(self) -> Rows:
-        """What the sweep reads in a row; sharp: where the normal of a vertex does not tell where the surface looks."""
-        return self.facets.rows(SLIVER_COSINE)
-
-    @cached_property
-    def topology(self) -> Topology:
-        """What the components need; the sweep looks up the anchors when needed."""
-        anchors = np.full(len(self.mesh.vertices), UNKNOWN, np.int32)
-        return Topology(self.triangles, self.facets.vertex_normals, self.facets.rings, self.facets.standing, anchors)
+    def layout(self) -> Layout:
+        """The surface laid out for sweeping."""
+        return self.facets.layout(SLIVER_COSINE)
 
     @cached_property
     def thin(self) -> Floats:
         """(k, 3, 3) corners of the faces under whose middle the solid is a thin wall or rod: a ray for every face."""
         mesh = self.facets.mesh
-        corners: Floats = mesh.vertices[mesh.faces[thin_faces(self.triangles, THIN_MM)]]
+        corners: Floats = mesh.vertices[mesh.faces[thin_faces(self.layout.triangles, THIN_MM)]]
         return corners
 
     def thin_mm(self, plane: Plane) -> float:
@@ -204,14 +181,6 @@ class Remainder:
     def most_columns(self, step_mm: float) -> int:
         """No direction has more offsets."""
         return int(float(np.linalg.norm(self.mesh.bounds_mm[1] - self.mesh.bounds_mm[0])) / step_mm) + 3
-
-
-class Scars(NamedTuple):
-    """What blemishes a surface: areas that need support, the rims of cuts and stairs."""
-
-    overhangs: Overhangs
-    needs: NeedsTable
-    rims: Rims
 
 
 class Sampling(NamedTuple):
@@ -248,18 +217,9 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
 
 def scars_of(remainder: Remainder, directions: Floats, risky_below: float, hopeless: Mask | None = None) -> Scars:
     """What blemishes a solid's surface along each of some directions; risky_below, hopeless: see gains."""
-    facets, lost = remainder.facets, np.zeros(0, np.bool_) if hopeless is None else hopeless
-    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.counted_mm2, facets.risky, risky_below, lost)
-    rims = Rims(
-        corners=facets.corners,
-        normals=facets.normals,
-        areas_mm2=facets.mesh.areas_mm2,
-        weights=facets.seam_weights,
-        feather=remainder.feather,
-        stair_areas_mm2=facets.stair_areas_mm2,
-        stairs_up_mm2=facets.stairs_up_mm2,
-    )
-    return Scars(surface, NeedsTable(facets.sources, remainder.classes(directions), remainder.weight), rims)
+    lost = np.zeros(0, np.bool_) if hopeless is None else hopeless
+    classes = remainder.classes(directions)
+    return Scars(remainder.facets.faces, risky_below, classes, remainder.weight, remainder.feather, lost)
 
 
 def sweep(
@@ -288,31 +248,28 @@ def sweep(
         pieces=np.zeros(shape, np.int32),
         contact_area_mm2=np.zeros(shape),
     )
-    in_threads(_sweep, shape[0], remainder.rows, remainder.topology, sampling, swept)
+    in_threads(_sweep, shape[0], remainder.layout, sampling, swept)
     return swept
 
 
 @kernel
 def _gains(begin_row: int, end_row: int, scars: Scars, directions: Floats, step_mm: float, out: Gains) -> None:
-    surface, table, rims = scars
-    points = surface.points
-    heights, scratch = floats(points.shape[1], 0.0), int_table(2, len(surface.areas_mm2) + 1)
+    points = scars.faces.points
+    heights, scratch = floats(points.shape[1], 0.0), int_table(2, len(scars.faces.areas_mm2) + 1)
     for row in range(begin_row, end_row):
         d = directions[row]
         first, n = find_heights(points[0], points[1], points[2], d, step_mm, heights)
         out.first[row], out.columns[row] = first, n
         if n > 0:
             grid = OffsetGrid(d, heights, n, step_mm)
-            needs = Needs(table.sources, table.classes[row], table.weight)
-            areas = Areas(out.up_mm2[row], out.residual_mm2[row], out.hopeless_mm2[row])
-            integrate_risky_area(surface, needs, grid, scratch, areas)
-            if len(rims.weights) > 0:
-                integrate_scars(rims, grid, ScarsAbove(out.rim_mm[row], out.stairs_up_mm2[row], out.stairs_mm2[row]))
+            integrate_risky_area(scars, row, grid, scratch, (out.up_mm2[row], out.residual_mm2[row], out.hopeless_mm2[row]))
+            if len(scars.faces.seam_weights) > 0:
+                integrate_scars(scars, grid, (out.rim_mm[row], out.stairs_up_mm2[row], out.stairs_mm2[row]))
 
 
 @kernel
-def _sweep(begin_row: int, end_row: int, rows: Rows, topology: Topology, sampling: Sampling, out: Sweep) -> None:
-    points, normals, step_mm = rows.points, rows.vertex_normals, sampling.step_mm
+def _sweep(begin_row: int, end_row: int, layout: Layout, sampling: Sampling, out: Sweep) -> None:
+    points, normals, step_mm = layout.faces.points, layout.vertex_normals, sampling.step_mm
     section, contact_area, lowest, pieces = out.section_mm2, out.contact_area_mm2, out.lowest_mm, out.pieces
     size = points.shape[1]
     heights, cosines, scratch = floats(size, 0.0), floats(size, 0.0), ints(size, 0)
@@ -322,14 +279,14 @@ def _sweep(begin_row: int, end_row: int, rows: Rows, topology: Topology, samplin
         out.first[row], out.columns[row] = first, n
         if n > 0:
             grid = OffsetGrid(d, heights, n, step_mm)
-            integrate_volume(rows, grid, section[row], out.volume_mm3[row])
-            find_lowest(points[2], rows.rising_edges, grid, sampling.watched_mm[row], lowest[row])
+            integrate_volume(layout, grid, section[row], out.volume_mm3[row])
+            find_lowest(points[2], layout.rising_edges, grid, sampling.watched_mm[row], lowest[row])
             dot(normals[0], normals[1], normals[2], d, cosines)
-            find_slivers(rows, grid, cosines, out.fragile_mm[row])
-            view = View(grid, cosines, scratch[: find_critical(cosines, rows.flatness, heights, topology.rings, scratch)])
-            count_pieces(topology, view, pieces[row])
+            find_slivers(layout, grid, cosines, out.fragile_mm[row])
+            view = View(grid, cosines, scratch[: find_critical(cosines, layout.flatness, heights, layout.rings, scratch)])
+            count_pieces(layout, view, pieces[row])
             wanted = ints(n, 0)
             for column in range(n):
                 contact_area[row, column] = section[row, column]
                 wanted[column] = int(pieces[row, column] == 0 and lowest[row, column] >= sampling.needed_mm[row])
-            find_contact_areas(rows, topology, view, sampling.crumb, wanted, contact_area[row])
+            find_contact_areas(layout, view, sampling.crumb, wanted, contact_area[row])

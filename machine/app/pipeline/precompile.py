@@ -23,7 +23,7 @@ from mdp.clearance import passes_clear
 from mdp.cost.cost import CostTerms, measure_seam
 from mdp.cost.forecast import Surface
 from mdp.cost.hidden import hidden_shares
-from mdp.cost.part_forecast import ModelForecast
+from mdp.cost.part_forecast import forecast_parts
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.kernels.cache import trouble
@@ -91,7 +91,7 @@ def _search() -> None:
     measure_seam(remainder.mesh, remainder.mesh.areas_mm2, PLANE, 0.0)
     terms = CostTerms(45.0, False)
     Surface.of(remainder, terms).left_mm2([PLANE])
-    ModelForecast.of(remainder, remainder.mesh.areas_mm2, terms).parts([PLANE])
+    forecast_parts(Surface.of(remainder, terms, remainder.mesh.areas_mm2), [PLANE])
     _limbs(remainder)
 
 

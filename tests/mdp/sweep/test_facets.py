@@ -2,7 +2,7 @@ import manifold3d as m3
 import numpy as np
 
 from mdp.mesh import Floats, Mesh
-from mdp.sweep.facets import Facets
+from mdp.sweep.facets import Layout
 from mdp.sweep.sweep import Remainder
 from tests import shapes
 
@@ -14,33 +14,33 @@ def _bumpy_ball(seed: int) -> Mesh:
     return Mesh(ball.vertices * (1.0 + 0.05 * waves[:, None]), ball.faces)
 
 
-def _facets(mesh: Mesh) -> Facets:
-    return Remainder(mesh, np.zeros(len(mesh.faces), bool)).facets
+def _layout(mesh: Mesh) -> Layout:
+    return Remainder(mesh, np.zeros(len(mesh.faces), bool)).layout
 
 
-def _turns(facets: Facets, heights: Floats) -> list[int]:
+def _turns(layout: Layout, heights: Floats) -> list[int]:
     """How often the neighbours around each vertex change from higher to lower and back."""
-    starts, neighbours = facets.rings
+    starts, neighbours = layout.rings
     rings = [neighbours[starts[v] : starts[v + 1]] for v in range(len(heights))]
     lower = [heights[ring] < heights[v] for v, ring in enumerate(rings)]
     return [int((side != np.roll(side, 1)).sum()) for side in lower]
 
 
 def test_a_vertex_leaning_more_than_its_flatness_is_regular() -> None:
-    facets = _facets(_bumpy_ball(1))
+    layout = _layout(_bumpy_ball(1))
     for direction in np.random.default_rng(2).normal(size=(5, 3)):
         direction = direction / np.linalg.norm(direction)
-        turns = np.array(_turns(facets, facets.mesh.vertices @ direction))
-        regular = np.abs(facets.vertex_normals @ direction) < facets.flatness
+        turns = np.array(_turns(layout, direction @ layout.faces.points))
+        regular = np.abs(direction @ layout.vertex_normals) < layout.flatness
         assert regular.mean() > 0.8
         assert (turns[regular] == 2).all()
 
 
 def test_neighbours_lie_in_a_ring_each_joined_to_the_next_by_a_face() -> None:
-    facets = _facets(shapes.branch())
-    starts, neighbours = facets.rings
-    corners = {frozenset(face) for face in facets.mesh.faces.tolist()}
-    for v in range(len(facets.mesh.vertices)):
+    layout = _layout(shapes.branch())
+    starts, neighbours = layout.rings
+    corners = {frozenset(face) for face in layout.triangles.faces.tolist()}
+    for v in range(len(layout.triangles.vertices)):
         ring = neighbours[starts[v] : starts[v + 1]].tolist()
         assert all(frozenset((v, a, b)) in corners for a, b in zip(ring, ring[1:] + ring[:1], strict=True))
 
@@ -50,4 +50,4 @@ def test_laying_out_moves_vertices_and_faces_but_not_the_surface() -> None:
     risky = np.arange(len(mesh.faces)) < 5
     facets = Remainder(mesh, risky).facets
     assert facets.mesh.volume_mm3 == mesh.volume_mm3
-    assert sorted(facets.mesh.areas_mm2[facets.risky]) == sorted(mesh.areas_mm2[risky])
+    assert sorted(facets.mesh.areas_mm2[facets.faces.risky]) == sorted(mesh.areas_mm2[risky])

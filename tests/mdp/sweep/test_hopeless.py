@@ -23,7 +23,7 @@ def _lost(least_offset_mm: float) -> tuple[Remainder, np.ndarray]:
 def test_every_overhang_is_saved_where_planes_may_lie_anywhere_and_none_where_they_may_lie_nowhere() -> None:
     assert not _lost(-np.inf)[1].any()
     remainder, lost = _lost(np.inf)
-    assert (lost == remainder.facets.risky).all()
+    assert (lost == remainder.facets.faces.risky).all()
 
 
 @pytest.mark.parametrize("shape", ["tee", "branch", "ball"])
@@ -34,7 +34,7 @@ def test_the_faces_that_are_lost_are_those_that_a_plain_search_over_all_directio
     carried = facets.mesh.normals @ limits.directions.T >= threshold(45.0)
     saved = (carried & (middles @ limits.directions.T > limits.least_offset_mm)).any(axis=1)
     lost = hopeless_faces(facets, Savers(limits.directions, limits.least_offset_mm, threshold(45.0)))
-    assert (lost == (facets.risky & ~saved)).all()
+    assert (lost == (facets.faces.risky & ~saved)).all()
 
 
 def test_what_no_cut_can_save_is_split_by_a_plane_and_bounds_every_cost() -> None:
@@ -54,4 +54,4 @@ def test_a_direction_straight_up_saves_nothing_that_overhangs() -> None:
     mesh = shapes.tee()
     remainder = Remainder(mesh, risky_upright(mesh, 45.0))
     lost = hopeless_faces(remainder.facets, Savers(UP[None], np.array([-np.inf]), threshold(45.0)))
-    assert (lost == remainder.facets.risky).all()
+    assert (lost == remainder.facets.faces.risky).all()

@@ -24,7 +24,7 @@ def nearest_mm(origin: Floats, ray: Floats, mesh: Mesh) -> float:
 def test_the_solid_is_thin_where_a_face_that_looks_the_other_way_is_the_nearest(seed: int, thickness_mm: float) -> None:
     solid = random_solid(seed)
     remainder = Remainder(solid, np.zeros(len(solid.faces), np.bool_))
-    mesh, thin = remainder.facets.mesh, thin_faces(remainder.triangles, thickness_mm)
+    mesh, thin = remainder.facets.mesh, thin_faces(remainder.layout.triangles, thickness_mm)
     assert thin.shape == (len(mesh.faces),)
     for face in range(0, len(mesh.faces), 5):
         nearest = nearest_mm(mesh.vertices[mesh.faces[face]].mean(axis=0), -mesh.normals[face], mesh)
