@@ -20,7 +20,7 @@ from mdp.mesh import Floats, Ints, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
 from mdp.topology.cross_section import loop_edges, loops_at
-from mdp.topology.linked_faces import opposites
+from mdp.topology.edges import opposites
 from profiles.profile import Profile
 
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge

@@ -17,7 +17,7 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.sweep.rays import TriangleTree, blocked_shares, first_hit, frames_about, triangle_tree
-from mdp.topology.linked_faces import opposites
+from mdp.topology.edges import opposites
 
 NEIGHBOURHOOD = 0.03  # radius of a face's neighbourhood, as a share of the model's diagonal
 FULL_BEND = 0.6  # radians by which a place bends inward over such a radius where it counts as hidden altogether

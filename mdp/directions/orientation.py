@@ -4,12 +4,14 @@ A model may rest on a facet of its convex hull (`facet_orientations`), or stand 
 file's box or a principal axis (`straight_orientations`). In most directions spread over the whole sphere only a raft could hold
 it. A cube balanced on a corner has no risky face at all, so the areas of those are a lower bound rather than an advice:
 `best_orientation` takes what rests unless it is asked for the other.
+
+`azimuth_rad` is a bearing about z that turns with a model, so that a search finds the same of it however it is turned.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import update_wrapper
-from math import atan2, cos, degrees, hypot, pi, radians, sin
+from math import atan2, cos, degrees, factorial, hypot, pi, radians, sin
 from typing import Concatenate, NamedTuple, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -32,6 +34,8 @@ SAME_MOMENT = 0.02  # of the largest second moment: axes whose moments differ by
 MOST_FACETS = 1000
 MOST_CORNERS = 1000
 EQUAL_MM2 = 1e-6  # areas that differ less are equal but for rounding
+HIGHEST = 6  # the order of the highest moment that is measured
+PLAIN = 1e-3  # of the largest that a moment can be: less is rounding, or a symmetry
 SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 32)])
 
 
@@ -291,6 +295,37 @@ def centre_of_mass(mesh: Mesh) -> Floats:
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
     centre: Floats = middle + volumes @ (a + b + c) / (4.0 * volumes.sum())
     return centre
+
+
+def azimuth_rad(mesh: Mesh) -> float:
+    """Where the first moment of a mesh points that is not 0: the integral over the surface of (x + i y)^m about the centre of
+    mass points in m directions at once, of which the higher moments choose; 0 where there is none, as of a body of revolution.
+
+    Over a triangle with the corners a, b, c as complex numbers it is 2 A m! / (m + 2)! times the sum of all a^i b^j c^k with
+    i + j + k = m, A its area.
+    """
+    moments = _moments(mesh)
+    order = next((m for m in range(1, HIGHEST + 1) if abs(moments[m - 1]) > PLAIN), 0)
+    if order == 0:
+        return 0.0
+    bearings = (np.angle(moments[order - 1]) + 2.0 * np.pi * np.arange(order)) / order
+    powers = np.arange(1, HIGHEST + 1)
+    along = np.real(np.exp(-1j * np.outer(bearings, powers)) @ moments)
+    return float(bearings[int(np.argmax(np.round(along, 6)))])
+
+
+def _moments(mesh: Mesh) -> np.ndarray:
+    """(6,) the moments, each as a share of the largest that it can be."""
+    centre = centre_of_mass(mesh)
+    z = (mesh.vertices[:, 0] - centre[0]) + 1j * (mesh.vertices[:, 1] - centre[1])
+    z /= np.abs(z).max()
+    sums = [np.ones(len(mesh.faces), complex), *np.zeros((HIGHEST, len(mesh.faces)), complex)]
+    for corner in z[mesh.faces].T:  # complete homogeneous polynomials of ever more variables
+        for m in range(1, HIGHEST + 1):
+            sums[m] = sums[m] + corner * sums[m - 1]
+    total = mesh.areas_mm2.sum()
+    scale = [2.0 * factorial(m) / factorial(m + 2) for m in range(1, HIGHEST + 1)]
+    return np.array([scale[m - 1] * (mesh.areas_mm2 @ sums[m]) / total for m in range(1, HIGHEST + 1)])
 
 
 def _turns(direction: Floats) -> tuple[float, float]:

@@ -35,7 +35,7 @@ from mdp.search.node import Node
 from mdp.search.parts import Outcome, decomposition_of, make_parts, notes_of_search
 from mdp.search.polish import make_regular, polish, settle
 from mdp.search.problem import Problem, with_search
-from mdp.sweep.deviation import distances_mm
+from mdp.sweep.rays import distances_mm
 from mdp.sweep.limbs import cylinders_cut
 from mdp.zone import Volume, Zones
 from profiles.errors import PlanError

@@ -1,7 +1,8 @@
 """Descent: the way straight down a surface, as water takes it, and what it comes to (numba kernels).
 
 The way follows the steepest slope through faces, along edges where both sides slope towards them, and from vertex to vertex: it
-is one of the shape, the same however that is cut into triangles.
+is one of the shape, the same however that is cut into triangles. So is whether a hanging place begins in mid-air, which it does
+where it holds a bottom of the surface that lies deeper than DIP_MM below all ways out of it.
 """
 
 from typing import NamedTuple
@@ -10,16 +11,18 @@ import numpy as np
 
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
-from mdp.topology.linked_faces import LinkedFaces
+from mdp.topology.edges import LinkedFaces
 
 ANCHOR_MM = 1.0  # a ridge that goes down less than this is no anchor: it hangs in the air itself
-ROUNDING_MM = 1e-6  # of a way down just as deep
+ROUNDING_MM = 1e-6  # of a way down just as deep, and of bottoms that are as low
 ANCHORED, LOOSE = 0, -1  # what a way down comes to, if not to a patch, whose number is above 0
 SAFE = 0  # the number of faces that belong to no patch
 LEVEL = 1e-6  # slope of a face that water does not leave
 ASIDE = 1e-9  # a way that leaves an edge by less runs along it
 END = 1e-7  # share of an edge that is its end
 MOST_STEPS = 1000  # over faces, about a vertex or down; never reached by a sound mesh
+DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
+UNSEEN = -1  # no vertex
 
 
 class View(NamedTuple):
@@ -218,3 +221,60 @@ def _end_at_vertex(view: View, first: int, v: int, own: int) -> int:
         if f < 0:
             break
     return ANCHORED if pit else LOOSE
+
+
+class Pool(NamedTuple):
+    """seen (n,): from which bottom, one with a way out, a vertex was seen, UNSEEN else; queue (n,): room."""
+
+    seen: Ints
+    queue: Ints
+
+
+@no_nrt
+def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool, base_mm: float) -> bool:
+    """Whether a patch has a bottom in the air."""
+    for f in patch:
+        for k in range(3):
+            v = surface.faces[f, k]
+            candidate = pool.seen[v] == UNSEEN and heights[v] > base_mm and _is_bottom(surface, heights, v)
+            if candidate and not _has_way_out(surface, heights, v, pool, base_mm):
+                return True
+    return False
+
+
+@no_nrt
+def _is_bottom(surface: LinkedFaces, heights: Floats, v: int) -> bool:
+    """Whether no vertex next to one lies lower."""
+    at, end = surface.starts[v], surface.starts[v + 1]
+    while at < end and heights[surface.around[at]] >= heights[v]:
+        at += 1
+    return bool(at == end)
+
+
+@no_nrt
+def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool, base_mm: float) -> bool:
+    """Whether what hangs together with a bottom and lies no higher than DIP_MM above it goes on below it or to the base. If so,
+    it has been seen, as far as one had to look."""
+    seen, queue = pool.seen, pool.queue
+    low = heights[bottom] - ROUNDING_MM
+    seen[bottom], queue[0] = bottom, bottom
+    at, count = 0, 1
+    while at < count:
+        v = queue[at]
+        for k in range(surface.starts[v], surface.starts[v + 1]):
+            w = surface.around[k]
+            if heights[w] < low or heights[w] <= base_mm or _leads_out(seen[w], bottom, heights):
+                return True
+            if seen[w] != bottom and heights[w] <= heights[bottom] + DIP_MM:
+                seen[w], queue[count] = bottom, w
+                count += 1
+        at += 1
+    for k in range(count):
+        seen[queue[k]] = UNSEEN
+    return False
+
+
+@no_nrt
+def _leads_out(seen_bottom: int, bottom: int, heights: Floats) -> bool:
+    """Whether another bottom as low, which has a way out, has been found."""
+    return bool(seen_bottom != UNSEEN and seen_bottom != bottom and abs(heights[seen_bottom] - heights[bottom]) <= ROUNDING_MM)

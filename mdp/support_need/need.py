@@ -5,15 +5,16 @@ from functools import cached_property
 
 import numpy as np
 
-from mdp.directions.azimuth import axes_along, azimuth_rad
 from mdp.directions.frame import AXES, FramedDirections, framed
+from mdp.directions.orientation import azimuth_rad
 from mdp.directions.spread import spread
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, threshold
+from mdp.pose import about
 from mdp.support_need.over_air import find_over_air
 from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Limits, classify
-from mdp.topology.linked_faces import LinkedFaces, flat_places, link
+from mdp.topology.edges import LinkedFaces, flat_places, link
 from profiles.process import Process
 
 MOST_CACHED = 256  # single directions whose classes are cached; a polished plane comes back to the same few again and again
@@ -63,7 +64,7 @@ class SupportNeed:
     def of(cls, mesh: Mesh, process: Process, weight: float, enforced: Mask | None = None) -> "SupportNeed":
         """The need of a model that stands on the platform; enforced: None: no face is."""
         enforced = np.zeros(len(mesh.faces), dtype=np.bool_) if enforced is None else enforced
-        return cls(link(mesh), process, weight, axes_along(azimuth_rad(mesh)), enforced)
+        return cls(link(mesh), process, weight, about(UP, azimuth_rad(mesh)).T, enforced)
 
     @cached_property
     def upright(self) -> Mask:

@@ -14,7 +14,7 @@ from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.support_need.patches import Classes
-from mdp.topology.linked_faces import LinkedFaces
+from mdp.topology.edges import LinkedFaces
 
 CELLS = 96  # of a grid along its longer side
 LEAST_COSINE = 0.05  # of a surface that looks up and the direction

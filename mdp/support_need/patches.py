@@ -11,16 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.directions.frame import FramedDirections
-from mdp.kernels.arrays import dot, floats, ints
+from mdp.kernels.arrays import dot, floats, ints, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
-from mdp.support_need.descent import SAFE, View
-from mdp.support_need.dips import UNSEEN, Pool, begins_in_air
-from mdp.support_need.narrow import is_near_anchors, triangles_room
+from mdp.support_need.descent import SAFE, UNSEEN, Pool, View, begins_in_air
 from mdp.support_need.sides import UNKNOWN, Patches, find_sides, is_rim, rests, seen_along
+from mdp.support_need.spans import DEEP, Sides, is_near_anchors, spans
 from mdp.support_need.spans import ROUNDING_MM as SPAN_ROUNDING_MM
-from mdp.support_need.spans import Sides, spans
-from mdp.topology.linked_faces import LinkedFaces
+from mdp.topology.edges import LinkedFaces
 
 Classes = NDArray[np.uint8]
 CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2  # classes of faces, the dearer the higher
@@ -166,7 +164,7 @@ def _is_held(view: View, patch: Patch, sides: Sides, longest_mm: float, width_mm
 @helper
 def _is_narrow(surface: LinkedFaces, patch: Patch, sides: Sides, reach_mm: float) -> bool:
     """Whether no place of a patch lies further than that from the nearest anchor."""
-    todo, triangle, nearest = triangles_room(), floats(6, 0.0), 0
+    todo, triangle, nearest = table(DEEP, 6), floats(6, 0.0), 0
     for f in patch.faces:
         for corner in range(3):
             x, y = seen_along(surface.vertices, surface.faces[f, corner], patch.frame)

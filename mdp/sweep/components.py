@@ -20,7 +20,7 @@ from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.facets import UNKNOWN, Layout, Rings
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rays import ANY_FACE, first_hit
-from mdp.topology.union_find import root, singletons
+from mdp.topology.components import root, singletons
 
 
 class View(NamedTuple):
@@ -111,27 +111,6 @@ def number_leaves(tree: MergeTree) -> Ints:
 
 
 @helper
-def join_at_saddles(tree: MergeTree) -> Ints:
-    """(j, 3): two leaves whose components meet, and the vertex at which they do."""
-    starts, neighbours = tree.rings.starts, tree.rings.neighbours
-    most = 0
-    for v in tree.critical:
-        most += starts[v + 1] - starts[v]
-    joins = int_table(most, 3)
-    size = 0
-    for v in tree.critical:
-        last = -1
-        for at in range(starts[v], starts[v + 1]):
-            if before(tree.heights, neighbours[at], v, tree.up):
-                leaf = find_leaf(tree, int(neighbours[at]))
-                if last >= 0 and leaf != last:
-                    joins[size, 0], joins[size, 1], joins[size, 2] = last, leaf, v
-                    size += 1
-                last = leaf
-    return joins[:size]
-
-
-@helper
 def anchor_of(layout: Layout, v: int) -> int:
     """The face that a ray from a vertex into the solid meets; below 0: none."""
     if layout.anchors[v] == UNKNOWN:
@@ -144,41 +123,44 @@ def anchor_of(layout: Layout, v: int) -> int:
 
 
 @helper
-def join_to_anchors(tree: MergeTree, leaves: Ints, layout: Layout, cosines: Floats) -> Ints:
-    """(j, 3): the leaf at a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
-    heights, faces, up = tree.heights, layout.triangles.faces, tree.up
-    joins = int_table(len(leaves), 3)
-    size = 0
-    for leaf in range(len(leaves)):
-        v = leaves[leaf]
-        if cosines[v] == 0.0 or (cosines[v] < 0.0) != up:
-            continue
-        anchor = anchor_of(layout, int(v))
-        if anchor < 0:
-            continue
-        w = faces[anchor, 0]
-        for corner in (1, 2):
-            if before(heights, faces[anchor, corner], w, up):
-                w = faces[anchor, corner]
-        if before(heights, w, v, up):
-            joins[size, 0], joins[size, 2] = leaf, v
-            joins[size, 1] = find_leaf(tree, int(w))
-            size += 1
-    return joins[:size]
+def _anchor_beyond(tree: MergeTree, layout: Layout, v: int, cosine: float) -> int:
+    """A vertex, passed before, of the face that a ray from the first one of a void into the solid meets; below 0: none."""
+    faces, heights = layout.triangles.faces, tree.heights
+    face = anchor_of(layout, v) if cosine != 0.0 and (cosine < 0.0) == tree.up else -1
+    if face < 0:
+        return -1
+    w = faces[face, 0]
+    for corner in (1, 2):
+        if before(heights, faces[face, corner], w, tree.up):
+            w = faces[face, corner]
+    return int(w) if before(heights, w, v, tree.up) else -1
 
 
 @helper
 def join_leaves(tree: MergeTree, leaves: Ints, layout: Layout, cosines: Floats) -> Ints:
-    """(j, 3): two leaves whose components join, at a saddle or through solid, and the vertex at which they do."""
-    saddles, anchored = join_at_saddles(tree), join_to_anchors(tree, leaves, layout, cosines)
-    joins = int_table(len(saddles) + len(anchored), 3)
-    for k in range(len(saddles)):
-        for which in range(3):
-            joins[k, which] = saddles[k, which]
-    for k in range(len(anchored)):
-        for which in range(3):
-            joins[len(saddles) + k, which] = anchored[k, which]
-    return joins
+    """(j, 3): two leaves whose components join, and the vertex at which they do: a saddle, or through solid the first of a void.
+
+    cosines: of vertex normals and the direction.
+    """
+    starts, neighbours, most, size = tree.rings.starts, tree.rings.neighbours, len(leaves), 0
+    for v in tree.critical:
+        most += starts[v + 1] - starts[v]
+    joins = int_table(most, 3)
+    for v in tree.critical:
+        last = -1
+        for at in range(starts[v], starts[v + 1]):
+            if before(tree.heights, neighbours[at], v, tree.up):
+                leaf = find_leaf(tree, int(neighbours[at]))
+                if last >= 0 and leaf != last:
+                    joins[size, 0], joins[size, 1], joins[size, 2] = last, leaf, v
+                    size += 1
+                last = leaf
+    for leaf in range(len(leaves)):
+        w = _anchor_beyond(tree, layout, int(leaves[leaf]), cosines[leaves[leaf]])
+        if w >= 0:
+            joins[size, 0], joins[size, 1], joins[size, 2] = leaf, find_leaf(tree, w), leaves[leaf]
+            size += 1
+    return joins[:size]
 
 
 @helper

@@ -15,7 +15,7 @@ from mdp.mesh import Floats, Ints
 from mdp.sweep.components import View, before, find_leaf, grow_tree, join_columns, join_leaves, number_leaves
 from mdp.sweep.facets import Layout
 from mdp.sweep.integrals import OffsetGrid, column_over
-from mdp.topology.union_find import root, singletons
+from mdp.topology.components import root, singletons
 
 LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
 

@@ -21,7 +21,7 @@ from mdp.directions.revolution import find_revolution
 from mdp.mesh import Floats, Indices, Ints, Mesh
 from mdp.plane import Plane
 from mdp.topology.components import connected_components
-from mdp.topology.linked_faces import opposites
+from mdp.topology.edges import opposites
 
 # Cosines of the angles by which two strips fold: a cylinder of eight sides does by 45 degrees, one of 900 by 0.4.
 LEAST_FOLD, MOST_FOLD = cos(radians(0.4)), cos(radians(46.0))

@@ -39,7 +39,7 @@ from mdp.sweep.pieces import (
     volume,
 )
 from mdp.sweep.sweep import Remainder, scars_of
-from mdp.topology.union_find import root
+from mdp.topology.components import root
 
 MOST_JOINED = 6  # limbs that one plane cuts off together
 MOST_ROWS = 48  # candidates per direction

@@ -21,7 +21,7 @@ from mdp.sweep.crossing import chord_at, moment_above, share_above, slopes
 from mdp.sweep.facets import Layout, Scars, times_along
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rims import weigh_chord
-from mdp.topology.union_find import root
+from mdp.topology.components import root
 
 NONE = -1
 SUMS = UP, RESIDUAL, STAIRS_UP, STAIRS, SECTION, MOMENT, RIM = 0, 1, 2, 3, 4, 5, 6
@@ -30,7 +30,7 @@ AREAS = 5  # the first five sums are areas: a face that crosses the plane adds t
 
 class Pieces(NamedTuple):
     """The pieces above a plane. For each vertex: heights (n,) along the direction in steps; over (n,) the last column that it
-    lies above; cosines (n,) of its normal with the direction; parent (n,) see union_find, NONE while it lies below the plane.
+    lies above; cosines (n,) of its normal with the direction; parent (n,) by union-find, NONE while it lies below the plane.
 
     For each face: face_over (m,) the last column that it reaches above; weights (m, 7) what it adds to the SUMS.
     For the vertex that stands for a piece: whole (n, 7) the SUMS of its faces wholly above; crossing (n, 7) those of the shares

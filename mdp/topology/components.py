@@ -1,7 +1,12 @@
-"""Components: what hangs together, of nodes and edges between them, and of a surface over its vertices."""
+"""Components: what hangs together, of nodes and edges between them, and of a surface over its vertices.
+
+Kernels find them by union-find: sets that grow together, each known by one of its members (paths halved).
+"""
 
 import numpy as np
 
+from mdp.kernels.arrays import ints
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Indices, Ints
 
 
@@ -30,3 +35,28 @@ def connected_components(count: int, a: Ints | Indices, b: Ints | Indices) -> In
 def vertex_components(count: int, faces: Ints | Indices) -> Indices:
     """(count,) the least vertex that hangs together with each over (m, 3) faces."""
     return connected_components(count, faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())
+
+
+@helper
+def singletons(size: int) -> Ints:
+    """The parents of `count` members, none of which have been joined."""
+    parent = ints(size, 0)
+    for member in range(size):
+        parent[member] = member
+    return parent
+
+
+@no_nrt
+def root(parent: Ints, member: int) -> int:
+    """The member that stands for all that one has been joined with."""
+    while parent[member] != member:
+        parent[member] = parent[parent[member]]
+        member = parent[member]
+    return member
+
+
+@helper
+def join(parent: Ints, a: int, b: int) -> None:
+    """Join two sets; the lesser of the members that stand for them stands for both."""
+    p, q = root(parent, a), root(parent, b)
+    parent[max(p, q)] = min(p, q)

@@ -15,7 +15,7 @@ from mdp.kernels.arrays import ints, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.kernels.sorting import rank, sort_into_bins
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.topology.linked_faces import opposites
+from mdp.topology.edges import opposites
 from profiles.errors import SliceError
 
 

@@ -1,17 +1,22 @@
-"""Edges of a surface: half-edges, and what they share.
+"""Edges of a surface: half-edges, what they share, and a surface with the face on the other side of every edge, for kernels.
 
 Half-edge 3 f + k runs from corner k of face f to the next corner.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.mesh import Indices
+from mdp.kernels.arrays import ints
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats, Indices, Ints, Mesh
+from mdp.topology.components import connected_components
 
 Flags = NDArray[np.bool_]
+FLAT_COSINE = 1.0 - 1e-9  # of the normals of neighbours in one flat place: some 0.003 degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,3 +62,72 @@ def edges_of(faces: Indices) -> Edges:
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     _, edge = np.unique(low * (int(faces.max(initial=0)) + 1) + high, return_inverse=True)
     return Edges(starts, ends, edge)
+
+
+def opposites(faces: Ints | Indices) -> Ints:
+    """(3 m,) for every half-edge of (m, 3) faces the one that runs the other way on the face across; -1 on a border.
+
+    The half-edges of an edge with more than two faces are paired in the order of their faces.
+
+    >>> opposites(np.array([[0, 1, 2], [2, 1, 3]]))
+    array([-1,  3, -1,  1, -1, -1], dtype=int32)
+    """
+    starts, ends = faces.ravel().astype(np.int64), faces[:, [1, 2, 0]].ravel().astype(np.int64)
+    keys = np.minimum(starts, ends) * (int(starts.max(initial=0)) + 1) + np.maximum(starts, ends)
+    paired: Ints = _paired(np.argsort(keys, kind="stable"), keys, starts < ends)
+    return paired
+
+
+@kernel
+def _paired(order: Indices, keys: Indices, forward: NDArray[np.bool_]) -> Ints:
+    """Pair the half-edges of every key; order: by their keys."""
+    paired: Ints = ints(len(keys), -1)
+    start = 0
+    while start < len(order):
+        end = start
+        while end < len(order) and keys[order[end]] == keys[order[start]]:
+            end += 1
+        for a in range(start, end):
+            for b in range(a + 1, end):
+                p, q = order[a], order[b]
+                if paired[p] < 0 and paired[q] < 0 and forward[p] != forward[q]:
+                    paired[p], paired[q] = q, p
+        start = end
+    return paired
+
+
+class LinkedFaces(NamedTuple):
+    """A surface of m faces and n vertices: vertices (3, n), faces (m, 3), unit normals (3, m), areas (m,), neighbours (m, 3): the
+    face across the edge from corner k to the next one, below 0 where there is none; the vertices next to v are
+    around[starts[v] : starts[v + 1]]."""
+
+    vertices: Floats
+    faces: Ints
+    normals: Floats
+    areas_mm2: Floats
+    neighbours: Ints
+    starts: Ints
+    around: Ints
+
+
+def link(mesh: Mesh) -> LinkedFaces:
+    """A mesh with its neighbours."""
+    begins, ends = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    order = np.lexsort((ends, begins))
+    return LinkedFaces(
+        vertices=np.ascontiguousarray(mesh.vertices.T),
+        faces=mesh.faces,
+        normals=np.ascontiguousarray(mesh.normals.T),
+        areas_mm2=mesh.areas_mm2,
+        neighbours=opposites(mesh.faces).reshape(-1, 3) // 3,
+        starts=np.searchsorted(begins[order], np.arange(len(mesh.vertices) + 1)).astype(np.int32),
+        around=ends[order],
+    )
+
+
+def flat_places(surface: LinkedFaces) -> Ints:
+    """(m,) the least face of the flat place that each face belongs to with its neighbours."""
+    face, corner = np.nonzero(surface.neighbours >= 0)
+    across, (x, y, z) = surface.neighbours[face, corner], surface.normals
+    flat = x[face] * x[across] + y[face] * y[across] + z[face] * z[across] > FLAT_COSINE
+    return connected_components(len(surface.faces), face[flat], across[flat]).astype(np.int32)

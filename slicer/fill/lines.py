@@ -15,7 +15,7 @@ from mdp.kernels.arrays import flags, floats, longs
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.sorting import argsort
 from mdp.mesh import Floats, Indices
-from mdp.topology.union_find import join, root, singletons
+from mdp.topology.components import join, root, singletons
 from slicer.geometry.clip import NO_PIECES, Pieces, clip_lines, rotation_2d
 from slicer.geometry.edge_index import EdgeIndex
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset

@@ -9,7 +9,7 @@ import numpy as np
 from mdp.kernels.arrays import flags, ints, longs
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices, Ints
-from mdp.topology.linked_faces import opposites
+from mdp.topology.edges import opposites
 from slicer.geometry.polyline import Segment, orientation
 
 ROUNDING = 1e-14  # of the terms that are added up: ten times their error

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdp.cut import Solid, mesh_of
-from mdp.directions.azimuth import azimuth_rad
+from mdp.directions.orientation import azimuth_rad
 from mdp.mesh import Mesh
 from mdp.pose import UP, about
 

@@ -11,9 +11,9 @@ from numba import njit
 
 from mdp.kernels.arrays import ints
 from mdp.mesh import Floats, Ints
-from mdp.support_need import dips
-from mdp.support_need.dips import DIP_MM, UNSEEN, Pool
-from mdp.topology.linked_faces import LinkedFaces, link
+from mdp.support_need import descent
+from mdp.support_need.descent import DIP_MM, UNSEEN, Pool
+from mdp.topology.edges import LinkedFaces, link
 from tests.mdp.solids import random_solid
 from tests.shapes import box
 
@@ -23,7 +23,7 @@ NO_BASE = -np.inf
 @njit
 def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, base_mm: float) -> bool:
     pool = Pool(ints(len(heights), UNSEEN), ints(len(heights), 0))
-    return dips.begins_in_air(surface, heights, patch, pool, base_mm)
+    return descent.begins_in_air(surface, heights, patch, pool, base_mm)
 
 
 def has_dip(surface: LinkedFaces, heights: Floats, patch: Ints, base_mm: float) -> bool:

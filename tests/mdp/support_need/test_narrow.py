@@ -6,9 +6,10 @@ from hypothesis import strategies as st
 from numba import njit
 from shapely import LineString, MultiLineString, Polygon
 
+from mdp.kernels.arrays import table
 from mdp.mesh import Floats
-from mdp.support_need import narrow
-from mdp.support_need.spans import Sides
+from mdp.support_need import spans
+from mdp.support_need.spans import DEEP, Sides
 
 REACH_MM = 0.9
 SLACK_MM = 0.06  # two places that are looked at are 0.1 mm apart
@@ -16,7 +17,7 @@ SLACK_MM = 0.06  # two places that are looked at are 0.1 mm apart
 
 @njit
 def near_anchors(sides: Sides, reach_mm: float, triangle: Floats, nearest: int) -> int:
-    return narrow.is_near_anchors(sides, reach_mm, triangle, narrow.triangles_room(), nearest)
+    return spans.is_near_anchors(sides, reach_mm, triangle, table(DEEP, 6), nearest)
 
 
 @settings(max_examples=150)

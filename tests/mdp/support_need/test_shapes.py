@@ -14,7 +14,7 @@ from mdp.pose import about, unit
 from mdp.support_need.need import SupportNeed, needs_support
 from mdp.support_need.over_air import find_over_air
 from mdp.support_need.patches import CARRIES_ITSELF, NARROW
-from mdp.topology.linked_faces import flat_places, link
+from mdp.topology.edges import flat_places, link
 from profiles.profile import load
 from tests.mdp.solids import random_solid
 from tests.shapes import from_manifold, standing

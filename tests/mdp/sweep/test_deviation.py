@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from mdp.mesh import Mesh
-from mdp.sweep.deviation import distances_mm
+from mdp.sweep.rays import distances_mm
 from tests import shapes
 from tests.mdp.solids import random_solid
 

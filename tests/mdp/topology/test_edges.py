@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from numba import njit
 
 from mdp.mesh import Ints, Mesh
-from mdp.topology import union_find
+from mdp.topology import components
 from mdp.topology.components import vertex_components
-from mdp.topology.edges import edges_of
-from mdp.topology.linked_faces import link, opposites
+from mdp.topology.edges import edges_of, link, opposites
 from tests.mdp.solids import random_solid
 from tests.shapes import box, hollow
 
@@ -62,11 +61,11 @@ def test_vertices_hang_together_where_a_graph_of_the_edges_says_so(corners: list
 
 @njit
 def _joined(size: int, pairs: Ints) -> Ints:
-    parent = union_find.singletons(size)
+    parent = components.singletons(size)
     for k in range(len(pairs)):
-        union_find.join(parent, pairs[k, 0], pairs[k, 1])
+        components.join(parent, pairs[k, 0], pairs[k, 1])
     for member in range(size):
-        parent[member] = union_find.root(parent, member)
+        parent[member] = components.root(parent, member)
     return parent
 
 

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdp.mesh import Ints, Mesh
-from mdp.topology.edges import edges_of
-from mdp.topology.linked_faces import flat_places, link, opposites
+from mdp.topology.edges import edges_of, flat_places, link, opposites
 from tests.mdp.solids import random_solid
 from tests.shapes import box, tee
 
