@@ -81,7 +81,7 @@ def core_s(work: Callable[[], object]) -> float:
 def _all_heights(points, directions, step):  # type: ignore[no-untyped-def]
     heights, counts = np.empty((len(directions), points.shape[1])), np.empty(len(directions), np.int64)
     for k in range(len(directions)):
-        counts[k] = find_heights(points[0], points[1], points[2], directions[k], step, heights[k])[1]
+        counts[k] = find_heights(points, directions[k], step, heights[k])[1]
     return heights, counts
 
 

@@ -189,11 +189,6 @@ def tips_over(base: CrossSection, height_mm: float) -> bool:
     return _tension_mpa(section_edges(base), height_mm) > ADHESION_MPA
 
 
-def section_modulus_mm3(base: CrossSection) -> float:
-    """Least section modulus of an area over all directions of bending, 0 of an empty one."""
-    return 1.0 / greatest_stress_per_moment(section_edges(base))
-
-
 def section_edges(area: CrossSection) -> Floats:
     """(n, 4) the edges x, y, x, y of an area's outlines, the area on the left of each."""
     return loop_edges([np.asarray(loop) for loop in area.to_polygons()])

@@ -70,7 +70,8 @@ class Surface:
             rim_weights = np.zeros(count)
         stairs = np.zeros(count) if remainder.stair_weights is None else remainder.stair_weights
         faces = faces._replace(seam_weights=rim_weights, stair_weights=stairs).of_faces(chosen)
-        scars = Scars(faces, least, np.zeros((0, 0), np.uint8), remainder.weight, terms.feather, np.zeros(0, np.bool_))
+        no_classes, none_lost = np.zeros((0, 0), np.uint8), np.zeros(0, np.bool_)
+        scars = Scars(np.zeros((0, 3)), faces, least, no_classes, remainder.weight, terms.feather, none_lost)
         return cls(remainder, terms, chosen, scars)
 
     def classes(self, planes: Sequence[Plane]) -> Classes:

@@ -102,31 +102,17 @@ def resting_orientations(mesh: Mesh, angle_deg: float) -> list[Orientation]:
     return sorted((orientation for orientation in facet_orientations(mesh, angle_deg) if orientation.stable), key=_rank)
 
 
-@dataclass(frozen=True, eq=False)
-class RestingFacet:
-    """A facet of a model's convex hull on which it rests: its outward normal (3,), and the corners of its triangles (k, 3, 3),
-    mm."""
-
-    normal: Floats
-    corners: Floats
-
-
-def resting_facets(mesh: Mesh) -> list[RestingFacet]:
-    """The facets of the hull, its triangles grouped by plane, that the model rests on without tipping over, largest first."""
+def resting_facets(mesh: Mesh) -> list[tuple[Floats, Floats]]:
+    """The facets of the hull, its triangles grouped by plane, that the model rests on without tipping over, largest first:
+    outward normal (3,) and the corners of its triangles (k, 3, 3), mm."""
     hull, directions = convex_hull(mesh.vertices), np.concatenate([_facets(mesh), UP[None]])
     directions = directions[_lean_deg(mesh, directions) >= LEAN_DEG]
     if len(directions) == 0:
         return []
     along = hull.normals @ -directions.T
     nearest = np.where(along.max(axis=1) >= cos(radians(SAME_FACET_DEG)), along.argmax(axis=1), -1)
-    groups = [(-direction, hull.vertices[hull.faces[nearest == k]]) for k, direction in enumerate(directions)]
-    return [RestingFacet(normal, corners) for normal, corners in groups if len(corners)]
-
-
-@cached_with_mesh
-def measure_upright(mesh: Mesh, angle_deg: float) -> Orientation:
-    """The model as it stands."""
-    return _measure(mesh, angle_deg, UP[None])[0]
+    facets = [(-direction, hull.vertices[hull.faces[nearest == k]]) for k, direction in enumerate(directions)]
+    return [(normal, corners) for normal, corners in facets if len(corners)]
 
 
 def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
@@ -147,11 +133,6 @@ def motion_between(before: Mesh, after: Mesh) -> tuple[Floats, Floats]:
     return rotation, second - rotation @ first
 
 
-def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
-    """(k,) risky areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
-    return _face_areas(mesh, directions, angle_deg)[:, RISKY]
-
-
 class _Faces(NamedTuple):
     """A mesh for a kernel: (n, 3) vertices, (m, 3) corners, (m, 3) normals, and (m,) areas of its faces."""
 
@@ -164,7 +145,7 @@ class _Faces(NamedTuple):
 RISKY, STAIRS, SHADOW = range(3)
 
 
-def _face_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
+def face_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
     """(k, 3) areas, mm2, of the model printed along (k, 3) unit directions: the faces that overhang too far and do not stand on
     the plate; all faces, each times the height of its steps as a share of a layer's; and their shadow."""
     areas_mm2 = np.zeros((len(directions), 3))
@@ -222,7 +203,7 @@ def _principal_axes(mesh: Mesh) -> Floats:
 
 
 def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
-    areas_mm2 = _face_areas(mesh, directions, angle_deg)
+    areas_mm2 = face_areas(mesh, directions, angle_deg)
     lean_deg, corners = _lean_deg(mesh, directions), convex_hull(mesh.vertices).vertices
     return [
         Orientation(

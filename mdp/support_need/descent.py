@@ -23,6 +23,7 @@ END = 1e-7  # share of an edge that is its end
 MOST_STEPS = 1000  # over faces, about a vertex or down; never reached by a sound mesh
 DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
 UNSEEN = -1  # no vertex
+Vector = tuple[float, float, float]
 
 
 class View(NamedTuple):
@@ -86,15 +87,16 @@ def outflow(view: View, f: int, corner: int) -> float:
     vertices, faces, normals, d = view.surface.vertices, view.surface.faces, view.surface.normals, view.direction
     a, b = faces[f, corner], faces[f, (corner + 1) % 3]
     x, y, z = vertices[0, b] - vertices[0, a], vertices[1, b] - vertices[1, a], vertices[2, b] - vertices[2, a]
-    p, q, r = _across(x, y, z, normals[0, f], normals[1, f], normals[2, f])
+    p, q, r = _across((x, y, z), (normals[0, f], normals[1, f], normals[2, f]))
     size = p * p + q * q + r * r
     # at right angles to the normal, so that the direction itself will do
     return -(d[0] * p + d[1] * q + d[2] * r) / np.sqrt(size) if size > 0.0 else 0.0
 
 
 @no_nrt
-def _across(x: float, y: float, z: float, nx: float, ny: float, nz: float) -> tuple[float, float, float]:
+def _across(edge: Vector, normal: Vector) -> Vector:
     """The vector in a face's plane across an edge and out of the face."""
+    (x, y, z), (nx, ny, nz) = edge, normal
     return y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
 
 
@@ -119,7 +121,7 @@ def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int,
         a, b = faces[f, corner], faces[f, (corner + 1) % 3]
         ax, ay, az = vertices[0, a], vertices[1, a], vertices[2, a]
         x, y, z = vertices[0, b] - ax, vertices[1, b] - ay, vertices[2, b] - az
-        p, q, r = _across(x, y, z, nx, ny, nz)
+        p, q, r = _across((x, y, z), (nx, ny, nz))
         out = -(d[0] * p + d[1] * q + d[2] * r)
         if out > ASIDE * np.sqrt(p * p + q * q + r * r):
             way = ((ax - point[0]) * p + (ay - point[1]) * q + (az - point[2]) * r) / out

@@ -5,8 +5,6 @@ surface that looks up; a place is over air where none in its cell lies lower tha
 places of a raster, and look up as a whole, so that it does not matter how they are cut into triangles.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from mdp.directions.frame import FramedDirections
@@ -25,16 +23,9 @@ MOST = 0.55  # share of a flat place over air that makes all of it; half of it o
 TINY = 1e-9  # twice the area of a face seen edge-on, in cells
 
 
-class Counts(NamedTuple):
-    """For every flat place, at its number (m,): how low and how high it reaches, how many places of the raster lie on it, and how
-    many of these over air. Where these are too few: its area, and the area over air by points of its faces."""
-
-    least: Floats
-    most: Floats
-    sampled: Floats
-    airy: Floats
-    area: Floats
-    airy_area: Floats
+# Rows of what is counted for every flat place, at its number (6, m): how low and how high it reaches, how many places of the
+# raster lie on it, how many of these over air; where they are too few, its area, and the area over air by points of its faces.
+LOW, HIGH, SAMPLED, AIRY, AREA, AIRY_AREA = range(6)
 
 
 @kernel
@@ -49,41 +40,36 @@ def find_over_air(
     for row in range(begin_row, end_row):
         d = along.directions[row]
         cell = _see(vertices, d, along.frames[row], seen)
-        counts = _no_counts(count)
+        counts = table(6, count)
         _find_extents(seen, faces, places, counts)
         lowest = floats((CELLS + 2) * (CELLS + 2), np.inf)
         for f in range(count):
             facing[f] = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
             if facing[f] > LEAST_COSINE:
-                _lay(seen, faces[f], counts.least[places[f]], counts.most[places[f]], lowest)
+                _lay(seen, faces[f], counts[LOW, places[f]], counts[HIGH, places[f]], lowest)
         for f in range(count):
             if facing[f] < 0.0:
                 _sample(seen, faces[f], lowest, 1e-3 * cell, places[f], counts)
         for f in range(count):
-            if facing[f] < 0.0 and counts.sampled[places[f]] < FEW_SAMPLES:
-                counts.area[places[f]] += surface.areas_mm2[f]
-                counts.airy_area[places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
+            if facing[f] < 0.0 and counts[SAMPLED, places[f]] < FEW_SAMPLES:
+                counts[AREA, places[f]] += surface.areas_mm2[f]
+                counts[AIRY_AREA, places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
         for f in range(count):
             p = places[f]
-            few = counts.sampled[p] < FEW_SAMPLES
-            out[row, f] = int(counts.airy_area[p] > MOST * counts.area[p] if few else counts.airy[p] > MOST * counts.sampled[p])
-
-
-@helper
-def _no_counts(count: int) -> Counts:
-    """The counts of a number of flat places, all empty."""
-    zeros = table(4, count)
-    return Counts(floats(count, np.inf), floats(count, -np.inf), zeros[0], zeros[1], zeros[2], zeros[3])
+            airy, of = (AIRY_AREA, AREA) if counts[SAMPLED, p] < FEW_SAMPLES else (AIRY, SAMPLED)
+            out[row, f] = int(counts[airy, p] > MOST * counts[of, p])
 
 
 @no_nrt
-def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Counts) -> None:
+def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Floats) -> None:
     """How low and how high the flat places reach."""
+    for p in range(counts.shape[1]):
+        counts[LOW, p], counts[HIGH, p] = np.inf, -np.inf
     for f in range(len(faces)):
         p = places[f]
         for corner in range(3):
             z = seen[faces[f, corner], 2]
-            counts.least[p], counts.most[p] = min(counts.least[p], z), max(counts.most[p], z)
+            counts[LOW, p], counts[HIGH, p] = min(counts[LOW, p], z), max(counts[HIGH, p], z)
 
 
 @no_nrt
@@ -93,7 +79,7 @@ def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
 
 
 @no_nrt
-def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: int, counts: Counts) -> None:
+def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: int, counts: Floats) -> None:
     """Look down from those places of a raster that lie on a face, one row after the other."""
     a, b, c = face[0], face[1], face[2]
     ux, uy, uz = seen[b, 0] - seen[a, 0], seen[b, 1] - seen[a, 1], seen[b, 2] - seen[a, 2]
@@ -114,8 +100,8 @@ def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: in
             for i in range(int(np.ceil(begin / RASTER - ASIDE)), int(np.ceil(end / RASTER - ASIDE))):
                 x = (i + ASIDE) * RASTER
                 z = seen[a, 2] + slope_x * (x - seen[a, 0]) + slope_y * (y - seen[a, 1])
-                counts.sampled[patch] += 1.0
-                counts.airy[patch] += int(_is_airy(lowest, x, y, z - slack_mm))
+                counts[SAMPLED, patch] += 1.0
+                counts[AIRY, patch] += int(_is_airy(lowest, x, y, z - slack_mm))
 
 
 @no_nrt

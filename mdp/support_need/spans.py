@@ -142,7 +142,7 @@ def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Float
         count -= 1
         t = todo[count]
         for k in range(3):
-            nearest = _near_anchor(sides.ends, sides.anchored, t[2 * k], t[2 * k + 1], reach_mm, nearest)
+            nearest = _near_anchor(sides, t[2 * k], t[2 * k + 1], reach_mm, nearest)
             if nearest < 0:
                 return -1
         longest, split = 0.0, 0
@@ -183,12 +183,12 @@ def _all_near_one(sides: Sides, t: Floats, reach_mm: float, first: int) -> bool:
 
 
 @no_nrt
-def _near_anchor(ends: Floats, anchored: Ints, x: float, y: float, reach_mm: float, first: int) -> int:
+def _near_anchor(sides: Sides, x: float, y: float, reach_mm: float, first: int) -> int:
     """A anchored side within reach of a place, looked for from a side on; -1: none."""
-    count = len(anchored)
+    count = len(sides.anchored)
     for k in range(count):
         e = (first + k) % count
-        if anchored[e] > 0 and _is_near(ends, e, x, y, reach_mm):
+        if sides.anchored[e] > 0 and _is_near(sides.ends, e, x, y, reach_mm):
             return e
     return -1
 

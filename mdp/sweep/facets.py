@@ -58,10 +58,11 @@ class FaceTable(NamedTuple):
 
 
 class Scars(NamedTuple):
-    """What blemishes a solid along each of k directions: its faces, the cosine of normal and direction below which one is risky,
-    what the faces of the model need (k, n), how many times an area over air counts, by how much more a rim does on a feather
-    edge, and the faces that no cut can save (m,), (0,): not asked for."""
+    """What blemishes a solid along each of (k, 3) directions: its faces, the cosine of normal and direction below which one is
+    risky, what the faces of the model need (k, n), how many times an area over air counts, by how much more a rim does on a
+    feather edge, and the faces that no cut can save (m,), (0,): not asked for."""
 
+    directions: Floats
     faces: FaceTable
     risky_below: float
     classes: Classes

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import dot, floats, int_table, table
+from mdp.kernels.arrays import dot, floats, int_table, ints, table
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
-from mdp.sweep.crossing import THIRD, moment_above, share_above, slopes
+from mdp.sweep.crossing import THIRD, Ramp, moment_above, share_above, slopes
 from mdp.sweep.facets import FaceTable, Indices, Layout, Scars, class_along
 
 BLOCK = 128
@@ -45,9 +45,9 @@ class Block(NamedTuple):
 
 
 @no_nrt
-def find_heights(x: Floats, y: Floats, z: Floats, d: Floats, step: float, heights: Floats) -> tuple[int, int]:
+def find_heights(points: Floats, d: Floats, step: float, heights: Floats) -> tuple[int, int]:
     """Fill the heights of all vertices; returns the first offset's number and the count of offsets in between."""
-    d0, d1, d2 = d[0], d[1], d[2]
+    (x, y, z), d0, d1, d2 = (points[0], points[1], points[2]), d[0], d[1], d[2]
     for v in range(len(heights)):
         heights[v] = (x[v] * d0 + y[v] * d1 + z[v] * d2) / step
     least, most = _range(heights)
@@ -79,15 +79,19 @@ def column_over(height: float) -> int:
 
 
 @helper
-def cut_block(rows: Floats, places: Ints, size: int) -> Block:
-    """A block of `size` faces in (6, BLOCK) and (2, BLOCK) arrays."""
-    low, middle, high = rows[0, :size], rows[1, :size], rows[2, :size]
-    return Block(low, middle, high, rows[3, :size], rows[4, :size], rows[5, :size], places[0, :size], places[1, :size])
+def lay_block(values: Floats, places: Ints, corners: tuple[Indices, Indices, Indices], heights: Floats) -> Block:
+    """A block of faces with (k,) corners in (6, BLOCK) and (2, BLOCK) arrays; their weights, values[5], stay as they are."""
+    size = len(corners[0])
+    low, middle, high = values[0, :size], values[1, :size], values[2, :size]
+    block = Block(low, middle, high, values[3, :size], values[4, :size], values[5, :size], places[0, :size], places[1, :size])
+    _sort_heights(corners, heights, block)
+    _find_ramps(block)
+    return block
 
 
 @no_nrt
-def sort_heights(a: Indices, b: Indices, c: Indices, heights: Floats, block: Block) -> None:
-    low, middle, high = block.low, block.middle, block.high
+def _sort_heights(corners: tuple[Indices, Indices, Indices], heights: Floats, block: Block) -> None:
+    (a, b, c), low, middle, high = corners, block.low, block.middle, block.high
     for k in range(len(low)):
         p, q, r = heights[a[k]], heights[b[k]], heights[c[k]]
         least, most = min(p, q), max(p, q)
@@ -96,7 +100,7 @@ def sort_heights(a: Indices, b: Indices, c: Indices, heights: Floats, block: Blo
 
 
 @no_nrt
-def find_ramps(block: Block) -> None:
+def _find_ramps(block: Block) -> None:
     """The first column each face crosses and how many, and the two factors of its share above an offset."""
     low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
     column, crossed = block.column, block.crossed
@@ -108,58 +112,77 @@ def find_ramps(block: Block) -> None:
 
 
 @no_nrt
-def _weigh(ahead: float, block: Block, area: Floats, moment: Floats) -> None:
-    """Weighted share and moment of each face above the column that lies `ahead` columns after its first."""
-    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
-    for k in range(len(low)):
-        c = max(np.ceil(low[k]), 0.0) + ahead
-        inside = weight[k] if c < high[k] else 0.0
-        area[k] = inside * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
-        moment[k] = inside * moment_above(c, low[k], middle[k], high[k], rise[k], fall[k])
+def ramp_at(block: Block, k: int) -> Ramp:
+    """The ramp of a face."""
+    return block.low[k], block.middle[k], block.high[k], block.rise[k], block.fall[k]
 
 
 @no_nrt
-def _add_volumes(block: Block, shares: Floats, integrals: Floats) -> None:
-    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
-    column, crossed = block.column, block.crossed
-    for k in range(len(low)):
-        b = np.uint32(column[k])
-        integrals[b, 0] += weight[k]
-        integrals[b, 1] += weight[k] * ((low[k] + middle[k] + high[k]) * THIRD)
-        integrals[b, 2] += shares[0, k]
-        integrals[b, 3] += shares[1, k]
-        integrals[b + 1, 2] += shares[2, k]
-        integrals[b + 1, 3] += shares[3, k]
-        integrals[b + 2, 2] += shares[4, k]
-        integrals[b + 2, 3] += shares[5, k]
-        for ahead in range(AHEAD, crossed[k]):
-            c = float(b) + ahead
-            integrals[b + ahead, 2] += weight[k] * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
-            integrals[b + ahead, 3] += weight[k] * moment_above(c, low[k], middle[k], high[k], rise[k], fall[k])
+def find_shares(block: Block, shares: Floats) -> None:
+    """(AHEAD, k) share of each face above the first columns that it crosses, 0 above those that it does not reach."""
+    for ahead in range(AHEAD):
+        for k in range(len(block.low)):
+            c = max(np.ceil(block.low[k]), 0.0) + ahead
+            shares[ahead, k] = share_above(c, ramp_at(block, k)) if c < block.high[k] else 0.0
+
+
+@no_nrt
+def add_areas(kind: Ints, block: Block, shares: Floats, sums: Floats) -> None:
+    """Add weights of faces to two sums for each kind: of those wholly above, and of the shares of those crossed."""
+    weight = block.weight
+    for k in range(len(weight)):
+        b, which = np.uint32(block.column[k]), 2 * np.uint32(kind[k])
+        sums[b, which] += weight[k]
+        sums[b, which + 1] += weight[k] * shares[0, k]
+        sums[b + 1, which + 1] += weight[k] * shares[1, k]
+        sums[b + 2, which + 1] += weight[k] * shares[2, k]
+        for ahead in range(AHEAD, block.crossed[k]):
+            sums[b + ahead, which + 1] += weight[k] * share_above(float(b) + ahead, ramp_at(block, k))
+
+
+@no_nrt
+def _find_moments(block: Block, moments: Floats) -> None:
+    """(AHEAD, k) first moment of each share that find_shares finds."""
+    for ahead in range(AHEAD):
+        for k in range(len(block.low)):
+            c = max(np.ceil(block.low[k]), 0.0) + ahead
+            moments[ahead, k] = moment_above(c, ramp_at(block, k)) if c < block.high[k] else 0.0
+
+
+@no_nrt
+def _add_moments(block: Block, moments: Floats, sums: Floats) -> None:
+    low, middle, high, weight = block.low, block.middle, block.high, block.weight
+    for k in range(len(weight)):
+        b = np.uint32(block.column[k])
+        sums[b, 2] += weight[k] * ((low[k] + middle[k] + high[k]) * THIRD)
+        sums[b, 3] += weight[k] * moments[0, k]
+        sums[b + 1, 3] += weight[k] * moments[1, k]
+        sums[b + 2, 3] += weight[k] * moments[2, k]
+        for ahead in range(AHEAD, block.crossed[k]):
+            sums[b + ahead, 3] += weight[k] * moment_above(float(b) + ahead, ramp_at(block, k))
 
 
 @helper
 def integrate_volume(layout: Layout, grid: OffsetGrid, section: Floats, volume: Floats) -> None:
     """Cross-section at (mm2) and volume above (mm3) each offset, by the divergence theorem."""
     corners, vectors, d, n = layout.faces.corners, layout.vectors_mm2, grid.direction, grid.columns
-    integrals = table(n + AHEAD + 1, 4)
-    values, shares, places = table(6, BLOCK), table(2 * AHEAD, BLOCK), int_table(2, BLOCK)
+    sums, values, shares = table(n + AHEAD + 1, 4), table(6, BLOCK), table(AHEAD, BLOCK)
+    places, kind = int_table(2, BLOCK), ints(BLOCK, 0)
     for begin in range(0, corners.shape[1], BLOCK):
         end = min(begin + BLOCK, corners.shape[1])
-        size = end - begin
-        block = cut_block(values, places, size)
-        sort_heights(corners[0, begin:end], corners[1, begin:end], corners[2, begin:end], grid.heights, block)
+        a, b, c = corners[0, begin:end], corners[1, begin:end], corners[2, begin:end]
+        block = lay_block(values, places, (a, b, c), grid.heights)
         dot(vectors[0, begin:end], vectors[1, begin:end], vectors[2, begin:end], d, block.weight)
-        find_ramps(block)
-        for ahead in range(AHEAD):
-            _weigh(float(ahead), block, shares[2 * ahead, :size], shares[2 * ahead + 1, :size])
-        _add_volumes(block, shares, integrals)
-    whole, first_moment = 0.0, 0.0
+        find_shares(block, shares)
+        add_areas(kind, block, shares, sums)
+        _find_moments(block, shares)
+        _add_moments(block, shares, sums)
+    area, first_moment = 0.0, 0.0
     for column in range(n - 1, -1, -1):
-        whole += integrals[column + 1, 0]
-        first_moment += integrals[column + 1, 1]
-        section[column] = integrals[column, 2] + whole
-        volume[column] = (integrals[column, 3] + first_moment - column * whole) * grid.step_mm
+        area += sums[column + 1, 0]
+        first_moment += sums[column + 1, 2]
+        section[column] = sums[column, 1] + area
+        volume[column] = (sums[column, 3] + first_moment - column * area) * grid.step_mm
 
 
 @helper
@@ -193,31 +216,6 @@ def _pick(chosen: Ints, faces: FaceTable, picked: Indices, weight: Floats) -> No
         weight[k] = areas[chosen[k]] * counts[chosen[k]]
 
 
-@no_nrt
-def share_columns(ahead: float, block: Block, share: Floats) -> None:
-    """Share of each face above the column that lies `ahead` columns after its first."""
-    low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
-    for k in range(len(low)):
-        c = max(np.ceil(low[k]), 0.0) + ahead
-        share[k] = share_above(c, low[k], middle[k], high[k], rise[k], fall[k]) if c < high[k] else 0.0
-
-
-@no_nrt
-def add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> None:
-    """Add weights of faces to two sums for each kind: of those wholly above, and of the shares of those crossed."""
-    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
-    column, crossed = block.column, block.crossed
-    for k in range(len(low)):
-        b, which = np.uint32(column[k]), 2 * np.uint32(kind[k])
-        integrals[b, which] += weight[k]
-        integrals[b, which + 1] += weight[k] * shares[0, k]
-        integrals[b + 1, which + 1] += weight[k] * shares[1, k]
-        integrals[b + 2, which + 1] += weight[k] * shares[2, k]
-        for ahead in range(AHEAD, crossed[k]):
-            c = float(b) + ahead
-            integrals[b + ahead, which + 1] += weight[k] * share_above(c, low[k], middle[k], high[k], rise[k], fall[k])
-
-
 @helper
 def integrate_risky_area(scars: Scars, row: int, grid: OffsetGrid, scratch: Ints, out: tuple[Floats, Floats, Floats]) -> None:
     """Risky areas above each offset of a direction: printed straight up, along it, weighted by what the faces need, and what no
@@ -225,32 +223,27 @@ def integrate_risky_area(scars: Scars, row: int, grid: OffsetGrid, scratch: Ints
 
     scratch: (2, m + 1) whole numbers to work in.
     """
-    (up, residual, hopeless), n = out, grid.columns
-    integrals = table(n + AHEAD + 1, 2 * KINDS)
-    chosen, kind = scratch[0], scratch[1]
+    (up, residual, hopeless), (chosen, kind), n = out, (scratch[0], scratch[1]), grid.columns
     count = _select(scars, row, grid.direction, chosen, kind)
-    values, shares, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
+    sums, values, shares, places = table(n + AHEAD + 1, 2 * KINDS), table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
     picked = np.empty((3, BLOCK), np.uint32)
     for begin in range(0, count, BLOCK):
         end = min(begin + BLOCK, count)
         size = end - begin
-        block = cut_block(values, places, size)
-        _pick(chosen[begin:end], scars.faces, picked, block.weight)
-        sort_heights(picked[0, :size], picked[1, :size], picked[2, :size], grid.heights, block)
-        find_ramps(block)
-        for ahead in range(AHEAD):
-            share_columns(float(ahead), block, shares[ahead, :size])
-        add_areas(kind[begin:end], block, shares, integrals)
-    whole = floats(KINDS, 0.0)
+        _pick(chosen[begin:end], scars.faces, picked, values[5])
+        block = lay_block(values, places, (picked[0, :size], picked[1, :size], picked[2, :size]), grid.heights)
+        find_shares(block, shares)
+        add_areas(kind[begin:end], block, shares, sums)
+    above = floats(KINDS, 0.0)
     for column in range(n - 1, -1, -1):
         for which in range(1, KINDS):
-            whole[which] += integrals[column + 1, 2 * which]
-        lost, airy_lost = integrals[column, 13] + whole[6], integrals[column, 15] + whole[7]
-        both = integrals[column, 7] + whole[3] + lost
-        airy_both = integrals[column, 11] + whole[5] + airy_lost
-        up[column] = integrals[column, 3] + whole[1] + both + airy_both
-        airy = integrals[column, 9] + whole[4] + airy_both
-        residual[column] = integrals[column, 5] + whole[2] + both + scars.weight * airy
+            above[which] += sums[column + 1, 2 * which]
+        lost, airy_lost = sums[column, 13] + above[6], sums[column, 15] + above[7]
+        both = sums[column, 7] + above[3] + lost
+        airy_both = sums[column, 11] + above[5] + airy_lost
+        up[column] = sums[column, 3] + above[1] + both + airy_both
+        airy = sums[column, 9] + above[4] + airy_both
+        residual[column] = sums[column, 5] + above[2] + both + scars.weight * airy
         hopeless[column] = lost + airy_lost
 
 

@@ -250,7 +250,10 @@ def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
 
 @no_nrt
 def _keep_row(rows: LimbRows, row: int, key: float, column: int, tops: Ints) -> None:
-    """Keep a candidate if it is the best of its limbs within a span of offsets; in a full table the worst one makes room."""
+    """Keep a candidate if it is the best of its limbs within a span of offsets; in a full table the worst one makes room. One of
+    infinite key is left out."""
+    if key == np.inf:
+        return
     place = _same_limbs(rows, row, column, tops)
     if place == NONE and rows.filled[row] < MOST_ROWS:
         place = rows.filled[row]
@@ -300,11 +303,10 @@ def _may_be_cut(pieces: Pieces, piece: int, column: int, grid: LimbGrid, least_m
 
 
 @no_nrt
-def _offer(out: LimbRows, row: int, column: int, tops: Ints, costs: tuple[float, float], grid: LimbGrid) -> None:
-    """Keep a candidate that gains enough. costs: gain and loss without the cost of a cut."""
-    gain, lost = costs[0] - grid.cut_mm2, costs[1] + grid.cut_mm2
-    if gain >= grid.least_gain_mm2:
-        _keep_row(out, row, TRADE_OFF * lost - gain, column, tops)
+def _rank(gain: float, lost: float, grid: LimbGrid) -> float:
+    """The key of a candidate, infinite where it gains too little. gain, lost: without the cost of a cut."""
+    gain, lost = gain - grid.cut_mm2, lost + grid.cut_mm2
+    return TRADE_OFF * lost - gain if gain >= grid.least_gain_mm2 else np.inf
 
 
 @no_nrt
@@ -326,7 +328,7 @@ def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: L
         own_cubic = volume(pieces, piece, column) * grid.step_mm
         if own_cubic >= grid.least_volume_mm3:
             single[0] = pieces.top[piece]
-            _offer(out, row, column, single, (own_gain, own_lost), grid)
+            _keep_row(out, row, _rank(own_gain, own_lost, grid), column, single)
         if own_gain > 0.0 and many < len(several):
             several[many] = pieces.top[piece]
             many += 1
@@ -334,7 +336,7 @@ def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: L
             lost += own_lost
             cubic += own_cubic
     if 1 < many < pieces.counts[0] and cubic >= grid.least_volume_mm3:
-        _offer(out, row, column, several, (gain, lost), grid)
+        _keep_row(out, row, _rank(gain, lost, grid), column, several)
 
 
 @kernel
@@ -344,7 +346,7 @@ def _find_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, grid
     pieces, tops = make_pieces(points.shape[1], corners.shape[1]), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE))
     for row in range(begin_row, end_row):
         direction, heights = grid.directions[row], pieces.heights
-        first, n = find_heights(points[0], points[1], points[2], direction, step_mm, heights)
+        first, n = find_heights(points, direction, step_mm, heights)
         out.first[row] = first
         if n == 0 or not np.isfinite(grid.least_height_mm[row]):
             continue
@@ -359,12 +361,10 @@ def _find_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, grid
 def _sum_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, planes: PointedPlanes, out: Floats) -> None:
     """Fill the rows of some planes with the SUMS over their limbs and what else LimbSums has."""
     pieces = make_pieces(layout.faces.points.shape[1], layout.faces.corners.shape[1])
-    chosen = ints(MOST_JOINED, NONE)
     for row in range(begin_row, end_row):
-        many = _find_chosen(scars, row, layout, planes, pieces, chosen)
+        chosen = _find_chosen(scars, row, layout, planes, pieces)
         contact, lowest = np.inf, np.inf
-        for limb in range(many):
-            piece = chosen[limb]
+        for piece in chosen:
             for which in range(AREAS):
                 out[row, which] += value(pieces, piece, which)
             out[row, RIM] += value(pieces, piece, RIM)
@@ -373,47 +373,46 @@ def _sum_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, plane
             if pieces.heights[pieces.top[piece]] >= planes.crumb_mm:
                 contact = min(contact, value(pieces, piece, SECTION))
         out[row, CONTACT], out[row, LOWEST] = contact, lowest
-        out[row, EXISTS] = 1.0 if many > 0 else 0.0
-        out[row, ALONE] = 1.0 if many == pieces.counts[0] else 0.0
+        out[row, EXISTS] = 1.0 if len(chosen) > 0 else 0.0
+        out[row, ALONE] = 1.0 if len(chosen) == pieces.counts[0] else 0.0
 
 
 @kernel
 def _mark_limbs(scars: Scars, layout: Layout, planes: PointedPlanes) -> Mask:
     """(n,) the vertices of the limbs of one plane."""
-    size, chosen = layout.faces.points.shape[1], ints(MOST_JOINED, NONE)
+    size = layout.faces.points.shape[1]
     pieces, marked = make_pieces(size, layout.faces.corners.shape[1]), flags(size)
-    many = _find_chosen(scars, 0, layout, planes, pieces, chosen)
+    chosen = _find_chosen(scars, 0, layout, planes, pieces)
     for v in range(size):
         if pieces.parent[v] >= 0:
             own = root(pieces.parent, v)
-            for limb in range(many):
-                marked[v] = marked[v] or own == chosen[limb]
+            for piece in chosen:
+                marked[v] = marked[v] or own == piece
     return marked
 
 
 @helper
-def _find_chosen(scars: Scars, row: int, layout: Layout, planes: PointedPlanes, pieces: Pieces, chosen: Ints) -> int:
-    """Lower a plane to its offset and fill `chosen` with the pieces that its points lie on. Returns how many there are, 0 where
-    any of the points lies on none."""
+def _find_chosen(scars: Scars, row: int, layout: Layout, planes: PointedPlanes, pieces: Pieces) -> Ints:
+    """The pieces that the points of a plane lie on, lowered to its offset; none where any of the points lies on none."""
     d, points, heights = planes.normals[row], layout.faces.points, pieces.heights
     dot(points[0], points[1], points[2], d, heights)
     for v in range(len(heights)):
         heights[v] -= planes.offsets_mm[row]
     descend(pieces, 0, begin(pieces, scars, row, OffsetGrid(d, heights, 1, 1.0), layout), layout)
-    many = 0
+    chosen, count = ints(MOST_JOINED, NONE), 0
     for limb in range(planes.points.shape[1]):
         if not np.isfinite(planes.points[row, limb, 0]):
             continue
         v = _nearest(planes.points[row, limb], points, pieces.parent, planes.farthest_mm2)
         if v < 0:
-            return 0
+            return chosen[:0]
         own, known = root(pieces.parent, v), False
-        for other in range(many):
+        for other in range(count):
             known = known or chosen[other] == own
         if not known:
-            chosen[many] = own
-            many += 1
-    return many
+            chosen[count] = own
+            count += 1
+    return chosen[:count]
 
 
 @no_nrt

@@ -17,7 +17,7 @@ from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
 from mdp.sweep.components import anchor_of, before
-from mdp.sweep.crossing import chord_at, moment_above, share_above, slopes
+from mdp.sweep.crossing import Ramp, chord_at, moment_above, ramp_of, share_above
 from mdp.sweep.facets import Layout, Scars, times_along
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rims import weigh_chord
@@ -198,16 +198,16 @@ def _cross(pieces: Pieces, column: int, layout: Layout) -> None:
         f = pieces.active[at]
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
         p, q, r = heights[i], heights[j], heights[k]
-        lowest, highest = min(p, q, r), max(p, q, r)
-        own = root(pieces.parent, i if p == highest else (j if q == highest else k))
-        if lowest > c:
+        ramp = ramp_of(p, q, r)
+        own = root(pieces.parent, i if p == ramp[2] else (j if q == ramp[2] else k))
+        if ramp[0] > c:
             _add(pieces.whole, own, pieces.weights, f)
             pieces.whole[own, MOMENT] += pieces.weights[f, SECTION] * (p + q + r) / 3.0
             pieces.whole[own, RIM] = 0.0  # only faces that cross have a rim
             continue
         pieces.active[still] = f
         still += 1
-        _add_share(pieces, own, f, c, (lowest, max(min(p, q), min(max(p, q), r)), highest))
+        _add_share(pieces, own, f, c, ramp)
         for corner in range(3):
             v, w = faces[f, corner], faces[f, corner - 2]
             if (heights[v] > c) != (heights[w] > c):
@@ -232,13 +232,10 @@ def _forget_crossing(pieces: Pieces) -> None:
 
 
 @no_nrt
-def _add_share(pieces: Pieces, piece: int, f: int, c: float, heights: tuple[float, float, float]) -> None:
-    """Add the share of a face above c to its piece. heights: of its corners, the lowest first."""
-    lowest, middle, highest = heights
-    rise, fall = slopes(lowest, middle, highest)
-    crossing, weights = pieces.crossing, pieces.weights
-    share = share_above(c, lowest, middle, highest, rise, fall)
+def _add_share(pieces: Pieces, piece: int, f: int, c: float, ramp: Ramp) -> None:
+    """Add the share of a face above c to its piece."""
+    crossing, weights, share = pieces.crossing, pieces.weights, share_above(c, ramp)
     for which in range(AREAS):
         crossing[piece, which] += weights[f, which] * share
-    crossing[piece, MOMENT] += weights[f, SECTION] * moment_above(c, lowest, middle, highest, rise, fall)
-    crossing[piece, RIM] += weights[f, RIM] * chord_at(c, lowest, middle, highest, rise, fall)
+    crossing[piece, MOMENT] += weights[f, SECTION] * moment_above(c, ramp)
+    crossing[piece, RIM] += weights[f, RIM] * chord_at(c, ramp)

@@ -14,9 +14,9 @@ from mdp.kernels.arrays import dot, floats, int_table, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.stairs import step_share
-from mdp.sweep.crossing import chord_at, slopes
+from mdp.sweep.crossing import chord_at, ramp_of
 from mdp.sweep.facets import Scars
-from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, add_areas, cut_block, find_ramps, share_columns, sort_heights
+from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, add_areas, find_shares, lay_block, ramp_at
 
 COT_30 = 3.0**0.5
 FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is so thin that it is reported
@@ -43,26 +43,24 @@ def _weigh_rims(cosines: Floats, areas: Floats, weights: Floats, feather: float,
 
 
 @no_nrt
-def _measure_chords(ahead: float, block: Block, length: Floats) -> None:
-    """Weighted chord of each face at the column that lies `ahead` columns after its first."""
-    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
-    for k in range(len(low)):
-        c = max(np.ceil(low[k]), 0.0) + ahead
-        inside = weight[k] if c < high[k] else 0.0
-        length[k] = inside * chord_at(c, low[k], middle[k], high[k], rise[k], fall[k])
+def _find_chords(block: Block, chords: Floats) -> None:
+    """(AHEAD, k) chord of each face at the first columns that it crosses, 0 at those that it does not reach."""
+    for ahead in range(AHEAD):
+        for k in range(len(block.low)):
+            c = max(np.ceil(block.low[k]), 0.0) + ahead
+            chords[ahead, k] = chord_at(c, ramp_at(block, k)) if c < block.high[k] else 0.0
 
 
 @no_nrt
-def _add_rims(block: Block, lengths: Floats, rim: Floats) -> None:
-    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
-    column, crossed = block.column, block.crossed
-    for k in range(len(low)):
-        b = np.uint32(column[k])
-        rim[b] += lengths[0, k]
-        rim[b + 1] += lengths[1, k]
-        rim[b + 2] += lengths[2, k]
-        for ahead in range(AHEAD, crossed[k]):
-            rim[b + ahead] += weight[k] * chord_at(float(b) + ahead, low[k], middle[k], high[k], rise[k], fall[k])
+def _add_rims(block: Block, chords: Floats, rim: Floats) -> None:
+    weight = block.weight
+    for k in range(len(weight)):
+        b = np.uint32(block.column[k])
+        rim[b] += weight[k] * chords[0, k]
+        rim[b + 1] += weight[k] * chords[1, k]
+        rim[b + 2] += weight[k] * chords[2, k]
+        for ahead in range(AHEAD, block.crossed[k]):
+            rim[b + ahead] += weight[k] * chord_at(float(b) + ahead, ramp_at(block, k))
 
 
 @no_nrt
@@ -77,28 +75,24 @@ def integrate_scars(scars: Scars, grid: OffsetGrid, out: tuple[Floats, Floats, F
     and along the direction, mm2."""
     faces, (rim, stairs_up, stairs_along), n = scars.faces, out, grid.columns
     corners, normals, areas, stair_weights = faces.corners, faces.normals, faces.areas_mm2, faces.stair_weights
-    rims, stairs, cosines, kinds = floats(n + AHEAD + 1, 0.0), table(n + AHEAD + 1, 4), floats(BLOCK, 0.0), int_table(2, BLOCK)
-    values, shares, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
+    rims, stairs, cosines = floats(n + AHEAD + 1, 0.0), table(n + AHEAD + 1, 4), floats(BLOCK, 0.0)
+    values, shares, places, kinds = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK), int_table(2, BLOCK)
     for k in range(BLOCK):
         kinds[1, k] = 1
     for begin in range(0, corners.shape[1], BLOCK):
         end = min(begin + BLOCK, corners.shape[1])
-        size = end - begin
-        block = cut_block(values, places, size)
-        sort_heights(corners[0, begin:end], corners[1, begin:end], corners[2, begin:end], grid.heights, block)
-        dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], grid.direction, cosines[:size])
-        _weigh_rims(cosines[:size], areas[begin:end], faces.seam_weights[begin:end], scars.feather, block.weight)
-        find_ramps(block)
-        for ahead in range(AHEAD):
-            _measure_chords(float(ahead), block, shares[ahead, :size])
+        a, b, c, along = corners[0, begin:end], corners[1, begin:end], corners[2, begin:end], cosines[: end - begin]
+        block = lay_block(values, places, (a, b, c), grid.heights)
+        dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], grid.direction, along)
+        _weigh_rims(along, areas[begin:end], faces.seam_weights[begin:end], scars.feather, block.weight)
+        _find_chords(block, shares)
         _add_rims(block, shares, rims)
         if len(stair_weights) > 0:
-            for ahead in range(AHEAD):
-                share_columns(float(ahead), block, shares[ahead, :size])
+            find_shares(block, shares)
             _weigh_stairs(normals[2, begin:end], areas[begin:end], stair_weights[begin:end], block.weight)
-            add_areas(kinds[0, :size], block, shares, stairs)
-            _weigh_stairs(cosines[:size], areas[begin:end], stair_weights[begin:end], block.weight)
-            add_areas(kinds[1, :size], block, shares, stairs)
+            add_areas(kinds[0], block, shares, stairs)
+            _weigh_stairs(along, areas[begin:end], stair_weights[begin:end], block.weight)
+            add_areas(kinds[1], block, shares, stairs)
     up_mm2, along_mm2 = 0.0, 0.0
     for column in range(n - 1, -1, -1):
         up_mm2 += stairs[column + 1, 0]
@@ -131,11 +125,9 @@ def measure_rim(faces: Ints, heights: Floats, cosines: Floats, areas: Floats, we
     length, weighted, feathered = 0.0, 0.0, 0.0
     for f in range(len(faces)):
         p, q, r = heights[faces[f, 0]], heights[faces[f, 1]], heights[faces[f, 2]]
-        low, high = min(p, q, r), max(p, q, r)
-        if weights[f] <= 0.0 or low >= -ROUNDING_MM or high <= ROUNDING_MM:
+        if weights[f] <= 0.0 or min(p, q, r) >= -ROUNDING_MM or max(p, q, r) <= ROUNDING_MM:
             continue
-        middle = max(min(p, q), min(max(p, q), r))
-        chord = 2.0 * areas[f] * chord_at(0.0, low, middle, high, *slopes(low, middle, high))
+        chord = 2.0 * areas[f] * chord_at(0.0, ramp_of(p, q, r))
         length += chord * weigh_chord(cosines[f], 0.0)
         weighted += chord * weights[f] * weigh_chord(cosines[f], feather)
         if abs(cosines[f]) > FEATHER_COSINE:

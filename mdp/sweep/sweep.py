@@ -209,7 +209,7 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     columns = np.zeros((2, shape[0]), np.int32)
     swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(7)))
     scars = scars_of(remainder, directions, risky_below, hopeless)
-    in_threads(_gains, shape[0], scars, np.ascontiguousarray(directions), step_mm, swept)
+    in_threads(_gains, shape[0], scars, step_mm, swept)
     if remainder.cylinders:
         swept.crossed[:] = crossings(remainder.cylinders, directions, swept.offsets_mm(step_mm))
     return swept
@@ -217,9 +217,9 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
 
 def scars_of(remainder: Remainder, directions: Floats, risky_below: float, hopeless: Mask | None = None) -> Scars:
     """What blemishes a solid's surface along each of some directions; risky_below, hopeless: see gains."""
-    lost = np.zeros(0, np.bool_) if hopeless is None else hopeless
-    classes = remainder.classes(directions)
-    return Scars(remainder.facets.faces, risky_below, classes, remainder.weight, remainder.feather, lost)
+    lost, faces = np.zeros(0, np.bool_) if hopeless is None else hopeless, remainder.facets.faces
+    directions, classes = np.ascontiguousarray(directions), remainder.classes(directions)
+    return Scars(directions, faces, risky_below, classes, remainder.weight, remainder.feather, lost)
 
 
 def sweep(
@@ -253,12 +253,12 @@ def sweep(
 
 
 @kernel
-def _gains(begin_row: int, end_row: int, scars: Scars, directions: Floats, step_mm: float, out: Gains) -> None:
+def _gains(begin_row: int, end_row: int, scars: Scars, step_mm: float, out: Gains) -> None:
     points = scars.faces.points
     heights, scratch = floats(points.shape[1], 0.0), int_table(2, len(scars.faces.areas_mm2) + 1)
     for row in range(begin_row, end_row):
-        d = directions[row]
-        first, n = find_heights(points[0], points[1], points[2], d, step_mm, heights)
+        d = scars.directions[row]
+        first, n = find_heights(points, d, step_mm, heights)
         out.first[row], out.columns[row] = first, n
         if n > 0:
             grid = OffsetGrid(d, heights, n, step_mm)
@@ -275,7 +275,7 @@ def _sweep(begin_row: int, end_row: int, layout: Layout, sampling: Sampling, out
     heights, cosines, scratch = floats(size, 0.0), floats(size, 0.0), ints(size, 0)
     for row in range(begin_row, end_row):
         d = sampling.directions[row]
-        first, n = find_heights(points[0], points[1], points[2], d, step_mm, heights)
+        first, n = find_heights(points, d, step_mm, heights)
         out.first[row], out.columns[row] = first, n
         if n > 0:
             grid = OffsetGrid(d, heights, n, step_mm)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.directions.orientation import best_orientation, resting_facets, resting_orientations, risky_areas
+from mdp.directions.orientation import RISKY, best_orientation, face_areas, resting_facets, resting_orientations
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.pose import about, unit
@@ -110,7 +110,7 @@ def test_one_direction_is_what_brute_force_gives(vector: tuple[float, float, flo
         for area, normal, face in zip(mesh.areas_mm2, mesh.normals, mesh.faces, strict=True)
         if normal @ up < -(np.sin(np.radians(ANGLE_DEG)) + 1e-4) and max(heights[k] for k in face) > 0.3
     )
-    assert risky_areas(mesh, up[None], ANGLE_DEG)[0] == pytest.approx(risky, abs=1e-9)
+    assert face_areas(mesh, up[None], ANGLE_DEG)[0, RISKY] == pytest.approx(risky, abs=1e-9)
 
 
 def test_what_is_known_of_a_mesh_is_worked_out_once_and_keeps_the_mesh_from_nobody() -> None:
@@ -127,6 +127,6 @@ def test_a_tee_rests_on_six_facets_of_its_hull_and_not_on_the_undersides_of_its_
     lean = np.array([0.8944, 0.0, -0.4472])  # from the foot to the end of an arm
     expected = [(0, -1, 0), (0, 1, 0), (0, 0, 1), lean * (-1, 1, 1), lean, (0, 0, -1)]
     facets = resting_facets(tee())
-    assert np.array([facet.normal for facet in facets]) == pytest.approx(np.array(expected), abs=1e-4)
-    front = facets[0].corners
+    assert np.array([normal for normal, _ in facets]) == pytest.approx(np.array(expected), abs=1e-4)
+    front = facets[0][1]
     assert (front.shape, set(front[..., 1].ravel().tolist())) == ((4, 3, 3), {-5.0})

@@ -11,7 +11,7 @@ import pytest
 from mdp.cost.footing import Footing
 from mdp.cut import mesh_of
 from mdp.decomposition import Decomposition, FrontRow, Part
-from mdp.directions.orientation import measure_upright, side_in_words, standing_still
+from mdp.directions.orientation import facet_orientations, side_in_words, standing_still
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
@@ -87,7 +87,7 @@ def leaning_plate() -> Mesh:
 def test_of_two_ways_to_lie_that_need_no_support_the_one_without_stairs_is_taken() -> None:
     ways = distinct_orientations(leaning_plate(), PROFILE)
     assert ways[0].stairs_mm2 == pytest.approx(0.0, abs=1e-6)
-    assert measure_upright(leaning_plate(), 45.0).stairs_mm2 == pytest.approx(
+    assert facet_orientations(leaning_plate(), 45.0)[0].stairs_mm2 == pytest.approx(
         2.0 * (40 * 30 * np.cos(np.radians(30.0)) + 4 * 30 * np.sin(np.radians(30.0)))
     )
 
@@ -163,7 +163,7 @@ def test_a_model_that_cannot_be_printed_as_it_stands_once_it_is_searched_is_foun
 
 
 def test_the_side_that_a_model_lies_on_has_a_name() -> None:
-    assert side_in_words(measure_upright(tee(), 45.0)) == "as it stands"
+    assert side_in_words(facet_orientations(tee(), 45.0)[0]) == "as it stands"
     sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}
     assert sides <= {"on its front", "on its back", "on its left side", "on its right side", "upside down"}
 

@@ -6,13 +6,18 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mdp.cost.footing import section_modulus_mm3, tips_over
+from mdp.cost.footing import section_edges, tips_over
 from mdp.mesh import Mesh
+from mdp.sweep.bending import greatest_stress_per_moment
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
 from tests.shapes import box, tee
 from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
+
+
+def section_modulus_mm3(area: Polygons) -> float:
+    return 1.0 / greatest_stress_per_moment(section_edges(area))
 
 
 @given(st.floats(1, 50), st.floats(1, 50), st.floats(0, 180), st.floats(-90, 90))

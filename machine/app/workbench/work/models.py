@@ -72,8 +72,8 @@ def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, .
 def rest_facets(tell: Tell, model: Model) -> bytes:
     """The facets of a model's hull that it rests on, as JSON in its own frame: `normal`, `corners` (nine numbers a triangle)."""
     facets = [
-        {"normal": facet.normal.tolist(), "corners": np.round(facet.corners, FACET_DIGITS).ravel().tolist()}
-        for facet in resting_facets(model.mesh())
+        {"normal": normal.tolist(), "corners": np.round(corners, FACET_DIGITS).ravel().tolist()}
+        for normal, corners in resting_facets(model.mesh())
     ]
     return json.dumps(facets).encode()
 

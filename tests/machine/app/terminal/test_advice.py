@@ -8,7 +8,7 @@ import numpy as np
 from machine.app.terminal.advice import advice, orientation_in_words, standing_in_words
 from mdp.cut import mesh_of
 from mdp.decomposition import FrontRow
-from mdp.directions.orientation import best_orientation, measure_upright
+from mdp.directions.orientation import best_orientation, facet_orientations
 from mdp.plane import Plane
 from mdp.search.orient import Oriented
 from profiles.profile import load
@@ -38,7 +38,7 @@ def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
 
 def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> None:
     oriented = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
-    side, upright = best_orientation(tee(), 45.0), measure_upright(tee(), 45.0)
+    side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
     assert orientation_in_words(Oriented(side, oriented, 900.0, CUT, upright, True, True), "--as-is keeps it so") == (
         "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands in 3 parts with"
         " 78 mm2 of scars in 1h 0m; --as-is keeps it so",
@@ -51,7 +51,7 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
 
 
 def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
-    oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, measure_upright(tee(), 45.0), False, False)
+    oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, facet_orientations(tee(), 45.0)[0], False, False)
     warning = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
     assert orientation_in_words(oriented, "--as-is keeps it so") == (warning,)
     turned = replace(oriented, orientation=best_orientation(tee(), 45.0))
@@ -60,7 +60,7 @@ def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
 
 def test_a_model_that_is_turned_because_the_plate_would_not_hold_it_is_told_so() -> None:
     laid = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
-    side, upright = best_orientation(tee(), 45.0), measure_upright(tee(), 45.0)
+    side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
     (told,) = orientation_in_words(Oriented(side, laid, 900.0, None, upright, True, False), "--as-is keeps it so")
     assert ", as it stands the plate would hardly hold it; --as-is" in told
 
