@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mdp.directions.frame import AXES, FramedDirections, framed
+from mdp.directions.frame import AXES, framed
 from mdp.directions.orientation import azimuth_rad
 from mdp.directions.spread import spread
 from mdp.kernels.threads import in_threads
@@ -99,7 +99,8 @@ class SupportNeed:
         for lean in nearest[1:]:
             over_air &= self._over_air[lean]
         limits = limits_of(self.process, NO_BASE_MM)
-        classes = _classify(self.surface, framed(directions, self.axes), limits, NEEDS_SUPPORT + over_air)
+        classes: Classes = NEEDS_SUPPORT + over_air
+        in_threads(classify, len(directions), self.surface, framed(directions, self.axes), limits, classes)
         classes[:, self.enforced] = np.maximum(classes[:, self.enforced], np.uint8(NEEDS_SUPPORT))
         return classes
 
@@ -117,16 +118,11 @@ class SupportNeed:
         return over_air
 
 
-def _classify(surface: LinkedFaces, directions: FramedDirections, limits: Limits, classes: Classes) -> Classes:
-    """The classes with CARRIES_ITSELF filled in."""
-    in_threads(classify, len(directions.directions), surface, directions, limits, classes)
-    return classes
-
-
 def _needing_upright(surface: LinkedFaces, limits: Limits, axes: Floats = AXES) -> Mask:
     """(m,) False for the faces that overhang straight up but carry themselves."""
     classes = np.full((1, len(surface.faces)), NEEDS_SUPPORT, np.uint8)
-    needing: Mask = np.not_equal(_classify(surface, framed(UP[None], axes), limits, classes)[0], CARRIES_ITSELF)
+    in_threads(classify, 1, surface, framed(UP[None], axes), limits, classes)
+    needing: Mask = np.not_equal(classes[0], CARRIES_ITSELF)
     return needing
 
 

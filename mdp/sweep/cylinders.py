@@ -36,11 +36,7 @@ SHORT = 0.15  # of the radius: a hole in a thin sheet is shorter, too, but its r
 FEWEST = 4  # edges between strips: fewer are a chamfer or a fillet of three facets
 OFF_CIRCLE = 0.02  # of the radius: the corners of a cylinder lie on it up to the rounding of a file
 LEAST_TURN_DEG = 100.0  # that the strips go around: a quarter is a rounded edge, which needs no fit
-LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = (
-    0.7,
-    25.0,
-    6.0,
-)  # radii of screws, bearings, pegs; what is larger is the model's shape
+LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = 0.7, 25.0, 6.0  # of screws, bearings, pegs; what is larger is the model's shape
 
 
 @dataclass(frozen=True, eq=False)

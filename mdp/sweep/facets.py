@@ -5,7 +5,7 @@ around every vertex its neighbours in cyclic order.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ class FaceTable(NamedTuple):
 
     def of_faces(self, chosen: NDArray[np.int64]) -> "FaceTable":
         """The table of some of the faces, given by their numbers."""
-        columns = (np.take(column, chosen, axis=-1) if column.size else column for column in self[1:])
+        columns: list[Any] = [np.take(column, chosen, axis=-1) if column.size else column for column in self[1:]]
         return FaceTable(self.points, *columns)
 
 

@@ -1,11 +1,14 @@
-"""Rays over the tree of boxes against every triangle looked at one by one."""
+"""Rays over the tree of boxes against every triangle looked at one by one, and distances against those of another library."""
 
 import numpy as np
 import pytest
+import trimesh
 
 from mdp.mesh import Floats, Mesh
+from mdp.sweep.rays import distances_mm
 from mdp.sweep.slivers import OPPOSITE_COSINE, thin_faces
 from mdp.sweep.sweep import Remainder
+from tests import shapes
 from tests.mdp.solids import random_solid
 
 
@@ -30,3 +33,13 @@ def test_the_solid_is_thin_where_a_face_that_looks_the_other_way_is_the_nearest(
         nearest = nearest_mm(mesh.vertices[mesh.faces[face]].mean(axis=0), -mesh.normals[face], mesh)
         if abs(nearest - thickness_mm) > 1e-6:
             assert thin[face] == (nearest < thickness_mm)
+
+
+@pytest.mark.parametrize("mesh", [shapes.tee(), shapes.bowl(), random_solid(3)], ids=["tee", "bowl", "random"])
+def test_distances_are_those_of_trimesh(mesh: Mesh) -> None:
+    places = np.random.default_rng(1).uniform(mesh.bounds_mm[0] - 5.0, mesh.bounds_mm[1] + 5.0, (200, 3))
+    triangles = mesh.vertices[mesh.faces]
+    nearest = [trimesh.triangles.closest_point(triangles, np.tile(place, (len(triangles), 1))) - place for place in places]
+    expected = [np.linalg.norm(off, axis=1).min() for off in nearest]
+    assert distances_mm(mesh, places, 1e3) == pytest.approx(expected, abs=1e-9)
+    assert distances_mm(mesh, places, 2.0) == pytest.approx(np.minimum(expected, 2.0), abs=1e-9)
