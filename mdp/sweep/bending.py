@@ -18,7 +18,7 @@ from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
-from mdp.sweep.components import UNKNOWN
+from mdp.sweep.facets import UNKNOWN
 from mdp.topology.components import join, root
 
 MOMENTS = AREA, X, Y, XX, YY, XY = 0, 1, 2, 3, 4, 5
