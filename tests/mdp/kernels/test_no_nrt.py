@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
-NUMBERS = re.compile(r"None|bool|Segment|Point|int|float|tuple\[(int|float)(, (int|float))*\]")
+NUMBERS = re.compile(r"None|bool|Segment|Point|Ramp|Vector|int|float|tuple\[(int|float)(, (int|float))*\]")
 NUMERIC = (
     "abs",
     "arccos",
