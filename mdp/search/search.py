@@ -35,8 +35,8 @@ from mdp.search.node import Node
 from mdp.search.parts import Outcome, decomposition_of, make_parts, notes_of_search
 from mdp.search.polish import make_regular, polish, settle
 from mdp.search.problem import Problem, with_search
-from mdp.sweep.rays import distances_mm
 from mdp.sweep.limbs import cylinders_cut
+from mdp.sweep.rays import distances_mm
 from mdp.zone import Volume, Zones
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
