@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from profiles.frozen import Frozen, Limits, Vector
+from profiles.frozen import Frozen, Limits, Vector, advanced, rare
 
 Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
 
@@ -17,13 +17,15 @@ def _reversed(limits: Limits, name: str) -> list[str]:
 class LinearAxis(Frozen):
     """One of X, Y, Z as the firmware means it."""
 
-    limits_mm: Limits = Field(description="least and greatest position the firmware accepts, mm")
-    speed_mm_s: float = Field(gt=0, le=5000, description="greatest speed, mm/s")
-    acceleration_mm_s2: float = Field(gt=0, le=100000, description="acceleration, mm/s2")
-    home_mm: float | None = Field(
+    limits_mm: Limits = advanced("Travel", "limits build volume size stroke")(
+        ..., "least and greatest position the firmware accepts, mm"
+    )
+    speed_mm_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=5000)(..., "greatest speed, mm/s")
+    acceleration_mm_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000)(..., "acceleration, mm/s2")
+    home_mm: float | None = rare("Position at home", "endstop")(
         None,
-        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
-        "mm; left out: the least of limits_mm for X and Y, the greatest for Z",
+        "what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, mm; left out: "
+        "the least of limits_mm for X and Y, the greatest for Z",
     )
 
     def _problems(self) -> Iterable[str]:
@@ -37,32 +39,32 @@ class RotaryAxis(Frozen):
     -sign * (value - zero_deg): the rule of LinuxCNC's xyzac-trt-kins, whose default sign is -1.
     """
 
-    letter: Letter = Field(description="the G-code word of this axis")
-    stepper: str = Field(
-        "",
-        pattern=r"^[A-Za-z0-9_]*$",
-        description="name of the axis's [manual_stepper] in Klipper; empty: stepper_ and the letter",
+    letter: Letter = advanced("Letter in G-code", "axis A B C")(..., "the G-code word of this axis")
+    stepper: str = rare("Stepper in Klipper", "manual_stepper", pattern=r"^[A-Za-z0-9_]*$")(
+        "", "name of the axis's [manual_stepper] in Klipper; empty: stepper_ and the letter"
     )
-    axis: Vector = Field(description="direction of the axis in the machine frame (any length)")
-    point_mm: Vector = Field(
-        description="a point of the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it "
-        "meets the table's surface, which is the workpiece origin"
+    axis: Vector = advanced("Direction of the axis")(..., "direction of the axis in the machine frame (any length)")
+    point_mm: Vector = advanced("Point on the axis", "centre of rotation calibration offset")(
+        ...,
+        "a point of the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it meets the table's "
+        "surface, which is the workpiece origin",
     )
-    sign: Literal[-1, 1] = Field(description="-1: positive values turn the table right-handed about axis; 1: the other way")
-    zero_deg: float = Field(0.0, ge=-360, le=360, description="axis value at which the table is level (tilt) or unturned")
-    limits_deg: Limits = Field(description="least and greatest value the firmware accepts, deg")
-    budget_deg: float | None = Field(
+    sign: Literal[-1, 1] = advanced("Sense of turning", "direction invert")(
+        ..., "-1: positive values turn the table right-handed about axis; 1: the other way"
+    )
+    zero_deg: float = advanced("Value when level", "offset zero", ge=-360, le=360)(
+        0.0, "axis value at which the table is level (tilt) or unturned"
+    )
+    limits_deg: Limits = advanced("Range", "limits angle")(..., "least and greatest value the firmware accepts, deg")
+    budget_deg: float | None = advanced("Winding of the cables", "limit", ge=180, le=100000)(
+        None, "how far cables let the axis wind to either side of zero_deg, deg: it is unwound before; left out: no cable"
+    )
+    speed_deg_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=3600)(..., "greatest speed, deg/s")
+    acceleration_deg_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000)(..., "acceleration, deg/s2")
+    home_deg: float | None = rare("Position at home", "endstop")(
         None,
-        ge=180,
-        le=100000,
-        description="how far cables let the axis wind to either side of zero_deg, deg: it is unwound before; left out: no cable",
-    )
-    speed_deg_s: float = Field(gt=0, le=3600, description="greatest speed, deg/s")
-    acceleration_deg_s2: float = Field(gt=0, le=100000, description="acceleration, deg/s2")
-    home_deg: float | None = Field(
-        None,
-        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
-        "deg; left out: it is homed to zero_deg, and believed at the least of limits_deg after a restart",
+        "what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, deg; left out: "
+        "it is homed to zero_deg, and believed at the least of limits_deg after a restart",
     )
 
     @property

@@ -1,15 +1,75 @@
-"""Frozen: what all validated values of a profile share."""
+"""Frozen: what all validated values of a profile share, and the keys that they are made of."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from types import NoneType
 from typing import Any, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 Vector = tuple[float, float, float]
 Limits = tuple[float, float]
 KEY_BY_KEY = "key by key"  # context of a validation that leaves out what keys must be together
+# Of groups of keys: a matter of the process as its class is called, a table of the machine, or a section.
+TITLES = {
+    "process: layers": "Layers and lines",
+    "process: shell": "Walls, top and bottom",
+    "process: finish": "Sizes and smooth tops",
+    "process: infill": "Infill",
+    "process: support": "Support and bridges",
+    "process: plate": "Skirt, brim and plate",
+    "process: interface": "Joints between parts",
+    "process: motion": "Speeds and travels",
+    "material": "Material",
+    "search": "Finding parts",
+    "machine": "Machine",
+    "machine.x": "X axis",
+    "machine.y": "Y axis",
+    "machine.z": "Z axis",
+    "machine.tilt": "Tilt axis",
+    "machine.turn": "Turn axis",
+    "machine.table": "Table",
+    "machine.head": "Print head",
+    "machine.gcode": "G-code blocks",
+}
+UNITS = (  # what the names of keys end with -> how a page shows the unit
+    ("_g_cm3", "g/cm³"),
+    ("_mm3_s", "mm³/s"),
+    ("_mm_s2", "mm/s²"),
+    ("_deg_s2", "°/s²"),
+    ("_mm_s", "mm/s"),
+    ("_deg_s", "°/s"),
+    ("_c_s", "°C/s"),
+    ("_mm2", "mm²"),
+    ("_mm", "mm"),
+    ("_deg", "°"),
+    ("_c", "°C"),
+    ("_s", "s"),
+    ("_min", "min"),
+    ("_mpa", "MPa"),
+    ("_n", "N"),
+    ("_px", "px"),
+    ("_bytes", "bytes"),
+)
+
+
+def _key(level: str, title: str, synonyms: str = "", **allowed: Any) -> Callable[[Any, str], Any]:
+    """A key that takes its default (...: none) and its meaning, mm and the like included, in a second call.
+
+    level: who needs it; title: in its place on a page; synonyms: words of other slicers that neither title nor key has; allowed:
+    what pydantic's Field takes to restrict values.
+    """
+
+    def field(default: Any, description: str) -> Any:
+        extra: dict[str, Any] = {"level": level, "synonyms": synonyms}
+        return Field(default, title=title, description=description, json_schema_extra=extra, **allowed)
+
+    return field
+
+
+# Keys that everybody needs, that serve whoever tunes a print, and that are for whoever builds a machine or studies the method.
+simple, advanced, rare = (partial(_key, level) for level in ("simple", "advanced", "all"))
 
 
 class Frozen(BaseModel):
@@ -47,3 +107,12 @@ class Frozen(BaseModel):
 def may_be_left_out(annotation: Any) -> bool:
     """Whether a key of this type may have no value."""
     return NoneType in get_args(annotation)
+
+
+def unit_of(key: str) -> str:
+    """The unit of a key's value as a page shows it; "": it has none.
+
+    >>> unit_of("machine.tilt.acceleration_deg_s2"), unit_of("process.walls")
+    ('°/s²', '')
+    """
+    return next((unit for ending, unit in UNITS if key.endswith(ending)), "")

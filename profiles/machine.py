@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from math import acos, cos, degrees, hypot, radians
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, WithJsonSchema, model_validator
 
 from profiles.axes import STANDING, LinearAxis, RotaryAxis
-from profiles.frozen import Frozen, Vector
+from profiles.frozen import Frozen, Vector, advanced, rare, simple
 from profiles.wording import keys, nearest
 
 # The firmwares' dialects of G-code that a profile may name, which machine/firmware/ writes -> whether its firmware can keep the
@@ -29,7 +29,7 @@ LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright pa
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
 GCODE = "gcode"  # of a text in the schema: lines of G-code
 STEADY_S = 10.0  # a nozzle has to be at its heat so long before a firmware goes on
-Block = Annotated[str, Field(json_schema_extra={"format": GCODE})]
+Block = Annotated[str, WithJsonSchema({"type": "string", "format": GCODE})]
 Pixels = Annotated[int, Field(ge=16, le=1024)]
 
 
@@ -72,11 +72,13 @@ class CradleBox(Frozen):
 class Head(Frozen):
     """What must not touch the table: a silhouette revolved about the nozzle, and boxes."""
 
-    nozzle_mm: float = Field(gt=0.05, le=3, description="diameter of the nozzle's bore, mm")
-    silhouette_mm: list[tuple[float, float]] = Field(
-        min_length=1, description="pairs [radius, height above the tip] of the hot end's lowest points, radii rising"
+    nozzle_mm: float = simple("Nozzle diameter", "size", gt=0.05, le=3)(..., "diameter of the nozzle's bore, mm")
+    silhouette_mm: list[tuple[float, float]] = advanced(
+        "Silhouette of the hot end", "extruder clearance radius collision", min_length=1
+    )(..., "pairs [radius, height above the tip] of the hot end's lowest points, radii rising")
+    boxes: list[Box] = advanced("Bodies beside the nozzle", "extruder clearance fan duct collision")(
+        [], "fan duct, carriage, gantry beam"
     )
-    boxes: list[Box] = Field(default=[], description="fan duct, carriage, gantry beam")
 
     def _problems(self) -> Iterable[str]:
         problems = [
@@ -92,11 +94,13 @@ class Head(Frozen):
 class Table(Frozen):
     """The turning plate: a disc, or a rectangle about the turn axis."""
 
-    radius_mm: float = Field(gt=0, le=2000, description="radius of a round plate, mm; size_mm makes it half a diagonal")
-    size_mm: tuple[float, float] | None = Field(
-        None, description="x and y size of a rectangular plate at turn 0, its middle on the turn axis, mm; left out: round"
+    radius_mm: float = simple("Radius", "bed size build plate diameter", gt=0, le=2000)(
+        ..., "radius of a round plate, mm; size_mm makes it half a diagonal"
     )
-    thickness_mm: float = Field(gt=0, le=200, description="thickness of the plate, mm")
+    size_mm: tuple[float, float] | None = simple("Size of a rectangle", "bed size build plate shape")(
+        None, "x and y size of a rectangular plate at turn 0, its middle on the turn axis, mm; left out: round"
+    )
+    thickness_mm: float = rare("Thickness", "build plate", gt=0, le=200)(..., "thickness of the plate, mm")
 
     @model_validator(mode="before")
     @classmethod
@@ -114,96 +118,104 @@ class Table(Frozen):
 class Blocks(Frozen):
     """G-code blocks; {placeholders} are listed in docs/profiles.md."""
 
-    start: Block = Field(description="before the first part: homing, heating, priming")
-    end: Block = Field(description="after the last part: heaters off, parking")
-    before_part: Block = Field("", description="before each reorientation")
-    after_part: Block = Field("", description="after each part")
-    before_layer: Block = Field(
+    start: Block = advanced("Start G-code", "custom script begin")(..., "before the first part: homing, heating, priming")
+    end: Block = advanced("End G-code", "custom script finish")(..., "after the last part: heaters off, parking")
+    before_part: Block = advanced("G-code before a part", "custom script")("", "before each reorientation")
+    after_part: Block = advanced("G-code after a part", "custom script")("", "after each part")
+    before_layer: Block = advanced("G-code before a layer", "custom script layer change before_layer_gcode layer_gcode")(
         "",
-        description="before each layer, over the print: only commands that are known to move nothing and to change no mode; "
-        "macros are refused",
+        "before each layer, over the print: only commands that are known to move nothing and to change no mode; macros are "
+        "refused",
     )
-    resume: Block = Field(
+    resume: Block = rare("G-code after a power cut", "custom script recovery")(
         "",
-        description="after a power cut, a print on the table: makes the axes know where they stand, and leaves the tip at "
-        "{clear_z_mm} or above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all are "
-        "taken to stand there still, the tip rises, X and Y are homed",
+        "after a power cut, a print on the table: makes the axes know where they stand, and leaves the tip at {clear_z_mm} or "
+        "above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all are taken to stand "
+        "there still, the tip rises, X and Y are homed",
     )
 
 
 class Machine(Frozen):
     """A printer whose head moves on X Y Z over a table that tilts about one axis and turns about another, or stands still."""
 
-    name: str = Field(description="what people call it")
-    shape: Literal["table", "fixed"] = Field(
-        "table",
-        description="table: it tilts and turns; fixed: three axes only, tilt and turn are left out, all is printed in one part",
+    name: str = advanced("Name of the machine", "printer")(..., "what people call it")
+    shape: Literal["table", "fixed"] = advanced("Shape", "kinematics 3-axis 5-axis")(
+        "table", "table: it tilts and turns; fixed: three axes only, tilt and turn are left out, all is printed in one part"
     )
-    dialect: DialectName = Field(
-        description="the firmware's way of writing G-code; klipper: the rotary steppers are axes of G1 (GCODE_AXIS), "
-        "klipper_steppers: they are turned by MANUAL_STEPPER"
+    dialect: DialectName = advanced("Firmware", "G-code flavor marlin klipper")(
+        ...,
+        "the firmware's way of writing G-code; klipper: the rotary steppers are axes of G1 (GCODE_AXIS), klipper_steppers: they "
+        "are turned by MANUAL_STEPPER",
     )
-    coordinates: Literal["table", "workpiece"] = Field(
+    coordinates: Literal["table", "workpiece"] = advanced("Meaning of X Y Z", "tool centre point TCP")(
         "table",
-        description="what X Y Z of the file mean; table: axis positions, which any firmware with five plain axes prints; "
-        "workpiece: places on the table, for a firmware that follows the table by itself (marlin with G43.4, linuxcnc, grblhal)",
+        "what X Y Z of the file mean; table: axis positions, which any firmware with five plain axes prints; workpiece: places "
+        "on the table, for a firmware that follows the table by itself (marlin with G43.4, linuxcnc, grblhal)",
     )
     x: LinearAxis
     y: LinearAxis
     z: LinearAxis
     tilt: RotaryAxis
     turn: RotaryAxis
-    tool_mm: Vector = Field((0.0, 0.0, 0.0), description="from the nozzle tip to the point whose position X Y Z tell, mm")
-    junction_speed_mm_s: float = Field(
-        8.0, ge=0, le=100, description="speed change that the firmware makes at once at a corner (jerk), mm/s"
+    tool_mm: Vector = advanced("From the tip to X Y Z", "tool offset length")(
+        (0.0, 0.0, 0.0), "from the nozzle tip to the point whose position X Y Z tell, mm"
     )
-    receive_bytes: int = Field(
-        128,
-        ge=64,
-        le=65536,
-        description="receive buffer of the board's serial port, bytes (Marlin: RX_BUFFER_SIZE): less is on its way at a time",
+    junction_speed_mm_s: float = advanced("Corner speed", "jerk junction deviation square corner velocity", ge=0, le=100)(
+        8.0, "speed change that the firmware makes at once at a corner (jerk), mm/s"
     )
-    extruder_speed_mm_s: float = Field(60.0, gt=0, le=500, description="greatest speed of the filament, mm/s")
-    extruder_acceleration_mm_s2: float = Field(1500.0, gt=0, le=100000, description="acceleration of the filament, mm/s2")
-    arcs: bool = Field(
-        False, description="true: strokes along circles are written as arcs, G2 and G3; the firmware must know them"
+    receive_bytes: int = rare("Receive buffer", "RX_BUFFER_SIZE serial", ge=64, le=65536)(
+        128, "receive buffer of the board's serial port, bytes (Marlin: RX_BUFFER_SIZE): less is on its way at a time"
     )
-    arc_tolerance_mm: float = Field(
-        0.025, ge=0.003, le=0.5, description="an arc stays so near to the path it replaces, mm; 0.025 is an eighteenth of a bead"
+    extruder_speed_mm_s: float = advanced("Extruder speed", "E maximum feedrate", gt=0, le=500)(
+        60.0, "greatest speed of the filament, mm/s"
+    )
+    extruder_acceleration_mm_s2: float = advanced("Extruder acceleration", "E maximum", gt=0, le=100000)(
+        1500.0, "acceleration of the filament, mm/s2"
+    )
+    arcs: bool = advanced("Arcs", "arc fitting G2 G3 welder")(
+        False, "true: strokes along circles are written as arcs, G2 and G3; the firmware must know them"
+    )
+    arc_tolerance_mm: float = advanced("Arc tolerance", "arc fitting resolution", ge=0.003, le=0.5)(
+        0.025, "an arc stays so near to the path it replaces, mm; 0.025 is an eighteenth of a bead"
     )
     table: Table
-    cradle: list[CradleBox] = Field(default=[], description="what tilts with the table but does not turn with it")
+    cradle: list[CradleBox] = rare("Bodies that tilt with the table", "collision")(
+        [], "what tilts with the table but does not turn with it"
+    )
     head: Head
-    clearance_mm: float = Field(1.0, ge=0, le=100, description="least distance kept between head and table, mm")
-    lift_mm: float = Field(10.0, ge=0, le=500, description="extra height above everything printed while the table moves, mm")
-    pause_cools_after_min: float = Field(
+    clearance_mm: float = advanced("Clearance between head and table", "collision distance", ge=0, le=100)(
+        1.0, "least distance kept between head and table, mm"
+    )
+    lift_mm: float = advanced("Lift while the table moves", "z hop", ge=0, le=500)(
+        10.0, "extra height above everything printed while the table moves, mm"
+    )
+    pause_cools_after_min: float = advanced("Nozzle off after a pause of, minutes", "idle timeout", ge=0, le=1440)(
         10.0,
-        ge=0,
-        le=1440,
-        description="minutes of a pause after which the nozzle is switched off, the bed not; it is heated and filled again when "
-        "the print goes on; as long as Prusa's M600 (M600_TIMEOUT 600 s) and Klipper (idle_timeout) wait, Marlin's M600 waits "
-        "45 s (PAUSE_PARK_NOZZLE_TIMEOUT); 0: never",
+        "minutes of a pause after which the nozzle is switched off, the bed not; it is heated and filled again when the print "
+        "goes on; as long as Prusa's M600 (M600_TIMEOUT 600 s) and Klipper (idle_timeout) wait, Marlin's M600 waits 45 s "
+        "(PAUSE_PARK_NOZZLE_TIMEOUT); 0: never",
     )
-    purge_mm: float = Field(
+    purge_mm: float = simple("Purge line", "prime line intro wipe", ge=0, le=500)(
         0.0,
-        ge=0,
-        le=500,
-        description="length of the line that is printed at the plate's edge, clear of the print, after the start block, so that "
-        "the nozzle is full and clean, mm; 0: none, or the start block has one itself",
+        "length of the line that is printed at the plate's edge, clear of the print, after the start block, so that the nozzle "
+        "is full and clean, mm; 0: none, or the start block has one itself",
     )
-    nozzle_limit_c: float = Field(300.0, gt=0, le=600, description="greatest nozzle temperature, deg C")
-    nozzle_heating_c_s: float = Field(
-        1.5,
-        gt=0,
-        le=50,
-        description="how fast the nozzle gets hotter when it is near the heat of printing, deg C/s: by it waiting is estimated",
+    nozzle_limit_c: float = advanced("Hottest nozzle", "maximum temperature", gt=0, le=600)(
+        300.0, "greatest nozzle temperature, deg C"
     )
-    bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed")
-    thumbnails_px: list[tuple[Pixels, Pixels]] = Field(
-        default=[], max_length=4, description="width and height of the pictures in the G-code's head, pixels; web pages show them"
+    nozzle_heating_c_s: float = rare("Heating of the nozzle", "heat-up rate", gt=0, le=50)(
+        1.5, "how fast the nozzle gets hotter when it is near the heat of printing, deg C/s: by it waiting is estimated"
     )
-    uncalibrated: list[str] = Field(default=[], description="keys whose values no source gives; the dry run names them")
-    sources: dict[str, str] = Field(default={}, description="for a key or a table of keys: where its value comes from")
+    bed_limit_c: float = advanced("Hottest bed", "maximum temperature heatbed", ge=0, le=300)(
+        120.0, "greatest bed temperature, deg C; 0: no heated bed"
+    )
+    thumbnails_px: list[tuple[Pixels, Pixels]] = advanced("Pictures in the G-code", "thumbnails preview", max_length=4)(
+        [], "width and height of the pictures in the G-code's head, pixels; web pages show them"
+    )
+    uncalibrated: list[str] = rare("Keys without a source", "calibration")(
+        [], "keys whose values no source gives; the dry run names them"
+    )
+    sources: dict[str, str] = rare("Sources of values")({}, "for a key or a table of keys: where its value comes from")
     gcode: Blocks
 
     def heating_s(self, rise_c: float, since_s: float = 0.0) -> float:

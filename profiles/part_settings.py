@@ -7,11 +7,9 @@ from pydantic import Field
 
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
-from profiles.problems.of_several import unfit_for_nozzle
-from profiles.problems.of_table import table_problems
+from profiles.problems import table_problems, unfit_for_nozzle
 from profiles.process import Process
-from profiles.settings.plate import Plate
-from profiles.settings.support import Support
+from profiles.settings.support import Plate, Support
 from profiles.toml_text import read_value
 
 MOST_PARTS = 1000

@@ -2,14 +2,9 @@
 
 from collections.abc import Iterable
 
-from profiles.settings.finish import Finish
-from profiles.settings.infill import Infill
-from profiles.settings.interface import Interface
-from profiles.settings.layers import Layers
+from profiles.settings.layers import Finish, Infill, Layers, Shell
 from profiles.settings.motion import Motion
-from profiles.settings.plate import FARTHEST_MM, Plate
-from profiles.settings.shell import Shell
-from profiles.settings.support import Support
+from profiles.settings.support import FARTHEST_MM, Interface, Plate, Support
 
 HEIGHTS = ("layer_height_mm", "first_layer_height_mm")
 WIDTHS = (

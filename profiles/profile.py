@@ -1,6 +1,7 @@
-"""Loading: a machine, a material and a process, by name or from a file, with --set overrides."""
+"""Profile: a machine, a material and a process, loaded by name or from a file with --set overrides, or checked."""
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError
@@ -10,9 +11,22 @@ from profiles.frozen import Frozen
 from profiles.machine import Machine
 from profiles.material import Material
 from profiles.part_settings import PartSettings, merge_part_settings, process_of_part
-from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables
-from profiles.problems.of_several import lifted_twice, too_hot, unfit_for_nozzle
-from profiles.problems.of_table import TableProblems, table_problems
+from profiles.places import (
+    KINDS,
+    OF_KIND,
+    inherited,
+    kind_in,
+    kind_of,
+    known,
+    merged,
+    misspelt_parent,
+    own_tables,
+    parse,
+    shipped,
+    strangers,
+    tables,
+)
+from profiles.problems import TableProblems, lifted_twice, table_problems, too_hot, unfit_for_nozzle
 from profiles.process import Process
 from profiles.search import Search
 from profiles.toml_text import read_value
@@ -115,6 +129,29 @@ def sound_section(name: str, table: Any) -> Frozen | None:
         return SECTIONS[name].model_validate(_without_gone(name, table))
     except ValidationError:
         return None
+
+
+def check_file(path: Path) -> list[str]:
+    """All problems of a profile file, each one sentence; empty when it is fine."""
+    try:
+        kind, document = kind_in(path), parse(path)
+    except ProfileError as error:
+        return [str(error)]
+    sound = tables(kind, DEFAULTS[kind])
+    problem = strangers(kind, str(path), document)
+    problems = [problem] if problem else []
+    try:
+        base = inherited(kind, str(path), document, (str(path.resolve()),))
+    except ProfileError as error:
+        problems.append(str(error))
+        base = sound
+    if misspelt_parent(document):  # what it would inherit is not missing
+        base = sound
+    whole = merged(base, own_tables(document))
+    for section in OF_KIND[kind]:
+        if section in whole:
+            problems += table_problems(SECTIONS[section], f"{section}.", whole[section], sound.get(section, {})).problems
+    return problems
 
 
 def _without_gone(name: str, table: Any) -> Any:

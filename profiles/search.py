@@ -2,9 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
-
-from profiles.frozen import Frozen
+from profiles.frozen import Frozen, advanced, rare, simple
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
 OF_SCARS = {"seam_mm": 0.0, "nozzle_load_n": 0.0, "single_limb": False}  # what the paper's terms do not know
@@ -22,167 +20,137 @@ OF_SEAMS = {
 class Search(Frozen):
     """How the parts are searched."""
 
-    directions: int = Field(600, ge=1, le=100000, description="directions sampled on the Gaussian sphere")
-    least_elevation_deg: float = Field(10.0, ge=0, le=89, description="least angle of a direction above the platform, deg")
-    offset_step_mm: float = Field(1.0, gt=0, le=100, description="distance of the sampled planes of a direction, mm")
-    method: Literal["best", "published"] = Field(
-        "best", description="published: the authors' stop rule and bookkeeping, for comparisons; best: ours"
+    directions: int = advanced("Directions tried", "orientations samples", ge=1, le=100000)(
+        600, "directions sampled on the Gaussian sphere"
     )
-    beam_width: int = Field(4, ge=1, le=1000, description="how many decompositions are followed at a time")
-    objective: Literal["scar", "risky"] = Field(
+    least_elevation_deg: float = rare("Least angle of a direction", ge=0, le=89)(
+        10.0, "least angle of a direction above the platform, deg"
+    )
+    offset_step_mm: float = advanced("Distance of the planes tried", "step samples", gt=0, le=100)(
+        1.0, "distance of the sampled planes of a direction, mm"
+    )
+    method: Literal["best", "published"] = rare("Method")(
+        "best", "published: the authors' stop rule and bookkeeping, for comparisons; best: ours"
+    )
+    beam_width: int = advanced("Beam width", "thoroughness search effort", ge=1, le=1000)(
+        4, "how many decompositions are followed at a time"
+    )
+    objective: Literal["scar", "risky"] = rare("What is made small")(
         "scar",
-        description="scar: area that needs support and the seams of the cuts, each as wide as its scar; risky: the area alone, "
-        "the terms of the 2020 paper",
+        "scar: area that needs support and the seams of the cuts, each as wide as its scar; risky: the area alone, the terms of "
+        "the 2020 paper",
     )
-    seam_mm: float = Field(
+    seam_mm: float = advanced("Width of a cut's scar", "seam weight", ge=0, le=100)(
         5.0,
-        ge=0,
-        le=100,
-        description="width of the scar that a seam leaves on a model of 100 mm from end to end, in proportion on others, mm: a "
-        "cut must make more surface safe than its rim takes; 0: the paper's objective",
+        "width of the scar that a seam leaves on a model of 100 mm from end to end, in proportion on others, mm: a cut must make "
+        "more surface safe than its rim takes; 0: the paper's objective",
     )
-    feather_weight: float = Field(
+    feather_weight: float = rare("Thin edges count", "feather sharp", ge=0, le=100)(
         0.5,
-        ge=0,
-        le=100,
-        description="by how much more a seam counts where face and plane meet at less than 30 deg, times cot angle - cot 30: "
-        "such edges are thin, warp and break",
+        "by how much more a seam counts where face and plane meet at less than 30 deg, times cot angle - cot 30: such edges are "
+        "thin, warp and break",
     )
-    cut_mm2: float = Field(
+    cut_mm2: float = advanced("What a cut costs", "fewer parts penalty", ge=0, le=10000)(
         10.0,
-        ge=0,
-        le=10000,
-        description="what a cut costs beside its seam: one more turn, one more joint that can fail, mm2; a cut that saves less "
-        "than its seam and this is not made",
+        "what a cut costs beside its seam: one more turn, one more joint that can fail, mm2; a cut that saves less than its seam "
+        "and this is not made",
     )
-    stair_weight: float = Field(
+    stair_weight: float = advanced("Stairs count", "staircase layer lines stepping quality", ge=0, le=10)(
         0.1,
-        ge=0,
-        le=10,
-        description="how much an area counts that shows stairs as high as a layer of 0.2 mm, beside 1 where support scars it; "
-        "less where the layers or the angle make them lower: walls and level faces show none, so parts are printed along their "
-        "faces; 0: stairs do not count",
+        "how much an area counts that shows stairs as high as a layer of 0.2 mm, beside 1 where support scars it; less where the "
+        "layers or the angle make them lower: walls and level faces show none, so parts are printed along their faces; 0: stairs "
+        "do not count",
     )
-    second_mm2: float = Field(
+    second_mm2: float = advanced("What a second costs", "print time penalty", ge=0, le=1000)(
         0.1,
-        ge=0,
-        le=1000,
-        description="what a second of printing counts in the choice between numbers of parts and orientations: so much surface "
-        "that a seam or support blemishes, mm2 (1 cm2 is worth 1000 s); 0: time is free, as it is without support",
+        "what a second of printing counts in the choice between numbers of parts and orientations: so much surface that a seam "
+        "or support blemishes, mm2 (1 cm2 is worth 1000 s); 0: time is free, as it is without support",
     )
-    metre_mm2: float = Field(
+    metre_mm2: float = advanced("What a metre of filament costs", "plastic waste penalty", ge=0, le=1e5)(
         100.0,
-        ge=0,
-        le=1e5,
-        description="what a metre of filament counts there, mm2 (as 1000 s do: support has to be removed again); "
-        "0: it is free, as it is without support",
+        "what a metre of filament counts there, mm2 (as 1000 s do: support has to be removed again); 0: it is free, as it is "
+        "without support",
     )
-    hidden_seam_share: float = Field(
+    hidden_seam_share: float = rare("Hidden cuts count", gt=0, le=1)(
         0.25,
-        gt=0,
-        le=1,
-        description="how much a seam counts deep in a crease or neck or out of sight, as a share of what it counts across a "
-        "smooth surface in plain sight; 1: the same everywhere",
+        "how much a seam counts deep in a crease or neck or out of sight, as a share of what it counts across a smooth surface "
+        "in plain sight; 1: the same everywhere",
     )
-    feature_weight: float = Field(
-        4.0,
-        ge=1,
-        le=1000,
-        description="how many times a seam counts across a bore, where a ridge spoils a fit; 1: as elsewhere",
+    feature_weight: float = rare("Cuts across bores count", "holes", ge=1, le=1000)(
+        4.0, "how many times a seam counts across a bore, where a ridge spoils a fit; 1: as elsewhere"
     )
-    feature_mm2: float = Field(
+    feature_mm2: float = rare("What a cut askew through a bore costs", "holes", ge=0, le=1e5)(
         500.0,
-        ge=0,
-        le=1e5,
-        description="what it costs beside its seam that a cut passes askew through a bore, which then holds and guides "
-        "nothing, mm2; one across its axis leaves it round and costs nothing",
+        "what it costs beside its seam that a cut passes askew through a bore, which then holds and guides nothing, mm2; one "
+        "across its axis leaves it round and costs nothing",
     )
-    unsupportable_weight: float = Field(
+    unsupportable_weight: float = rare("Overhangs with nothing below count", "supports", ge=1, le=1000)(
         5.0,
-        ge=1,
-        le=1000,
-        description="how many times an area counts that needs support and has nothing but air beneath it along its part's "
-        "direction: support leans there from the side or stands on support printed with other parts, which takes more plastic "
-        "and holds less well",
+        "how many times an area counts that needs support and has nothing but air beneath it along its part's direction: support "
+        "leans there from the side or stands on support printed with other parts, which takes more plastic and holds less well",
     )
-    least_saving: float = Field(
+    least_saving: float = advanced("Every further part saves at least", "minimum share gain", ge=0, le=1)(
         0.03,
-        ge=0,
-        le=1,
-        description="share of what one piece costs, with its time and filament, that every further part must save; where more "
-        "parts would save less, a note says so, and --parts N takes them",
+        "share of what one piece costs, with its time and filament, that every further part must save; where more parts would "
+        "save less, a note says so, and --parts N takes them",
     )
-    polish: bool = Field(
-        True,
-        description="the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added",
+    polish: bool = rare("Polish the best results")(
+        True, "the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added"
     )
-    least_volume_share: float = Field(
-        0.02, ge=0, lt=1, description="criterion IV: a part has at least this share of the model's volume (published: 0.1)"
+    least_volume_share: float = advanced("Smallest part", "minimum volume", ge=0, lt=1)(
+        0.02, "criterion IV: a part has at least this share of the model's volume (published: 0.1)"
     )
-    preferred_volume_share: float = Field(
-        0.1,
-        ge=0,
-        lt=1,
-        description="criterion IV as a preference: the classic ranking takes parts of at least this share of the volume first",
+    preferred_volume_share: float = rare("Smallest part that is preferred", "minimum volume", ge=0, lt=1)(
+        0.1, "criterion IV as a preference: the classic ranking takes parts of at least this share of the volume first"
     )
-    least_interface_mm2: float = Field(
-        4.0, ge=0, le=1e6, description="least area that a part, and each of its pieces that is no crumb, stands on, mm2"
+    least_interface_mm2: float = advanced("Smallest face a part stands on", "minimum area", ge=0, le=1e6)(
+        4.0, "least area that a part, and each of its pieces that is no crumb, stands on, mm2"
     )
-    nozzle_load_n: float = Field(
+    nozzle_load_n: float = rare("Push of the nozzle", "strength force", ge=0, le=1000)(
         5.0,
-        ge=0,
-        le=1000,
-        description="push of the nozzle against the top of a part, sideways, that its base must bear while it is printed, N; 0: "
-        "strength is not looked at",
+        "push of the nozzle against the top of a part, sideways, that its base must bear while it is printed, N; 0: strength is "
+        "not looked at",
     )
-    strength_safety: float = Field(
+    strength_safety: float = rare("Safety of a joint", "strength factor", ge=1, le=100)(
         1.0,
-        ge=1,
-        le=100,
-        description="by how many times the strength of a weld to cold plastic, material.interlayer_strength_mpa by "
+        "by how many times the strength of a weld to cold plastic, material.interlayer_strength_mpa by "
         "material.cold_weld_factor, must exceed the stress of a base under that push",
     )
-    fragile_mm: float = Field(
-        0.3, ge=0, le=100, description="no plane leaves a sliver thinner than this, a layer and a half or so, mm"
+    fragile_mm: float = rare("Thinnest sliver", ge=0, le=100)(
+        0.3, "no plane leaves a sliver thinner than this, a layer and a half or so, mm"
     )
-    pedestal_mm: float = Field(
-        0.0,
-        ge=0,
-        le=1000,
-        description="height of a pedestal under the model, so that low, strongly tilted cuts become printable, mm",
+    pedestal_mm: float = simple("Pedestal height", "raft base lift", ge=0, le=1000)(
+        0.0, "height of a pedestal under the model, so that low, strongly tilted cuts become printable, mm"
     )
-    simplify_faces: int = Field(
+    simplify_faces: int = rare("Simplify models of more faces than", "reduce triangles decimate", ge=0)(
         20000,
-        ge=0,
-        description="a model of more faces is searched on a copy that has fewer and lies within 1.5 layers of it, and "
-        "cut by the planes that were found; 0: never",
+        "a model of more faces is searched on a copy that has fewer and lies within 1.5 layers of it, and cut by the planes that "
+        "were found; 0: never",
     )
-    most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
-    time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
-    least_gain: float = Field(
-        0.002,
-        ge=0,
-        le=1,
-        description="a cut must make at least this share of the risky area safe, faces that stand on the platform not counted",
+    most_parts: int = simple("Most parts", "maximum number count", ge=1, le=1000)(12, "the search stops at this number of parts")
+    time_limit_s: float | None = advanced("Time for the search", "limit", ge=0)(
+        None, "the search ends after this time with the best so far, s"
     )
-    least_gain_preferred: float = Field(
-        1e-4,
-        ge=0,
-        le=1,
-        description="the same for parts of the preferred volume in the classic ranking, which may be many (published: 0.0001)",
+    least_gain: float = rare("Least share a cut makes safe", ge=0, le=1)(
+        0.002, "a cut must make at least this share of the risky area safe, faces that stand on the platform not counted"
     )
-    platform_radius_mm: float | None = Field(
-        None, gt=0, description="criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
+    least_gain_preferred: float = rare("Least share a preferred cut makes safe", ge=0, le=1)(
+        1e-4, "the same for parts of the preferred volume in the classic ranking, which may be many (published: 0.0001)"
     )
-    count_platform_faces: bool = Field(
-        False, description="true: faces standing on the platform count as risky (the authors' terms)"
+    platform_radius_mm: float | None = rare("Radius that planes must clear", gt=0)(
+        None, "criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
     )
-    single_limb: bool = Field(
+    count_platform_faces: bool = rare("Count faces on the platform")(
+        False, "true: faces standing on the platform count as risky (the authors' terms)"
+    )
+    single_limb: bool = simple("Cut off single limbs", "branch arm leg tree one at a time")(
         True,
-        description="a cut may take single limbs off and leave others standing beside them, where the head passes clear; false: "
-        "it takes all that lies above its plane",
+        "a cut may take single limbs off and leave others standing beside them, where the head passes clear; false: it takes all "
+        "that lies above its plane",
     )
-    clearance: bool = Field(True, description="false: the head's bodies and the axis limits are ignored (the authors' terms)")
+    clearance: bool = rare("Heed the head and the axes", "collision")(
+        True, "false: the head's bodies and the axis limits are ignored (the authors' terms)"
+    )
 
     @property
     def effective(self) -> "Search":

@@ -12,7 +12,7 @@ import numpy as np
 from machine.quantities import duration, filament_cm3, filament_g, price
 from mdp.mesh import Floats
 from profiles.profile import Profile
-from profiles.settings.plate import MIDDLE
+from profiles.settings.support import MIDDLE
 
 LONGEST_COMMENT = 190
 CONFIG_BEGIN, CONFIG_END = "; tiltprint_config = begin", "; tiltprint_config = end"

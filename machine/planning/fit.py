@@ -26,7 +26,7 @@ from mdp.pose import Pose, least_rotation, level, poses
 from profiles.errors import MoveError
 from profiles.machine import Machine
 from profiles.profile import Profile
-from profiles.settings.plate import MIDDLE
+from profiles.settings.support import MIDDLE
 from slicer.interface.interface import AROUND_MM
 from slicer.paths import SlicedPart
 from slicer.raft import lift_mm, reach_mm

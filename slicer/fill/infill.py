@@ -17,7 +17,7 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from profiles.settings.infill import Infill
+from profiles.settings.layers import Infill
 from slicer.bead import Bead, infill_cell_mm, spacing_mm, with_line_width
 from slicer.fill.lightning import lightning_lines
 from slicer.fill.lines import Box, LinePattern, Lines, anchor_lines, clip_pattern, concentric_lines, grid_numbers, parallel_lines

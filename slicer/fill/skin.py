@@ -14,7 +14,7 @@ import numpy as np
 
 from mdp.mesh import Floats, Indices
 from profiles.process import Process
-from profiles.settings.shell import SkinPattern
+from profiles.settings.layers import SkinPattern
 from slicer.bead import ROUND_SIDES, Bead, spacing_mm
 from slicer.fill.lines import MARGIN_MM, Box, Draw, Lines, anchor_lines, clip_pattern, concentric_lines, horizontal_lines
 from slicer.geometry.clip import Pieces, rotation_2d

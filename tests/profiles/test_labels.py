@@ -5,16 +5,18 @@ from collections import Counter
 import pytest
 
 from machine.app.workbench.bench.settings import USUAL, settings_list
-from profiles.labels.label import Level
-from profiles.labels.labels import LABELS, TITLES, unit_of
+from profiles.frozen import TITLES, unit_of
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys
 
 ROWS = settings_list(load(), USUAL)
+ROW_OF = {row["key"]: row for row in ROWS}
 
 
 def test_every_key_has_a_label_and_every_label_a_key() -> None:
-    assert set(LABELS) == {key for name, kind in SECTIONS.items() for key, _ in keys(kind, f"{name}.")}
+    assert {key for key, row in ROW_OF.items() if row["label"]} == {
+        key for name, kind in SECTIONS.items() for key, _ in keys(kind, f"{name}.")
+    }
 
 
 def test_no_two_keys_of_a_group_have_the_same_label() -> None:
@@ -27,11 +29,11 @@ def test_every_group_has_a_title_of_its_own() -> None:
 
 
 def test_labels_are_words_not_keys() -> None:
-    assert [label.text for label in LABELS.values() if "_" in label.text or not label.text[0].isupper()] == []
+    assert [row["label"] for row in ROWS if "_" in row["label"] or not row["label"][0].isupper()] == []
 
 
 def test_a_beginner_sees_a_fifth_of_the_keys() -> None:
-    assert 30 <= sum(label.level == Level.SIMPLE for label in LABELS.values()) <= 55
+    assert 30 <= sum(row["level"] == "simple" for row in ROWS) <= 55
 
 
 @pytest.mark.parametrize(
@@ -69,5 +71,5 @@ def test_a_unit_is_that_of_the_name(key: str, unit: str) -> None:
     ],
 )
 def test_the_words_of_other_slicers_find_a_key(word: str, key: str) -> None:
-    label = LABELS[key]
-    assert word in f"{key} {label.text} {label.synonyms}".lower()
+    row = ROW_OF[key]
+    assert word in f"{key} {row['label']} {row['synonyms']}".lower()

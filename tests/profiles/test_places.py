@@ -6,10 +6,9 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
-from profiles.check import check_file
 from profiles.errors import ProfileError
 from profiles.places import known, own, own_folder, shipped
-from profiles.profile import load, load_one
+from profiles.profile import check_file, load, load_one
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from profiles.check import check_file
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
 from profiles.process import Process
@@ -19,6 +18,7 @@ from profiles.profile import (
     KINDS,
     OF_KIND,
     SECTIONS,
+    check_file,
     kind_of,
     load,
     load_one,

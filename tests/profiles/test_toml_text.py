@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from profiles.check import check_file
 from profiles.errors import ProfileError
 from profiles.places import tables
-from profiles.profile import load
+from profiles.profile import check_file, load
 from profiles.toml_text import read_toml, read_value
 
 

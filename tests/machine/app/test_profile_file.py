@@ -6,8 +6,7 @@ import pytest
 
 from machine.app.cli import main
 from machine.app.profile_file import profile_text
-from profiles.check import check_file
-from profiles.profile import known, load_one
+from profiles.profile import check_file, known, load_one
 
 BLOCK = 'machine.gcode.start="G28\\nM117 \'ready\' \\"{nozzle_c}\\" \\\\\\n"'  # as a terminal has it
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats
-from profiles.settings.shell import SkinPattern
+from profiles.settings.layers import SkinPattern
 from slicer.bead import Bead
 from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, clean

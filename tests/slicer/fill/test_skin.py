@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from profiles.settings.shell import SkinPattern
+from profiles.settings.layers import SkinPattern
 from slicer.fill.skin import FEW_HIDDEN, SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, offset
 from slicer.paths import Kind

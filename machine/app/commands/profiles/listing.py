@@ -7,11 +7,10 @@ from pathlib import Path
 
 from machine.app.terminal.plain import plain_line, plain_lines
 from machine.app.terminal.progress import say
-from profiles.check import check_file
 from profiles.frozen import Frozen
 from profiles.machine import Machine
 from profiles.places import own, own_folder
-from profiles.profile import KINDS, kind_of, load, load_one, rows, shipped
+from profiles.profile import KINDS, check_file, kind_of, load, load_one, rows, shipped
 
 
 def list_profiles() -> int:

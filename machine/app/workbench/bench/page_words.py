@@ -11,10 +11,13 @@ from itertools import count
 from pathlib import PurePath
 from typing import Any
 
-from profiles.labels.labels import LABELS, group_title
+from profiles.frozen import TITLES
+from profiles.profile import SECTIONS
+from profiles.wording import keys
 
+LABELS = {key: field.title or "" for section, model in SECTIONS.items() for key, field in keys(model, f"{section}.")}
 # The label of a key that a sentence names without its table: of several the process's own.
-_NAMES = [(*key.split("."), label.text) for key, label in LABELS.items() if not key.startswith("machine.")]
+_NAMES = [(*key.split("."), label) for key, label in LABELS.items() if not key.startswith("machine.")]
 _BARE = {name: text for section, name, text in sorted(_NAMES, key=lambda named: named[0] == "process") if "_" in name}
 _PAUSES = "under Copies and pauses"
 # Option or aside -> what the page has in its place; the first that fits goes first.
@@ -148,4 +151,4 @@ def _label(key: re.Match[str]) -> str:
     if label is None:
         return key[0]
     table = key[0].rpartition(".")[0]
-    return f"{group_title(table)}: {label.text}" if table.count(".") else label.text
+    return f"{TITLES[table]}: {label}" if table.count(".") else label

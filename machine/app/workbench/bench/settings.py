@@ -9,8 +9,7 @@ from machine.app.requests import Given
 from machine.app.workbench.bench.part_settings import own_values
 from machine.gcode.blocks import block_problems, block_values
 from profiles.errors import ProfileError
-from profiles.frozen import Frozen, may_be_left_out
-from profiles.labels.labels import group_title, label_of, unit_of
+from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
 from profiles.machine import GCODE
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
 from profiles.places import KINDS, OF_KIND, known
@@ -156,15 +155,14 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
             continue
         matter = next(kind for kind in reversed(model.__mro__) if issubclass(kind, Frozen) and name in kind.model_fields)
         own = f"{prefix}: {matter.__name__.lower()}" if matter is not model else prefix
-        key, label = f"{prefix}.{name}", label_of(f"{prefix}.{name}")
+        assert isinstance(field.json_schema_extra, dict)
         yield {
-            "key": key,
-            "label": label.text,
-            "level": label.level,
-            "synonyms": label.synonyms,
-            "unit": unit_of(key),
+            "key": f"{prefix}.{name}",
+            "label": field.title,
+            **field.json_schema_extra,
+            "unit": unit_of(name),
             "group": group or own,
-            "title": group_title(group or own),
+            "title": TITLES[group or own],
             "about": about or _sentence(matter),
             "meaning": field.description or "",
             "optional": may_be_left_out(field.annotation),

@@ -20,7 +20,7 @@ from mdp.ranking.ranker import CLASSIC
 from mdp.search.parts import one_piece
 from profiles.errors import MeshError, PlanError
 from profiles.frozen import Vector
-from profiles.settings.plate import MIDDLE
+from profiles.settings.support import MIDDLE
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, History, Step
-from machine.app.workbench.bench.page_words import RULES, in_page_words, page_words, with_page_words
+from machine.app.workbench.bench.page_words import LABELS, RULES, in_page_words, page_words, with_page_words
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.snapshot import snapshot
 from machine.app.workbench.work.worker_pool import WorkerPools
-from profiles.labels.labels import LABELS
 from profiles.profile import load
 from tests.machine.app.workbench.models import model
 
