@@ -6,8 +6,7 @@ from pathlib import Path
 from machine.app.requests import Given
 from profiles.errors import ProfileError
 from profiles.foreign.imported import KINDS, imported
-from profiles.foreign.read import read_config
-from profiles.foreign.slicer_file import is_slicer_file, read_slicer_settings
+from profiles.foreign.read import is_slicer_file, read_config, read_slicer_settings
 
 
 def has_settings(file: Path) -> bool:
@@ -15,7 +14,7 @@ def has_settings(file: Path) -> bool:
     if not is_slicer_file(file):
         return False
     try:
-        return bool(read_slicer_settings(file).values)
+        return bool(read_slicer_settings(file)[0])
     except ProfileError:
         return True
 

@@ -32,7 +32,7 @@ from profiles.errors import MeshError, ProfileError, counted
 from profiles.frozen import Vector
 
 if TYPE_CHECKING:
-    from profiles.foreign.slicer_file import SlicerSettings
+    from profiles.foreign.read import SlicerSettings
 
 MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
@@ -64,7 +64,7 @@ class _Marks:
     @cached_property
     def _settings(self) -> "SlicerSettings | None":
         """The settings of the whole print, read once; most models have none. None, with a note: they are damaged."""
-        from profiles.foreign.slicer_file import read_slicer_settings
+        from profiles.foreign.read import read_slicer_settings
 
         try:
             return read_slicer_settings(self._path)
@@ -118,7 +118,9 @@ class _Marks:
         """The keys of a process that settings become, with a note on them."""
         if self._settings is None:
             return {}
-        process, left = self._settings.of_place(settings)
+        from profiles.foreign.read import settings_of_volume
+
+        process, left = settings_of_volume(self._settings, settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
         values = [f"{name} = {settings[name]}" for name in left[:MOST_TOLD]] + ["..."] * (len(left) > MOST_TOLD)
         rest = f"; not taken: {', '.join(values)}" if left else ""

@@ -5,7 +5,6 @@ auto_extrusion_width); where it means "the firmware's", nothing is taken.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import pi
 
 from profiles.foreign.config import Config
@@ -13,42 +12,40 @@ from profiles.foreign.config import Config
 AUTO_WIDTH, AUTO_NARROW = 1.125, 1.0  # of the nozzle: walls and infill, uppermost skins and support
 ROUND_ENDS = 1.0 - pi / 4.0  # of a bead's height: by how much beads side by side overlap
 
-
-@dataclass(frozen=True)
-class Value:
-    """What we say for it. how: what was worked out; empty where it is taken as it is."""
-
-    value: float | bool | str | None
-    how: str = ""
-
-
-@dataclass(frozen=True)
-class Left:
-    """Why nothing is taken."""
-
-    reason: str
-
-
-Converted = Value | Left
+# A value of ours and what was worked out, "" where it is taken as it is; or None and the reason why nothing is taken.
+Converted = tuple[float | bool | str | None, str]
 Convert = Callable[[Config, str], Converted]
-NO_NUMBER = Left("is no number")
+NO_NUMBER: Converted = (None, "is no number")
 
 
 def number(config: Config, key: str) -> Converted:
     """A number as it is."""
     value = config.number(key)
-    return NO_NUMBER if value is None else Value(value)
+    return NO_NUMBER if value is None else (value, "")
 
 
 def whole(config: Config, key: str) -> Converted:
     """A count."""
     value = config.number(key)
-    return NO_NUMBER if value is None else Value(round(value))
+    return NO_NUMBER if value is None else (round(value), "")
 
 
-def flag(config: Config, key: str) -> Converted:
-    """On or off."""
-    return Value(bool(config.flag(key)))
+def always(value: float | bool | str | None, how: str = "") -> Convert:
+    """The same whatever the setting says; None: it is known and not taken."""
+    return lambda config, key: (value, how)
+
+
+def by_flag(on: Converted, off: Converted) -> Convert:
+    """What on and off mean."""
+    return lambda config, key: on if config.flag(key) else off
+
+
+flag = by_flag((True, ""), (False, ""))
+
+
+def unless_off(switch: str, off: Converted, convert: Convert) -> Convert:
+    """A conversion that holds only where another setting is not off."""
+    return lambda config, key: off if config.flag(switch) is False else convert(config, key)
 
 
 def above_zero(zero: str) -> Convert:
@@ -58,7 +55,7 @@ def above_zero(zero: str) -> Convert:
         value = config.number(key)
         if value is None:
             return NO_NUMBER
-        return Value(value) if value > 0.0 else Left(f"0: {zero}")
+        return (value, "") if value > 0.0 else (None, f"0: {zero}")
 
     return convert
 
@@ -66,43 +63,43 @@ def above_zero(zero: str) -> Convert:
 def share(config: Config, key: str) -> Converted:
     """A percentage, with its sign or without, as a share."""
     value, plain = config.share(key), config.number(key)
-    if value is None and plain is None:
-        return Left("is no percentage")
-    return Value(round(plain / 100.0 if value is None else value, 6), "percent as a share") if plain is not None else Value(value)
+    if plain is not None:
+        return round(plain / 100.0 if value is None else value, 6), "percent as a share"
+    return (None, "is no percentage") if value is None else (value, "")
 
 
 def part_of(base: str, zero: str = "") -> Convert:
     """A number, or a percentage of another setting; zero: what 0 means where it is no value."""
 
     def convert(config: Config, key: str) -> Converted:
-        part, value, whole_value = config.share(key), config.number(key), size(config, base)
+        part, value, whole_value = config.share(key), config.number(key), _size(config, base)
         if value is not None:
-            return Value(value) if value > 0.0 or not zero else Left(f"0: {zero}")
+            return (value, "") if value > 0.0 or not zero else (None, f"0: {zero}")
         if part is None:
             return NO_NUMBER
         if whole_value is None:
-            return Left(f"a percentage of {base}, which the file does not tell")
-        return Value(round(part * whole_value, 6), f"{100.0 * part:g} % of {base} ({whole_value:g})")
+            return None, f"a percentage of {base}, which the file does not tell"
+        return round(part * whole_value, 6), f"{100.0 * part:g} % of {base} ({whole_value:g})"
 
     return convert
 
 
-def size(config: Config, key: str) -> float | None:
+PARTS = {
+    "solid_infill_speed": part_of("infill_speed"),
+    "external_perimeter_speed": part_of("perimeter_speed"),
+    "external_perimeter_acceleration": part_of("default_acceleration"),
+}
+
+
+def _size(config: Config, key: str) -> float | None:
     """The number of a setting, percentages of others and widths worked out."""
     if key.endswith("_extrusion_width"):
-        converted = width()(config, key)
-        return converted.value if isinstance(converted, Value) and isinstance(converted.value, float) else None
-    if key in PARTS and config.text(key) is not None:
-        converted = part_of(PARTS[key])(config, key)
-        return converted.value if isinstance(converted, Value) and isinstance(converted.value, float) else None
-    return config.number(key)
-
-
-PARTS = {
-    "solid_infill_speed": "infill_speed",
-    "external_perimeter_speed": "perimeter_speed",
-    "external_perimeter_acceleration": "default_acceleration",
-}
+        value, _ = width()(config, key)
+    elif key in PARTS and config.text(key) is not None:
+        value, _ = PARTS[key](config, key)
+    else:
+        return config.number(key)
+    return value if isinstance(value, float) else None
 
 
 def width(height: str = "layer_height", auto: float = AUTO_WIDTH) -> Convert:
@@ -110,28 +107,27 @@ def width(height: str = "layer_height", auto: float = AUTO_WIDTH) -> Convert:
 
     def convert(config: Config, key: str) -> Converted:
         for name in dict.fromkeys((key, "extrusion_width")):
-            converted = part_of(height, "by the nozzle")(config, name)
-            if isinstance(converted, Value):
-                how = converted.how if name == key else f"0 is {name}"
-                return Value(converted.value, how)
+            value, how = part_of(height, "by the nozzle")(config, name)
+            if value is not None:
+                return value, how if name == key else f"0 is {name}"
         nozzle = config.number("nozzle_diameter")
         if nozzle is None:
-            return Left("0 is by the nozzle, which the file does not tell")
-        return Value(round(auto * nozzle, 6), f"0 is {auto:g} nozzles of {nozzle:g} mm")
+            return None, "0 is by the nozzle, which the file does not tell"
+        return round(auto * nozzle, 6), f"0 is {auto:g} nozzles of {nozzle:g} mm"
 
     return convert
 
 
-def density(spacing: str, line: str) -> Callable[[Config], float | None]:
-    """The share that lines fill which stand that far apart."""
+def density(line: str) -> Convert:
+    """The share that lines of that width fill which stand as far apart as the setting says."""
 
-    def convert(config: Config) -> float | None:
-        gap, wide = config.number(spacing), width(auto=AUTO_NARROW)(config, line)
+    def convert(config: Config, key: str) -> Converted:
+        gap, (wide, _) = config.number(key), width(auto=AUTO_NARROW)(config, line)
         high = config.number("layer_height")
-        if gap is None or gap < 0.0 or high is None or isinstance(wide, Left) or not isinstance(wide.value, float):
-            return None
-        pitch = wide.value - ROUND_ENDS * high
-        return round(pitch / (pitch + gap), 4) if pitch > 0.0 else None
+        pitch = wide - ROUND_ENDS * high if isinstance(wide, float) and high is not None else 0.0
+        if gap is None or gap < 0.0 or pitch <= 0.0:
+            return None, "needs a width and a layer height"
+        return round(pitch / (pitch + gap), 4), "lines that far apart"
 
     return convert
 
@@ -143,12 +139,7 @@ def one_of(words: dict[str, str], unknown: str = "there is no such one here") ->
         text = config.text(key) or ""
         found = words.get(text)
         if found is None:
-            return Left(unknown)
-        return Value(found, "" if found == text else "the nearest there is")
+            return None, unknown
+        return found, "" if found == text else "the nearest there is"
 
     return convert
-
-
-def left(why: str) -> Convert:
-    """A setting that is known and not taken."""
-    return lambda config, key: Left(why)

@@ -15,7 +15,7 @@ from zipfile import ZipFile
 
 from profiles.errors import ProfileError, first_line, reason
 from profiles.files import DAMAGED_ZIP
-from profiles.foreign.config import Config, Entry, finite
+from profiles.foreign.config import CURAS, Config, Entry, finite, without_still_fan
 from profiles.foreign.cura_formulas import worked_out
 
 PROGRAM = "Cura"
@@ -51,78 +51,6 @@ HOLDS = {  # settings that hold only where another has a word, and what they are
 DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, configparser.Error, ElementTree.ParseError)
 MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
 PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
-KEYS = {
-    "layer_height_0": "first_layer_height",
-    "line_width": "extrusion_width",
-    "wall_line_width_x": "perimeter_extrusion_width",
-    "wall_line_width_0": "external_perimeter_extrusion_width",
-    "infill_line_width": "infill_extrusion_width",
-    "skin_line_width": "solid_infill_extrusion_width",
-    "roofing_line_width": "top_infill_extrusion_width",
-    "support_line_width": "support_material_extrusion_width",
-    "wall_line_count": "perimeters",
-    "top_layers": "top_solid_layers",
-    "bottom_layers": "bottom_solid_layers",
-    "top_thickness": "top_solid_min_thickness",
-    "bottom_thickness": "bottom_solid_min_thickness",
-    "infill_sparse_density": "fill_density",
-    "infill_pattern": "fill_pattern",
-    "min_infill_area": "solid_infill_below_area",
-    "z_seam_type": "seam_position",
-    "inset_direction": "external_perimeters_first",
-    "outer_inset_first": "external_perimeters_first",
-    "magic_spiralize": "spiral_vase",
-    "print_sequence": "complete_objects",
-    "ironing_enabled": "ironing",
-    "ironing_line_spacing": "ironing_spacing",
-    "speed_ironing": "ironing_speed",
-    "speed_wall_x": "perimeter_speed",
-    "speed_wall_0": "external_perimeter_speed",
-    "speed_topbottom": "solid_infill_speed",
-    "speed_roofing": "top_solid_infill_speed",
-    "speed_infill": "infill_speed",
-    "speed_support": "support_material_speed",
-    "speed_support_interface": "support_material_interface_speed",
-    "speed_layer_0": "first_layer_speed",
-    "speed_travel": "travel_speed",
-    "bridge_skin_speed": "bridge_speed",
-    "acceleration_print": "default_acceleration",
-    "acceleration_wall_0": "external_perimeter_acceleration",
-    "acceleration_infill": "infill_acceleration",
-    "acceleration_travel": "travel_acceleration",
-    "acceleration_layer_0": "first_layer_acceleration",
-    "support_top_distance": "support_material_contact_distance",
-    "support_bottom_distance": "support_material_bottom_contact_distance",
-    "support_xy_distance": "support_material_xy_spacing",
-    "support_structure": "support_material_style",
-    "support_enable": "support_material",
-    "support_type": "support_material_buildplate_only",
-    "brim_gap": "brim_separation",
-    "raft_margin": "raft_expansion",
-    "raft_surface_margin": "raft_expansion",
-    "skirt_line_count": "skirts",
-    "skirt_gap": "skirt_distance",
-    "material_print_temperature": "temperature",
-    "material_print_temperature_layer_0": "first_layer_temperature",
-    "material_bed_temperature": "bed_temperature",
-    "material_flow": "extrusion_multiplier",
-    "cool_fan_speed_max": "max_fan_speed",
-    "cool_fan_speed_min": "min_fan_speed",
-    "cool_min_layer_time_fan_speed_max": "fan_below_layer_time",
-    "cool_min_layer_time": "slowdown_below_layer_time",
-    "cool_min_speed": "min_print_speed",
-    "cool_fan_full_layer": "full_fan_speed_layer",
-    "retraction_amount": "retract_length",
-    "retraction_speed": "retract_speed",
-    "retraction_min_travel": "retract_before_travel",
-    "retraction_hop": "retract_lift",
-    "xy_offset": "xy_contour_compensation",
-    "hole_xy_offset": "xy_hole_compensation",
-    "machine_nozzle_size": "nozzle_diameter",
-    "material_diameter": "filament_diameter",
-    "material_density": "filament_density",
-    "material_type": "filament_type",
-}
 RAFT_LAYERS = {"raft_base_layers": 1, "raft_interface_layers": 1, "raft_surface_layers": 2}  # with Cura's own numbers
 WORDS = {
     "fill_pattern": {
@@ -151,16 +79,15 @@ def of_values(values: Mapping[str, str], name: str = "") -> Config:
         switch, word, off = HOLDS.get(theirs, ("", "", None))
         if text.startswith("="):
             formulas.append(theirs)
-        elif (said := known.get(switch, word)).lower() != word and not said.startswith("="):
-            entries |= {KEYS.get(theirs, theirs): Entry(theirs, off)} if off is not None else {}
+            continue
+        key = CURAS.get(theirs, theirs)
+        if (said := known.get(switch, word)).lower() != word and not said.startswith("="):
+            entries |= {key: (theirs, off)} if off is not None else {}
         elif theirs not in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
-            key = KEYS.get(theirs, theirs)
-            entries[key] = Entry(theirs, _said(key, text))
+            entries[key] = theirs, _said(key, text)
     if (angle_deg := finite(known.get("support_angle", ""))) is not None:  # Cura's is from the vertical
-        entries["support_material_threshold"] = Entry("support_angle", f"{90.0 - angle_deg:g}")
-    entries |= _raft(known)
-    if "min_fan_speed" in entries:
-        entries["fan_always_on"] = Entry(entries["min_fan_speed"].name, "1")
+        entries["support_material_threshold"] = "support_angle", f"{90.0 - angle_deg:g}"
+    entries = without_still_fan(entries | _raft(known))
     return Config(PROGRAM, entries, tuple(f"{own} (a formula)" for own in formulas), name, name)
 
 
@@ -172,10 +99,10 @@ def _raft(values: Mapping[str, str]) -> dict[str, Entry]:
     entries = dict[str, Entry]()
     if (kind := values.get("adhesion_type", "")) and not kind.startswith("="):
         layers = sum(_number(values.get(key, ""), usual) for key, usual in RAFT_LAYERS.items())
-        entries["raft_layers"] = Entry("adhesion_type", f"{layers:g}" if kind == "raft" else "0")
+        entries["raft_layers"] = "adhesion_type", f"{layers:g}" if kind == "raft" else "0"
     if (gap_mm := finite(values.get("raft_airgap", ""))) is not None:
         into_mm = _number(values.get("layer_0_z_overlap", ""), 0.5 * gap_mm)
-        entries["raft_contact_distance"] = Entry("raft_airgap", f"{max(gap_mm - into_mm, 0.0):g}")
+        entries["raft_contact_distance"] = "raft_airgap", f"{max(gap_mm - into_mm, 0.0):g}"
     return entries
 
 

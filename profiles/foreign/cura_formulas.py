@@ -61,10 +61,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 DEEPEST = 12  # formulas within formulas; a ring of them would never end
 
 
-class _UnknownError(Exception):
-    """A setting without a value in the file, or a word that is no arithmetic."""
-
-
 def worked_out(values: Mapping[str, str]) -> dict[str, str]:
     """The values with formulas worked out where all that they name is known; those that are not stay as they are."""
     worked = dict(values)
@@ -72,16 +68,16 @@ def worked_out(values: Mapping[str, str]) -> dict[str, str]:
         if values.get(key, "=").startswith("="):
             try:
                 worked[key] = _text(_value(key, values, 0))
-            except (_UnknownError, ArithmeticError, TypeError, ValueError, SyntaxError):
+            except (LookupError, ArithmeticError, TypeError, ValueError, SyntaxError):
                 continue
     return worked
 
 
 def _value(key: str, values: Mapping[str, str], deep: int) -> Any:
-    """The value of a setting. Raises _UnknownError."""
+    """The value of a setting. Raises LookupError where a setting has none, or for a word that is no arithmetic."""
     text = values.get(key, "=" + USUAL.get(key, ""))
     if text == "=" or deep > DEEPEST:
-        raise _UnknownError(key)
+        raise LookupError(key)
     if text.startswith("="):
         return _worked(ast.parse(text[1:].strip(), mode="eval").body, values, deep + 1)
     try:
@@ -91,7 +87,7 @@ def _value(key: str, values: Mapping[str, str], deep: int) -> Any:
 
 
 def _worked(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
-    """The value of an expression. Raises _UnknownError."""
+    """The value of an expression. Raises LookupError where a setting has none, or for a word that is no arithmetic."""
     match node:
         case ast.Constant(value=value):
             return value
@@ -113,13 +109,13 @@ def _worked(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
             return _value(name, values, deep)
         case ast.Call(func=called, args=terms, keywords=[]) if (function := FUNCTIONS.get(ast.unparse(called))) is not None:
             return function(*(_number(term, values, deep) for term in terms))
-    raise _UnknownError(ast.unparse(node))
+    raise LookupError(ast.unparse(node))
 
 
 def _number(node: ast.AST, values: Mapping[str, str], deep: int) -> float:
     value = _worked(node, values, deep)
     if not isinstance(value, int | float):
-        raise _UnknownError(ast.unparse(node))
+        raise LookupError(ast.unparse(node))
     return value
 
 

@@ -1,13 +1,11 @@
 """Imported: a configuration of another slicer as settings of our material and process, row by row, with what was left and why."""
 
-from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Collection, Iterator
+from typing import Any, NamedTuple
 
 from profiles.errors import ProfileError
-from profiles.foreign import material_rules, process_rules
 from profiles.foreign.config import Config
-from profiles.foreign.conversion import Convert, Left, Value
+from profiles.foreign.rules import MATERIAL_RULES, PROCESS_RULES, base_of
 from profiles.part_settings import problems_of_place
 from profiles.process import WIDTHS, Process
 from profiles.profile import load_one
@@ -16,25 +14,16 @@ from profiles.toml_text import read_value, value_text
 PROCESS_BASE = "standard"
 NOZZLE_MM = 0.4  # of the shipped machines, whose profile decides in the end
 KINDS = ("process", "material")
-RULES = {"process": process_rules.RULES, "material": material_rules.RULES}
-CONDITIONS = frozenset(  # read beside others, and told with them
-    {
-        *("extrusion_width", "nozzle_diameter", "filament_type", "fan_always_on", "cooling", "brim_type", "thick_bridges"),
-        *(
-            "wipe_distance",
-            "enable_pressure_advance",
-            "enable_dynamic_overhang_speeds",
-            "enable_overhang_speed",
-            "curr_bed_type",
-            "adhesion_type",
-        ),
-    }
-)
+RULES = {"process": PROCESS_RULES, "material": MATERIAL_RULES}
+CONDITIONS = {  # read beside others, and told with them
+    *("extrusion_width", "nozzle_diameter", "filament_type", "fan_always_on", "cooling", "brim_type", "thick_bridges"),
+    *("wipe_distance", "enable_pressure_advance", "enable_dynamic_overhang_speeds", "enable_overhang_speed"),
+    *("curr_bed_type", "adhesion_type"),
+}
 SPARE = frozenset(f"process.{key}" for key in WIDTHS) - {"process.line_width_mm"}  # widths that may be those of all lines
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """A setting of theirs and what it became. key: ours; value: ours, as TOML has it, empty where it is left; how: what was
     worked out, or why it is left."""
 
@@ -50,8 +39,7 @@ class Row:
         return bool(self.value)
 
 
-@dataclass(frozen=True)
-class Imported:
+class Imported(NamedTuple):
     """A profile to be: kind, name, the shipped one it inherits from, and the rows of its settings."""
 
     kind: str
@@ -67,7 +55,7 @@ class Imported:
 
 def imported(config: Config, kind: str, name: str = "", nameless: str = "imported") -> Imported:
     """The material or the process of a configuration. name: what to call it; else as there; nameless: where it has no name."""
-    base = PROCESS_BASE if kind == "process" else material_rules.base_of(config)[0]
+    base = PROCESS_BASE if kind == "process" else base_of(config)[0]
     own_name = name or (config.process if kind == "process" else config.material) or nameless
     return _sound(Imported(kind, own_name, base, tuple(_rows(config, kind, base))))
 
@@ -81,8 +69,8 @@ def _sound(profile: Imported) -> Imported:
         wide = [row for row in profile.rows if row.taken and row.key in SPARE and row.key.split(".")[1] in said]
         if not wide:
             raise ProfileError(f"{profile.kind} {profile.name!r}: {said}") from None
-        rows = (replace(row, value="", how=_about(row, said)) if row in wide else row for row in profile.rows)
-        return _sound(replace(profile, rows=tuple(rows)))
+        rows = (row._replace(value="", how=_about(row, said)) if row in wide else row for row in profile.rows)
+        return _sound(profile._replace(rows=tuple(rows)))
     return profile
 
 
@@ -94,7 +82,7 @@ def _about(row: Row, said: str) -> str:
 def unused(config: Config) -> list[str]:
     """Names of theirs that no rule reads: what there is nothing like here, and what belongs to the machine."""
     read = {source for kind in KINDS for _, source, _ in RULES[kind]} | CONDITIONS
-    return sorted({entry.name for key, entry in config.entries.items() if key not in read} | set(config.unknown))
+    return sorted({name for key, (name, _) in config.entries.items() if key not in read} | set(config.unknown))
 
 
 def stay(profile: Imported) -> list[str]:
@@ -110,25 +98,15 @@ def _rows(config: Config, kind: str, base: str, sources: Collection[str] | None 
     """One row a rule whose setting the file has; of several for one key the first that gives a value is taken. sources: the
     settings to look at; None: all."""
     done: set[str] = set()
-    for key, source, convert in _present(config, kind):
-        if sources is not None and source not in sources:
+    for key, source, convert in RULES[kind]:
+        if config.text(source) is None or (sources is not None and source not in sources):
             continue
-        entry = config.entries[source]
-        converted = Left(f"{key} has another's") if key in done else convert(config, source)
-        if isinstance(converted, Value):
-            text = _text(converted.value, base, kind, key)
-            refused = _refusal(base, kind, key, text)
-            if refused:
-                converted = Left(refused)
-            else:
-                done.add(key)
-                yield Row(entry.name, entry.text, key, text, converted.how)
-                continue
-        yield Row(entry.name, entry.text, key, "", converted.reason)
-
-
-def _present(config: Config, kind: str) -> Iterable[tuple[str, str, Convert]]:
-    return (rule for rule in RULES[kind] if config.text(rule[1]) is not None)
+        converted, how = (None, f"{key} has another's") if key in done else convert(config, source)
+        value = "" if converted is None else _text(converted, base, kind, key)
+        if value and (refused := _refusal(base, kind, key, value)):
+            value, how = "", refused
+        done |= {key} if value else set()
+        yield Row(*config.entries[source], key, value, how)
 
 
 def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str, Any], list[str]]:
@@ -136,7 +114,7 @@ def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str,
     of a process, and the names of those that are left."""
     process = load_one(PROCESS_BASE, kind="process")["process"]
     assert isinstance(process, Process)
-    sources = {key for key, entry in config.entries.items() if entry.name in names}
+    sources = {key for key, (name, _) in config.entries.items() if name in names}
     settings, left = dict[str, Any](), set(names)
     for row in _rows(config, "process", PROCESS_BASE, sources):
         key = row.key.removeprefix("process.")
@@ -146,11 +124,11 @@ def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str,
     return settings, sorted(left)
 
 
-def _text(value: float | bool | str | None, base: str, kind: str, key: str) -> str:
+def _text(value: float | bool | str, base: str, kind: str, key: str) -> str:
     """A value as TOML has it; whole numbers where the key takes whole ones."""
     is_whole = isinstance(value, float) and value.is_integer() and not isinstance(value, bool)
     if is_whole and isinstance(_default(base, kind, key), int):
-        return value_text(int(value))  # type: ignore[arg-type]
+        return value_text(int(value))
     return value_text(value)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from profiles.errors import ProfileError, reason
-from profiles.foreign.config import Config, Entry, width_of_nozzle
+from profiles.foreign.config import ORCASLICERS, Config, Entry, first_filament, width_of_nozzle, without_still_fan
 
 PROGRAM = "OrcaSlicer"
 TYPES = {"process": "process", "filament": "material", "machine": "printer"}
@@ -18,87 +18,6 @@ ABOUT = (
     *("type", "name", "from", "inherits", "instantiation", "setting_id", "filament_id", "version", "is_custom_defined"),
     *("compatible_printers", "compatible_prints", "compatible_printers_condition", "compatible_prints_condition"),
 )
-WIDTHS = {
-    "line_width": "extrusion_width",
-    "inner_wall_line_width": "perimeter_extrusion_width",
-    "outer_wall_line_width": "external_perimeter_extrusion_width",
-    "top_surface_line_width": "top_infill_extrusion_width",
-    "sparse_infill_line_width": "infill_extrusion_width",
-    "internal_solid_infill_line_width": "solid_infill_extrusion_width",
-    "support_line_width": "support_material_extrusion_width",
-    "initial_layer_line_width": "first_layer_extrusion_width",
-}
-KEYS = {
-    **WIDTHS,
-    "initial_layer_print_height": "first_layer_height",
-    "wall_loops": "perimeters",
-    "only_one_wall_first_layer": "only_one_perimeter_first_layer",
-    "fuzzy_skin_point_distance": "fuzzy_skin_point_dist",
-    "before_layer_change_gcode": "before_layer_gcode",
-    "layer_change_gcode": "layer_gcode",
-    "top_shell_layers": "top_solid_layers",
-    "bottom_shell_layers": "bottom_solid_layers",
-    "top_shell_thickness": "top_solid_min_thickness",
-    "bottom_shell_thickness": "bottom_solid_min_thickness",
-    "resolution": "gcode_resolution",
-    "sparse_infill_density": "fill_density",
-    "sparse_infill_pattern": "fill_pattern",
-    "top_surface_pattern": "top_fill_pattern",
-    "bottom_surface_pattern": "bottom_fill_pattern",
-    "infill_direction": "fill_angle",
-    "minimum_sparse_infill_area": "solid_infill_below_area",
-    "spiral_mode": "spiral_vase",
-    "brim_object_gap": "brim_separation",
-    "print_sequence": "complete_objects",
-    "skirt_loops": "skirts",
-    "bridge_flow": "bridge_flow_ratio",
-    "ironing_flow": "ironing_flowrate",
-    "reduce_crossing_wall": "avoid_crossing_perimeters",
-    "outer_wall_speed": "external_perimeter_speed",
-    "inner_wall_speed": "perimeter_speed",
-    "internal_solid_infill_speed": "solid_infill_speed",
-    "top_surface_speed": "top_solid_infill_speed",
-    "sparse_infill_speed": "infill_speed",
-    "gap_infill_speed": "gap_fill_speed",
-    "support_speed": "support_material_speed",
-    "support_interface_speed": "support_material_interface_speed",
-    "initial_layer_speed": "first_layer_speed",
-    "outer_wall_acceleration": "external_perimeter_acceleration",
-    "inner_wall_acceleration": "perimeter_acceleration",
-    "sparse_infill_acceleration": "infill_acceleration",
-    "initial_layer_acceleration": "first_layer_acceleration",
-    "enable_support": "support_material",
-    "support_threshold_angle": "support_material_threshold",
-    "support_top_z_distance": "support_material_contact_distance",
-    "support_bottom_z_distance": "support_material_bottom_contact_distance",
-    "support_object_xy_distance": "support_material_xy_spacing",
-    "support_base_pattern_spacing": "support_material_spacing",
-    "support_base_pattern": "support_material_pattern",
-    "support_interface_top_layers": "support_material_interface_layers",
-    "support_interface_bottom_layers": "support_material_bottom_interface_layers",
-    "support_interface_spacing": "support_material_interface_spacing",
-    "support_on_build_plate_only": "support_material_buildplate_only",
-    "support_type": "support_material_style",
-    "nozzle_temperature": "temperature",
-    "nozzle_temperature_initial_layer": "first_layer_temperature",
-    "filament_flow_ratio": "extrusion_multiplier",
-    "fan_max_speed": "max_fan_speed",
-    "fan_min_speed": "min_fan_speed",
-    "fan_cooling_layer_time": "fan_below_layer_time",
-    "overhang_fan_speed": "bridge_fan_speed",
-    "slow_down_layer_time": "slowdown_below_layer_time",
-    "slow_down_min_speed": "min_print_speed",
-    "slow_down_for_layer_cooling": "cooling",
-    "close_fan_the_first_x_layers": "disable_fan_first_layers",
-    "retraction_length": "retract_length",
-    "retraction_speed": "retract_speed",
-    "retraction_minimum_travel": "retract_before_travel",
-    "z_hop": "retract_lift",
-    "filament_retraction_length": "filament_retract_length",
-    "filament_retraction_speed": "filament_retract_speed",
-    "filament_retraction_minimum_travel": "filament_retract_before_travel",
-    "filament_z_hop": "filament_retract_lift",
-}
 WORDS = {  # values that are called otherwise
     "fill_pattern": {"zig-zag": "rectilinear", "tri-hexagon": "stars"},
     "top_fill_pattern": {"zig-zag": "rectilinear"},
@@ -128,30 +47,21 @@ def of_values(values: Mapping[str, str], process: str = "", material: str = "") 
     """Settings under OrcaSlicer's names."""
     entries: dict[str, Entry] = {}
     for name, text in values.items():
-        key = KEYS.get(name, name)
-        entries[key] = Entry(name, _said(key, name, text, values))
+        key = ORCASLICERS.get(name, name)
+        if name in ORCASLICERS and key.endswith("extrusion_width"):
+            entries[key] = name, width_of_nozzle(text, values.get("nozzle_diameter", ""))
+        else:
+            entries[key] = name, WORDS.get(key, {}).get(text, text)
     plate = PLATES.get(values.get("curr_bed_type", ""), "hot_plate_temp")
     if plate in values:
-        entries["bed_temperature"] = Entry(plate, values[plate])
-    if "min_fan_speed" in entries:  # the fan never stands still above the first layers
-        entries["fan_always_on"] = Entry(entries["min_fan_speed"].name, "1")
-    return Config(PROGRAM, entries, (), process or values.get("print_settings_id", ""), material or _own(values))
+        entries["bed_temperature"] = plate, values[plate]
+    process, material = process or values.get("print_settings_id", ""), material or first_filament(values)
+    return Config(PROGRAM, without_still_fan(entries), (), process, material)
 
 
 def values_of(document: Mapping[str, Any]) -> dict[str, str]:
     """The settings of a preset or a slicer file as texts."""
     return {key: _text(value) for key, value in document.items() if key not in ABOUT}
-
-
-def _own(values: Mapping[str, str]) -> str:
-    return values.get("filament_settings_id", "").split(";")[0].strip('"')
-
-
-def _said(key: str, name: str, text: str, values: Mapping[str, str]) -> str:
-    """A value as PrusaSlicer would say it."""
-    if name in WIDTHS:
-        return width_of_nozzle(text, values.get("nozzle_diameter", ""))
-    return WORDS.get(key, {}).get(text, text)
 
 
 def _inherited(file: Path, document: Mapping[str, Any], below: tuple[Path, ...]) -> tuple[dict[str, str], str]:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from profiles.errors import ProfileError
-from profiles.foreign.config import Config, Entry, finite, width_of_nozzle
+from profiles.foreign.config import Config, finite, first_filament, width_of_nozzle
 
 KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # of a bundle's sections, and the options' names
 SECTION = re.compile(r"\[(.+)\]")
@@ -29,17 +29,16 @@ JSON_GROUPS = ("printer_settings", "print_settings", "toolprint_settings", "fila
 Presets = dict[str, dict[str, dict[str, str]]]  # kind, name, key
 
 
-def read_settings(lines: list[str], program: str, chosen: Mapping[str, str]) -> Config:
+def read_settings(lines: list[str], chosen: Mapping[str, str]) -> Config:
     """A config.ini, or the one preset of each kind that is chosen of a bundle. Raises ProfileError."""
     presets = _sections(lines)
     if not any(presets[kind] for kind in KINDS):
-        plain = presets[""].get("", {})
-        return _config(program, plain, plain.get("print_settings_id", ""), _unquoted(plain))
+        return of_gcode(presets[""].get("", {}))
     names = {kind: _chosen(presets, kind, chosen.get(option, "")) for kind, option in KINDS.items()}
     values: dict[str, str] = {}
     for kind in ("printer", "filament", "print"):
         values |= _inherited(presets[kind], names[kind], ()) if names[kind] else {}
-    return _config(program, values, names["print"], names["filament"])
+    return _config(values, names["print"], names["filament"])
 
 
 def gcode_settings(text: str) -> dict[str, str]:
@@ -86,12 +85,7 @@ def _json_text(value: Any) -> str:
 
 def of_gcode(settings: Mapping[str, str]) -> Config:
     """The settings of a G-code file that PrusaSlicer or SuperSlicer wrote."""
-    return _config("PrusaSlicer", settings, settings.get("print_settings_id", ""), _unquoted(settings))
-
-
-def _unquoted(settings: Mapping[str, str]) -> str:
-    """The name of the first filament."""
-    return settings.get("filament_settings_id", "").split(";")[0].strip().strip('"')
+    return _config(settings, settings.get("print_settings_id", ""), first_filament(settings))
 
 
 def _sections(lines: list[str]) -> Presets:
@@ -145,10 +139,10 @@ def _parents(text: str) -> Iterator[str]:
     yield from (name.strip().strip('"') for name in text.split(";") if name.strip())
 
 
-def _config(program: str, values: Mapping[str, str], process: str, material: str) -> Config:
+def _config(values: Mapping[str, str], process: str, material: str) -> Config:
     if not OF_SUPERSLICER & values.keys():
-        return Config(program, {key: Entry(key, value) for key, value in values.items()}, (), process, material)
-    entries = {key: Entry(key, _said(key, value, values.get("nozzle_diameter", ""))) for key, value in values.items()}
+        return Config("PrusaSlicer", {key: (key, value) for key, value in values.items()}, (), process, material)
+    entries = {key: (key, _said(key, value, values.get("nozzle_diameter", ""))) for key, value in values.items()}
     return Config("SuperSlicer", entries, (), process, material)
 
 

@@ -1,18 +1,74 @@
-"""Read: a file of another slicer, told by what is in it."""
+"""Read: a file of another slicer, told by what is in it; also the settings inside a .3mf that one has saved with its models."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
 
-from profiles.errors import ProfileError, reason
-from profiles.files import is_zip
+from profiles.errors import ProfileError, first_line, reason
+from profiles.files import DAMAGED_ZIP, is_zip
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
-from profiles.foreign.slicer_file import is_slicer_file, read_slicer_settings
+from profiles.foreign.imported import settings_of_place
 
 MOST_BYTES = 256 << 20  # of a G-code file; settings stand in its last MiB, OrcaSlicer's in its first as well
 END_BYTES = 1 << 20
 ORCA_KEYS = frozenset({"sparse_infill_density", "wall_loops", "nozzle_temperature"})
 PRUSA_KEYS = frozenset({"fill_density", "perimeters", "temperature", "layer_height", "filament_diameter", "nozzle_diameter"})
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, ProfileError)
+MOST_SETTINGS_BYTES = 16 << 20  # of a slicer file, whose settings have some 100 kB
+OF_PRUSASLICER = ("metadata/slic3r_pe.config", "metadata/slic3r.config", "metadata/superslicer.config")
+OF_ORCASLICER = "metadata/project_settings.config"
+OBJECTS_OF_ORCASLICER = "metadata/model_settings.config"  # there without the other where a file holds models alone
+OF_CURA = "cura/"
+
+# The settings of a slicer file under its program's names, and what makes a configuration of such.
+SlicerSettings = tuple[Mapping[str, str], Callable[[Mapping[str, str]], Config]]
+
+
+def is_slicer_file(file: Path) -> bool:
+    """Whether a file may be one, by its name and kind."""
+    return file.suffix.lower() == ".3mf" and is_zip(file)
+
+
+def read_slicer_settings(file: Path) -> SlicerSettings:
+    """The settings of a slicer file, none where it keeps none. Raises ProfileError for such that are damaged."""
+    try:
+        with ZipFile(file) as archive:
+            entries = {name.lower(): name for name in archive.namelist()}
+            prusaslicers = next((entries[name] for name in OF_PRUSASLICER if name in entries), None)
+            if prusaslicers is not None:
+                return prusaslicer.gcode_settings(_text(archive, prusaslicers)), prusaslicer.of_gcode
+            if OF_ORCASLICER in entries:
+                document = json.loads(_text(archive, entries[OF_ORCASLICER]))
+                if not isinstance(document, dict):
+                    raise ValueError("no table of settings")
+                return orcaslicer.values_of(document), orcaslicer.of_values
+            if OBJECTS_OF_ORCASLICER in entries:
+                return {}, orcaslicer.of_values
+            if any(name.startswith("metadata/slic3r") for name in entries):
+                return {}, prusaslicer.of_gcode
+    except OSError as error:
+        raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
+    except DAMAGED as error:
+        raise ProfileError(f"profile {file}: the settings inside it are damaged ({first_line(error)})") from None
+    has_settings = any(name.startswith(OF_CURA) for name in entries)
+    return cura.read_values(file)[0] if has_settings else {}, cura.of_values
+
+
+def settings_of_volume(settings: SlicerSettings, of_volume: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
+    """What settings of a volume or an object become: values by keys of a process, and the names of those that are left."""
+    values, of_values = settings
+    return settings_of_place(of_values({**values, **of_volume}), of_volume.keys()) if of_volume else ({}, [])
+
+
+def _text(archive: ZipFile, name: str) -> str:
+    """The text of a member. Raises ValueError for one that is too large."""
+    size = archive.getinfo(name).file_size
+    if size > MOST_SETTINGS_BYTES:
+        raise ValueError(f"{name} has {size} bytes, {MOST_SETTINGS_BYTES} are allowed")
+    return archive.read(name).decode("utf-8-sig", errors="replace")
 
 
 def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
@@ -40,7 +96,7 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
         return orcaslicer.of_values(commented)
     if PRUSA_KEYS & commented.keys():
         return prusaslicer.of_gcode(commented)
-    config = prusaslicer.read_settings(text.split("\n"), "PrusaSlicer", presets or {})
+    config = prusaslicer.read_settings(text.split("\n"), presets or {})
     if not PRUSA_KEYS & config.entries.keys():
         raise ProfileError(
             f"profile {file}: holds no settings; a config.ini, a bundle or a G-code file of PrusaSlicer or SuperSlicer, a JSON "
@@ -51,10 +107,10 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
 
 def _of_slicer_file(file: Path) -> Config:
     """The settings inside a slicer file. Raises ProfileError where it keeps none."""
-    settings = read_slicer_settings(file)
-    if not settings.values:
+    values, of_values = read_slicer_settings(file)
+    if not values:
         raise ProfileError(f"{file}: keeps no print settings; a .3mf that a slicer has saved with them is expected")
-    return settings.config
+    return of_values(values)
 
 
 def _ends(file: Path) -> bytes:

@@ -6,14 +6,14 @@ import pytest
 
 from profiles.errors import ProfileError
 from profiles.foreign import orcaslicer, prusaslicer
-from profiles.foreign.config import Config, Entry
+from profiles.foreign.config import Config
 from profiles.foreign.imported import imported, stay, unused
-from profiles.foreign.process_rules import RULES
+from profiles.foreign.rules import PROCESS_RULES
 from profiles.profile import load_one
 
 
 def config(**values: str) -> Config:
-    return Config("PrusaSlicer", {key: Entry(key, text) for key, text in values.items()})
+    return Config("PrusaSlicer", {key: (key, text) for key, text in values.items()})
 
 
 def taken(kind: str = "process", **values: str) -> dict[str, str]:
@@ -149,7 +149,7 @@ def test_a_filament_s_kind_chooses_the_material_below_it() -> None:
 
 def test_every_key_that_a_rule_fills_is_one_of_ours() -> None:
     ours = {f"process.{name}" for name in type(load_one("standard")["process"]).model_fields}
-    assert {key for key, _, _ in RULES if key} <= ours
+    assert {key for key, _, _ in PROCESS_RULES if key} <= ours
 
 
 def test_nothing_of_theirs_and_nothing_of_ours_is_passed_over_in_silence() -> None:

@@ -5,9 +5,10 @@ from zipfile import ZipFile
 
 import pytest
 
+from profiles.foreign.config import Config
 from profiles.foreign.cura import of_values
-from profiles.foreign.material_rules import base_of
-from profiles.foreign.slicer_file import read_slicer_settings
+from profiles.foreign.read import read_slicer_settings
+from profiles.foreign.rules import base_of
 
 MATERIAL = """<fdmmaterial xmlns="http://www.ultimaker.com/material">
 <metadata><name><brand>Acme</brand><material>PETG</material></name></metadata>
@@ -29,6 +30,11 @@ def project(path: Path, containers: dict[str, str], stacks: dict[str, tuple[str,
     return path
 
 
+def config_inside(file: Path) -> Config:
+    values, of_values = read_slicer_settings(file)
+    return of_values(values)
+
+
 def test_what_is_on_top_of_a_stack_holds_wherever_it_stands_in_the_file(tmp_path: Path) -> None:
     containers = {
         "changes": "layer_height = 0.2\nspeed_travel = 150",
@@ -43,7 +49,7 @@ def test_what_is_on_top_of_a_stack_holds_wherever_it_stands_in_the_file(tmp_path
         "a.global": ("type = machine", ["user", "changes", "quality"]),
         "c.extruder": ("position = 0\nenabled = True", ["first", "empty_intent", "first_printer"]),
     }
-    config = read_slicer_settings(project(tmp_path / "a.3mf", containers, stacks)).config
+    config = config_inside(project(tmp_path / "a.3mf", containers, stacks))
     numbers = [config.number(key) for key in ("layer_height", "travel_speed", "raft_expansion", "perimeters", "nozzle_diameter")]
     assert numbers == [0.25, 150, 3, 3, 0.6]
 
@@ -54,12 +60,12 @@ def test_the_first_extruder_that_is_switched_on_is_read(tmp_path: Path) -> None:
         "c.extruder": ("position = 1\nenabled = True", ["on"]),
     }
     file = project(tmp_path / "a.3mf", {"off": "wall_line_count = 9", "on": "wall_line_count = 3"}, stacks)
-    assert read_slicer_settings(file).config.number("perimeters") == 3
+    assert config_inside(file).number("perimeters") == 3
 
 
 def test_a_material_says_its_kind_and_temperature_below_what_a_person_has_set(tmp_path: Path) -> None:
     stacks = {"a.extruder": ("position = 0", ["user", "petg_acme_printer_0.4"])}
-    config = read_slicer_settings(project(tmp_path / "a.3mf", {"user": "material_bed_temperature = 70"}, stacks)).config
+    config = config_inside(project(tmp_path / "a.3mf", {"user": "material_bed_temperature = 70"}, stacks))
     assert config.text("filament_type") == "PETG"
     assert [config.number(key) for key in ("temperature", "bed_temperature", "filament_density")] == [240, 70, 1.27]
 

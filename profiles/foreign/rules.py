@@ -1,29 +1,32 @@
-"""Process rules: what of another slicer's print settings becomes which key of a process."""
+"""Rules: what of another slicer's print and filament settings becomes which key of a process and of a material."""
 
+import re
 from math import pi
 
 from profiles.foreign.config import Config
 from profiles.foreign.conversion import (
     AUTO_NARROW,
+    NO_NUMBER,
     Convert,
     Converted,
-    Left,
-    Value,
     above_zero,
+    always,
+    by_flag,
     density,
     flag,
-    left,
     number,
     one_of,
     part_of,
     share,
+    unless_off,
     whole,
     width,
 )
 
+Rule = tuple[str, str, Convert]  # our key, "" where there is none; PrusaSlicer's; how the one becomes the other
 FIRMWARE = "the firmware's own"
 AUTO = "as fast as the plastic melts; ours stays"
-SMALL_RADIUS_MM = 6.5  # of the walls that PrusaSlicer calls small
+SMALL_WALL = always(round(2.0 * pi * 6.5, 2), "a radius of 6.5 mm")  # of the walls that PrusaSlicer calls small
 PATTERNS = {
     **dict.fromkeys(("rectilinear", "alignedrectilinear", "line"), "rectilinear"),
     **dict.fromkeys(("cubic", "adaptivecubic", "supportcubic"), "cubic"),
@@ -36,7 +39,6 @@ SKINS = {
     **dict.fromkeys(("rectilinear", "alignedrectilinear"), "rectilinear"),
     "concentric": "concentric",
 }
-SEAMS = {"aligned": "aligned", "rear": "rear", "nearest": "nearest", "random": "random"}
 STYLES = {
     "grid": "grid",
     "snug": "grid",
@@ -48,120 +50,134 @@ STYLES = {
     "tree(manual)": "tree",
 }
 FILLS = {"rectilinear": "lines", "rectilinear-grid": "grid"}
+ADVANCE = re.compile(r"^(?:M900 K|M572 (?:D\d+ )?S|SET_PRESSURE_ADVANCE (?:EXTRUDER=\S+ )?ADVANCE=)(\d+\.?\d*|\.\d+)(?![\d.])")
+BASES = {"PLA": "pla", "PETG": "petg", "PET": "petg", "ABS": "abs", "ASA": "abs", "TPU": "tpu", "FLEX": "tpu", "TPE": "tpu"}
+USUAL_BASE = "pla"
+FAN_LEAST = unless_off("fan_always_on", (0.0, "fan_always_on is off: long layers have none"), share)
+PRESSURE = unless_off("enable_pressure_advance", (None, "enable_pressure_advance is off"), number)
+GCODE = "G-code blocks belong to the machine"
+
+
+def base_of(config: Config) -> tuple[str, str]:
+    """The shipped material that one inherits from, and what the file says that it is."""
+    kind = (config.text("filament_type") or "").strip('"').upper()
+    return next((BASES[word] for word in re.split(r"[^A-Z]+", kind) if word in BASES), USUAL_BASE), kind
 
 
 def _first_layer_infill_speed(config: Config, key: str) -> Converted:
     """Only where the first layer's speed is a percentage do its skins have one of their own."""
     if config.share(key) is None:
-        return Left("one speed for all lines")
+        return None, "one speed for all lines"
     return part_of("solid_infill_speed")(config, key)
 
 
 def _first_layer_width(config: Config, key: str) -> Converted:
     """0 is as elsewhere, by kind of line."""
-    if config.number(key) == 0.0:
-        return Left("0: as elsewhere")
-    return part_of("first_layer_height")(config, key)
+    return (None, "0: as elsewhere") if config.number(key) == 0.0 else part_of("first_layer_height")(config, key)
 
 
 def _steepest(config: Config, key: str) -> Converted:
     """From the printing direction, where the others count from the horizontal."""
     threshold = config.number(key)
     if threshold is None:
-        return Left("is no number")
-    return Left("0: found by the slicer") if threshold == 0.0 else Value(90.0 - threshold, f"90 less {threshold:g}")
+        return NO_NUMBER
+    return (None, "0: found by the slicer") if threshold == 0.0 else (90.0 - threshold, f"90 less {threshold:g}")
 
 
 def _found_by_the_slicer(config: Config, key: str) -> Converted:
     """A number, below 0 where the slicer works it out."""
-    converted = number(config, key)
-    below = isinstance(converted, Value) and isinstance(converted.value, float) and converted.value < 0.0
-    return Left("below 0: worked out by the slicer; ours stays") if below else converted
+    below = (config.number(key) or 0.0) < 0.0
+    return (None, "below 0: worked out by the slicer; ours stays") if below else number(config, key)
 
 
-def _support_density(config: Config, key: str) -> Converted:
-    filled = density(key, "support_material_extrusion_width")(config)
-    return Left("needs a width and a layer height") if filled is None else Value(filled, "lines that far apart")
-
-
-def _same_as_top(key_above: str, same: float) -> Convert:
+def _same_as_top(key_above: str, same: float, convert: Convert) -> Convert:
     """A number where one value of it means: as above."""
 
-    def convert(config: Config, key: str) -> Converted:
+    def converted(config: Config, key: str) -> Converted:
         value = config.number(key)
         above = config.number(key_above)
         if value == same and above is not None:
-            return Value(round(above) if float(above).is_integer() and "layers" in key else above, f"as {key_above}")
-        return number(config, key) if "layers" not in key else whole(config, key)
+            return round(above) if float(above).is_integer() and convert is whole else above, f"as {key_above}"
+        return convert(config, key)
 
-    return convert
-
-
-def _on_part(config: Config, key: str) -> Converted:
-    return Value(not config.flag(key))
-
-
-def _wall_order(config: Config, key: str) -> Converted:
-    return Value("outer-first" if config.flag(key) else "inner-first", "" if config.flag(key) is not None else "off")
+    return converted
 
 
 def _one_wall_top(config: Config, key: str) -> Converted:
     wanted = config.text(key)
-    return Value(wanted != "none", "on all tops" if wanted == "topmost" else "")
-
-
-def _gap_fill(config: Config, key: str) -> Converted:
-    return Left("on: as here") if config.flag(key) else Value(1000.0, "off: no gap is so long")
+    return wanted != "none", "on all tops" if wanted == "topmost" else ""
 
 
 def _brim(config: Config, key: str) -> Converted:
-    if config.text("brim_type") == "no_brim":
-        return Value(0.0, "brim_type is no_brim")
-    return number(config, key)
+    return (0.0, "brim_type is no_brim") if config.text("brim_type") == "no_brim" else number(config, key)
 
 
 def _ironing(config: Config, key: str) -> Converted:
-    if config.text("ironing_type") == "no ironing":
-        return Value(False)
-    return Value(bool(config.flag(key)) or key == "ironing_type")
+    return config.text("ironing_type") != "no ironing" and (bool(config.flag(key)) or key == "ironing_type"), ""
 
 
 def _holes_of_all(config: Config, key: str) -> Converted:
     grown = config.number(key)
-    return Left("is no number") if grown is None else Value(-grown or 0.0, "what grows outside closes holes")
-
-
-def _only_on(why: str) -> Convert:
-    return lambda config, key: Value(True) if config.flag(key) else Left(why)
-
-
-def _small_wall(config: Config, key: str) -> Converted:
-    del config, key
-    return Value(round(2.0 * pi * SMALL_RADIUS_MM, 2), f"a radius of {SMALL_RADIUS_MM:g} mm")
+    return NO_NUMBER if grown is None else (-grown or 0.0, "what grows outside closes holes")
 
 
 def _overhang(percent_on_plastic: str) -> Convert:
     """PrusaSlicer's speeds by what is on plastic hold at one share, ours from there to the next; 0 is off."""
 
     def convert(config: Config, key: str) -> Converted:
-        if config.flag("enable_dynamic_overhang_speeds") is False or config.flag("enable_overhang_speed") is False:
-            return Left("overhangs are not slowed down there; ours stays")
-        converted = part_of("external_perimeter_speed", "not slowed down there; ours stays")(config, key)
-        return Value(converted.value, converted.how or percent_on_plastic) if isinstance(converted, Value) else converted
+        value, how = part_of("external_perimeter_speed", "not slowed down there; ours stays")(config, key)
+        return value, how or percent_on_plastic
 
-    return convert
-
-
-def _layer_time(config: Config, key: str) -> Converted:
-    if config.flag("cooling") is False:
-        return Value(0.0, "cooling is off")
-    return number(config, key)
+    off: Converted = (None, "overhangs are not slowed down there; ours stays")
+    return unless_off("enable_dynamic_overhang_speeds", off, unless_off("enable_overhang_speed", off, convert))
 
 
-RULES: tuple[tuple[str, str, Convert], ...] = (
+def _fan_most(config: Config, key: str) -> Converted:
+    """The fan's most: where nothing is cooled by layer time, the least that is always there."""
+    if config.flag("cooling") is False and config.text("fan_always_on") is not None:
+        least, how = FAN_LEAST(config, "min_fan_speed")
+        return least, how if least is None else "cooling is off: the fan stays at its least"
+    return share(config, key)
+
+
+def _bridge_fan(config: Config, key: str) -> Converted:
+    """The fan over bridges; below 0 SuperSlicer has it as elsewhere."""
+    return (None, "below 0: as elsewhere") if (config.number(key) or 0.0) < 0.0 else share(config, key)
+
+
+def _override(own: str, convert: Convert = number) -> Convert:
+    """The filament's own value where it has one, else the printer's."""
+
+    def converted(config: Config, key: str) -> Converted:
+        if config.text(own) is None:
+            return convert(config, key)
+        value, how = convert(config, own)
+        return value, how if value is None else f"the filament's own {own}"
+
+    return converted
+
+
+def _advance(config: Config, key: str) -> Converted:
+    """Pressure advance out of a filament's G-code, where a line says nothing else."""
+    blocks = (config.text(key) or "").strip('"').replace("\\n", "\n").split("\n")
+    found = [match[1] for line in blocks if (match := ADVANCE.match(line.split(";")[0].strip()))]
+    if found:
+        return float(found[-1]), "out of the filament's G-code"
+    asks = any(word in line for line in blocks for word in ("M900", "M572", "SET_PRESSURE_ADVANCE"))
+    return None, "sets pressure advance on a condition: look at it, and set material.pressure_advance" if asks else GCODE
+
+
+def _wipe(config: Config, key: str) -> Converted:
+    if config.flag(key) is False:
+        return 0.0, "off"
+    distance = config.number("wipe_distance")
+    return (None, "on: how far is ours") if distance is None else (distance, "wipe_distance")
+
+
+PROCESS_RULES: tuple[Rule, ...] = (
     ("process.layer_height_mm", "layer_height", number),
-    ("", "before_layer_gcode", left("is the machine's here: machine.gcode.before_layer")),
-    ("", "layer_gcode", left("is the machine's here: machine.gcode.before_layer")),
+    ("", "before_layer_gcode", always(None, "is the machine's here: machine.gcode.before_layer")),
+    ("", "layer_gcode", always(None, "is the machine's here: machine.gcode.before_layer")),
     ("process.first_layer_height_mm", "first_layer_height", part_of("layer_height")),
     ("process.least_layer_height_mm", "min_layer_height", above_zero("by the nozzle")),
     ("process.most_layer_height_mm", "max_layer_height", above_zero("by the nozzle")),
@@ -171,7 +187,7 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.infill_line_width_mm", "infill_extrusion_width", width()),
     ("process.support_line_width_mm", "support_material_extrusion_width", width(auto=AUTO_NARROW)),
     ("process.first_layer_line_width_mm", "first_layer_extrusion_width", _first_layer_width),
-    ("", "solid_infill_extrusion_width", left("skins are as wide as process.line_width_mm")),
+    ("", "solid_infill_extrusion_width", always(None, "skins are as wide as process.line_width_mm")),
     ("process.walls", "perimeters", whole),
     ("process.top_layers", "top_solid_layers", whole),
     ("process.bottom_layers", "bottom_solid_layers", whole),
@@ -180,13 +196,13 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.only_one_wall_top", "top_one_perimeter_type", _one_wall_top),
     ("process.only_one_wall_top", "only_one_wall_top", flag),
     ("process.only_one_wall_first_layer", "only_one_perimeter_first_layer", flag),
-    ("process.gap_least_mm", "gap_fill_enabled", _gap_fill),
+    ("process.gap_least_mm", "gap_fill_enabled", by_flag((None, "on: as here"), (1000.0, "off: no gap is so long"))),
     ("process.gap_least_mm", "filter_out_gap_fill", number),
     ("process.fuzzy_skin", "fuzzy_skin", one_of({name: name for name in ("none", "external", "all", "allwalls")})),
     ("process.fuzzy_skin_thickness_mm", "fuzzy_skin_thickness", number),
     ("process.fuzzy_skin_point_distance_mm", "fuzzy_skin_point_dist", number),
-    ("process.wall_order", "external_perimeters_first", _wall_order),
-    ("process.seam", "seam_position", one_of(SEAMS)),
+    ("process.wall_order", "external_perimeters_first", by_flag(("outer-first", ""), ("inner-first", ""))),
+    ("process.seam", "seam_position", one_of({name: name for name in ("aligned", "rear", "nearest", "random")})),
     ("process.spiral_vase", "spiral_vase", flag),
     ("process.slit_closing_mm", "slice_closing_radius", number),
     ("process.resolution_mm", "gcode_resolution", number),
@@ -204,7 +220,7 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.solid_below_mm2", "solid_infill_below_area", number),
     ("process.infill_anchor_mm", "infill_anchor", part_of("infill_extrusion_width")),
     ("process.infill_joint_mm", "infill_anchor_max", part_of("infill_extrusion_width")),
-    ("", "infill_overlap", left("is counted from another edge there; ours stays")),
+    ("", "infill_overlap", always(None, "is counted from another edge there; ours stays")),
     ("process.ironing", "ironing", _ironing),
     ("process.ironing", "ironing_type", _ironing),
     ("process.ironing_flow", "ironing_flowrate", share),
@@ -224,24 +240,24 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.raft_first_layer_density", "raft_first_layer_density", share),
     ("process.raft_first_layer_expansion_mm", "raft_first_layer_expansion", _found_by_the_slicer),
     ("process.first_layer_speed_over_raft_mm_s", "first_layer_speed_over_raft", part_of("perimeter_speed", AUTO)),
-    ("", "support_material", left("parts that need support have it: process.support is auto")),
+    ("", "support_material", always(None, "parts that need support have it: process.support is auto")),
     ("process.self_supporting_angle_deg", "support_material_threshold", _steepest),
     ("process.support_style", "support_material_style", one_of(STYLES)),
-    ("process.support_on_part", "support_material_buildplate_only", _on_part),
+    ("process.support_on_part", "support_material_buildplate_only", by_flag((False, ""), (True, ""))),
     ("process.support_pattern", "support_material_pattern", one_of(FILLS)),
-    ("process.support_density", "support_material_spacing", _support_density),
+    ("process.support_density", "support_material_spacing", density("support_material_extrusion_width")),
     ("process.support_interface_layers", "support_material_interface_layers", whole),
     (
         "process.support_bottom_interface_layers",
         "support_material_bottom_interface_layers",
-        _same_as_top("support_material_interface_layers", -1.0),
+        _same_as_top("support_material_interface_layers", -1.0, whole),
     ),
-    ("process.support_interface_density", "support_material_interface_spacing", _support_density),
+    ("process.support_interface_density", "support_material_interface_spacing", density("support_material_extrusion_width")),
     ("process.support_gap_mm", "support_material_contact_distance", number),
     (
         "process.support_bottom_gap_mm",
         "support_material_bottom_contact_distance",
-        _same_as_top("support_material_contact_distance", 0.0),
+        _same_as_top("support_material_contact_distance", 0.0, number),
     ),
     ("process.support_distance_mm", "support_material_xy_spacing", part_of("external_perimeter_extrusion_width")),
     ("process.inner_wall_speed_mm_s", "perimeter_speed", above_zero(AUTO)),
@@ -258,7 +274,11 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.first_layer_infill_speed_mm_s", "first_layer_speed", _first_layer_infill_speed),
     ("process.first_layer_infill_speed_mm_s", "initial_layer_infill_speed", above_zero(AUTO)),
     ("process.small_wall_speed_mm_s", "small_perimeter_speed", part_of("perimeter_speed", AUTO)),
-    ("process.small_wall_mm", "small_perimeter_speed", _small_wall),
+    (
+        "process.small_wall_mm",
+        "small_perimeter_speed",
+        SMALL_WALL,
+    ),
     ("process.overhang_75_speed_mm_s", "overhang_speed_2", _overhang("from 50 % on plastic")),
     ("process.overhang_50_speed_mm_s", "overhang_speed_1", _overhang("from 25 % on plastic")),
     ("process.overhang_25_speed_mm_s", "overhang_speed_0", _overhang("from nothing on plastic")),
@@ -269,7 +289,7 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.lift_speed_mm_s", "travel_speed_z", above_zero("as travels; ours stays")),
     ("process.retract_travel_mm", "retract_before_travel", number),
     ("process.lift_mm", "retract_lift", number),
-    ("process.combing", "avoid_crossing_perimeters", _only_on("off: travels here go round by default")),
+    ("process.combing", "avoid_crossing_perimeters", by_flag((True, ""), (None, "off: travels here go round by default"))),
     ("process.acceleration_mm_s2", "default_acceleration", above_zero(FIRMWARE)),
     ("process.outer_wall_acceleration_mm_s2", "external_perimeter_acceleration", part_of("default_acceleration", FIRMWARE)),
     ("process.outer_wall_acceleration_mm_s2", "perimeter_acceleration", part_of("default_acceleration", FIRMWARE)),
@@ -277,6 +297,32 @@ RULES: tuple[tuple[str, str, Convert], ...] = (
     ("process.bridge_acceleration_mm_s2", "bridge_acceleration", part_of("external_perimeter_acceleration", FIRMWARE)),
     ("process.first_layer_acceleration_mm_s2", "first_layer_acceleration", part_of("default_acceleration", FIRMWARE)),
     ("process.travel_acceleration_mm_s2", "travel_acceleration", part_of("default_acceleration", FIRMWARE)),
-    ("process.least_layer_time_s", "slowdown_below_layer_time", _layer_time),
+    ("process.least_layer_time_s", "slowdown_below_layer_time", unless_off("cooling", (0.0, "cooling is off"), number)),
     ("process.least_speed_mm_s", "min_print_speed", above_zero("no slower limit")),
+)
+MATERIAL_RULES: tuple[Rule, ...] = (
+    ("material.diameter_mm", "filament_diameter", number),
+    ("material.density_g_cm3", "filament_density", above_zero("not told")),
+    ("material.price_per_kg", "filament_cost", above_zero("not told")),
+    ("material.nozzle_c", "temperature", number),
+    ("material.first_layer_nozzle_c", "first_layer_temperature", number),
+    ("material.bed_c", "bed_temperature", number),
+    ("material.flow", "extrusion_multiplier", number),
+    ("material.fan", "max_fan_speed", _fan_most),
+    ("material.fan_least", "min_fan_speed", FAN_LEAST),
+    ("material.fan_layer_time_s", "fan_below_layer_time", above_zero("no layer is cooled by its time")),
+    ("material.fan_bridge", "bridge_fan_speed", _bridge_fan),
+    ("material.fan_off_layers", "disable_fan_first_layers", whole),
+    ("material.fan_full_layer", "full_fan_speed_layer", whole),
+    ("material.retract_mm", "retract_length", _override("filament_retract_length")),
+    ("material.retract_speed_mm_s", "retract_speed", _override("filament_retract_speed", above_zero(FIRMWARE))),
+    ("material.retract_prime_extra_mm", "retract_restart_extra", _override("filament_retract_restart_extra")),
+    ("material.wipe_mm", "wipe", _wipe),
+    ("material.volumetric_limit_mm3_s", "filament_max_volumetric_speed", above_zero("no limit; ours stays")),
+    ("material.pressure_advance", "start_filament_gcode", _advance),
+    (
+        "material.pressure_advance",
+        "pressure_advance",
+        PRESSURE,
+    ),
 )
