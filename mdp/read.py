@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mdp.directions.turns import turned_by
-from mdp.foreign.marks import marks
+from mdp.foreign.marks import Marks
 from mdp.foreign.printed import printed
 from mdp.formats.readers import READERS
 from mdp.formats.slicer_file import Build
@@ -77,7 +77,7 @@ def read_model(
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
         mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
-        zones, mark_notes = marks(build, path, mesh, scale, turn, shift_mm)
+        zones, mark_notes = Marks(build, path, mesh, (scale, turn, shift_mm)).zones()
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
@@ -85,7 +85,7 @@ def read_model(
     left_out = (note for surface in surfaces for note in surface.notes)
     size = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
     notes = (*build.notes, *taken, *mark_notes, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
-    return ReadModel(mesh, tuple(dict.fromkeys(notes)), zones, {own.number: own.name for own in build.plates})
+    return ReadModel(mesh, tuple(dict.fromkeys(notes)), zones, build.plates)
 
 
 def read_in_place(path: Path) -> Mesh:

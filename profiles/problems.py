@@ -5,7 +5,6 @@ What is found wrong in a table is replaced by a sound value, so that the checks 
 
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -22,37 +21,30 @@ LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diame
 MOST_INTERFACE_WIDTH = 2.0  # thin beads on plastic: beyond the flat around the orifice nothing presses them down
 
 
-@dataclass(frozen=True)
-class TableProblems:
-    """Each problem one sentence.
-
-    value: the table as its keys' own types have it, made without what they must be together; None for no table.
-    mended: dotted keys whose values nobody gave, as those given are wrong.
-    """
-
-    problems: list[str]
-    value: Any
-    mended: frozenset[str]
-
-    def tells_of_mended(self, sentence: str) -> bool:
-        """Whether a sentence is of a value that nobody gave."""
-        words = sentence.replace(":", " ").split()
-        named = (f".{word}." for word in words)
-        return any(f".{key}." in word or word == f".{key.rpartition('.')[2]}." for word in named for key in self.mended)
-
-
-def table_problems(model: type[BaseModel], prefix: str, table: Any, sound: Mapping[str, Any]) -> TableProblems:
-    """All problems of a table; its keys are dotted after the prefix.
+def table_problems(
+    model: type[BaseModel], prefix: str, table: Any, sound: Mapping[str, Any]
+) -> tuple[list[str], Any, frozenset[str]]:
+    """All problems of a table whose keys are dotted after the prefix; the table made without what its keys must be together, None
+    for no table; and the dotted keys whose values nobody gave, as those given are wrong.
 
     sound: the values of a profile that is fine.
     """
     given = deepcopy(table)
     wrong, mended, value = _rounds(model, prefix, given, sound, KEY_BY_KEY)
-    single = TableProblems(wrong, value, mended)
     if value is not None:
         together, _, _ = _rounds(model, prefix, given, sound, None)
-        wrong += [sentence for sentence in together if not single.tells_of_mended(sentence)]
-    return TableProblems(wrong, value, mended)
+        wrong += not_of_mended(together, mended)
+    return wrong, value, mended
+
+
+def not_of_mended(problems: Iterable[str], mended: frozenset[str]) -> list[str]:
+    """The sentences that tell of no value that nobody gave. mended: the keys of such."""
+    return [sentence for sentence in problems if not _tells_of(sentence, mended)]
+
+
+def _tells_of(sentence: str, mended: frozenset[str]) -> bool:
+    named = [f".{word}." for word in sentence.replace(":", " ").split()]
+    return any(f".{key}." in word or word == f".{key.rpartition('.')[2]}." for word in named for key in mended)
 
 
 def _rounds(

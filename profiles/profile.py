@@ -26,7 +26,7 @@ from profiles.places import (
     strangers,
     tables,
 )
-from profiles.problems import TableProblems, lifted_twice, table_problems, too_hot, unfit_for_nozzle
+from profiles.problems import lifted_twice, not_of_mended, table_problems, too_hot, unfit_for_nozzle
 from profiles.process import Process
 from profiles.search import Search
 from profiles.toml_text import read_value
@@ -100,7 +100,7 @@ def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[st
         if setting.partition(".")[0].strip() not in OF_KIND[kind]:
             own_keys = " and ".join(f"{section}." for section in OF_KIND[kind])
             raise ProfileError(f"--set {setting}: {name} is a {kind} profile, whose keys begin with {own_keys}")
-    problems = [problem for name in OF_KIND[kind] for problem in _section_problems(name, whole[name]).problems]
+    problems = [problem for name in OF_KIND[kind] for problem in _section_problems(name, whole[name])]
     if problems:
         raise ProfileError("; ".join(problems))
     return {name: SECTIONS[name].model_validate(whole[name]) for name in OF_KIND[kind]}
@@ -111,7 +111,7 @@ def section(name: str, table: Any) -> Frozen:
     try:
         return SECTIONS[name].model_validate(table)
     except ValidationError:
-        raise ProfileError("; ".join(_section_problems(name, table).problems)) from None
+        raise ProfileError("; ".join(_section_problems(name, table))) from None
 
 
 def profile_of_tables(tables: dict[str, Any]) -> Profile:
@@ -150,7 +150,7 @@ def check_file(path: Path) -> list[str]:
     whole = merged(base, own_tables(document))
     for section in OF_KIND[kind]:
         if section in whole:
-            problems += table_problems(SECTIONS[section], f"{section}.", whole[section], sound.get(section, {})).problems
+            problems += table_problems(SECTIONS[section], f"{section}.", whole[section], sound.get(section, {}))[0]
     return problems
 
 
@@ -197,10 +197,8 @@ def _validated(whole: dict[str, Any]) -> Profile:
 def _all_problems(whole: dict[str, Any]) -> list[str]:
     """The problems of all tables, and what is wrong between those of their values that are right by themselves."""
     sound = {name: table for kind, name_of_kind in DEFAULTS.items() for name, table in tables(kind, name_of_kind).items()}
-    checked = table_problems(Profile, "", whole, sound)
-    if checked.value is None or checked.mended & LIMITS:
-        return checked.problems
-    return checked.problems + [text for text in _of_several(checked.value) if not checked.tells_of_mended(text)]
+    problems, checked, mended = table_problems(Profile, "", whole, sound)
+    return problems if checked is None or mended & LIMITS else problems + not_of_mended(_of_several(checked), mended)
 
 
 def _of_several(profile: Profile) -> list[str]:
@@ -212,6 +210,6 @@ def _of_several(profile: Profile) -> list[str]:
     ]
 
 
-def _section_problems(name: str, table: Any) -> TableProblems:
+def _section_problems(name: str, table: Any) -> list[str]:
     kind = next(kind for kind, sections in OF_KIND.items() if name in sections)
-    return table_problems(SECTIONS[name], f"{name}.", table, tables(kind, DEFAULTS[kind]).get(name, {}))
+    return table_problems(SECTIONS[name], f"{name}.", table, tables(kind, DEFAULTS[kind]).get(name, {}))[0]

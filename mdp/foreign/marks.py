@@ -20,10 +20,9 @@ from mdp.formats.slicer_file import (
     SUPPORT,
     Build,
     BuildObject,
-    BuildVolume,
     Role,
 )
-from mdp.formats.surface import concatenate
+from mdp.formats.surface import Surface, concatenate
 from mdp.head import corners
 from mdp.mesh import Floats, Mesh
 from mdp.repair.colours import NONE, triangle_of
@@ -43,21 +42,17 @@ THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
 BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
 
 
-def marks(build: Build, path: Path, mesh: Mesh, scale: float, turn: Floats, shift_mm: Floats) -> tuple[Zones, list[str]]:
-    """The modifiers and marks of a slicer file, with each place p of it at turn @ scale p + shift_mm, and a note on each.
+class Marks:
+    """The marks of a slicer file, moved as its model is.
 
-    mesh: the solid of what the file prints, which lies so. A volume that is no solid is left out, with a note.
+    mesh: the solid of what the file prints; moved: scale, turn and shift_mm by which each place p of the file lies on it, at
+    turn @ scale p + shift_mm. A volume that is no solid is left out, with a note.
     """
-    return _Marks(build, path, mesh, scale, turn, shift_mm).zones()
 
-
-class _Marks:
-    """The marks of a slicer file, moved as its model is."""
-
-    def __init__(self, build: Build, path: Path, mesh: Mesh, scale: float, turn: Floats, shift_mm: Floats) -> None:
+    def __init__(self, build: Build, path: Path, mesh: Mesh, moved: tuple[float, Floats, Floats]) -> None:
         self._objects, self._several = build.objects, sum(bool(item.surfaces(PART)) for item in build.objects) > 1
         self._corners_mm = mesh.vertices[mesh.faces]
-        self._path, self._scale, self._turn, self._shift_mm, self._on_plate = path, scale, turn, shift_mm, build.on_plate
+        self._path, (self._scale, self._turn, self._shift_mm), self._on_plate = path, moved, build.on_plate
         self._notes: list[str] = []
         self._subjects: dict[tuple[str, str], list[str]] = {}  # of notes, by what is said of each
 
@@ -79,17 +74,16 @@ class _Marks:
         painted = dict[str, list[Floats]]()
         for item in self._objects:
             modifiers += self._of_object(item) if item.surfaces(PART) else ()
-            for volume in item.volumes:
-                role = volume.role
+            for surface, role in item.volumes:
                 if role.kind == MODIFIER or (role.kind == PART and role.settings):
                     process = self._process(_named(role), role.settings)
-                    place = self._place(volume, item) if process else None
+                    place = self._place(surface, role, item) if process else None
                     modifiers += [] if place is None else [Modifier(place, process)]
-                elif role.kind in MARKED and (place := self._place(volume, item)) is not None:
+                elif role.kind in MARKED and (place := self._place(surface, role, item)) is not None:
                     kinds[MARKED[role.kind]].append(place)
                     self._tell(_named(role), "is", f"taken as [[{MARKED[role.kind]}]]")
                 elif role.kind in PAINTED:
-                    painted.setdefault(role.kind, []).append(self._moved(volume.surface.vertices[volume.surface.faces]))
+                    painted.setdefault(role.kind, []).append(self._moved(surface.vertices[surface.faces]))
         for kind, corners_mm in painted.items():
             kinds[PAINTED[kind]] += self._painted(kind, np.concatenate(corners_mm))
         notes = [_sentence(subjects, *predicate) for predicate, subjects in self._subjects.items()]
@@ -139,13 +133,13 @@ class _Marks:
         self._notes.append(f"{kind} on {held} of its triangles is taken as [[{PAINTED[kind]}]]{others}")
         return [Triangles(self._corners_mm[row != NONE])]
 
-    def _place(self, volume: BuildVolume, item: BuildObject) -> Volume | None:
+    def _place(self, surface: Surface, role: Role, item: BuildObject) -> Volume | None:
         """Where a volume lies, within the box of its object if there are others; None for one that is no solid, with a note.
 
         Where an object is nothing but marks, as in Cura, they hold for all.
         """
         try:
-            solid = solid_of_volume(volume)
+            solid = solid_of_volume(surface, role)
         except MeshError as error:
             self._notes.append(f"{error}: it is left out")
             return None

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mdp.formats.slicer_file import NEGATIVE, PART, Build, BuildVolume
+from mdp.formats.slicer_file import NEGATIVE, PART, Build, Role
 from mdp.formats.surface import Surface
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
@@ -19,7 +19,7 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
     """
     surfaces, notes, subtracted = list[Surface](), list[str](), 0
     for item in build.objects:
-        parts, negatives = item.surfaces(PART), [volume for volume in item.volumes if volume.role.kind == NEGATIVE]
+        parts, negatives = item.surfaces(PART), [volume for volume in item.volumes if volume[1].kind == NEGATIVE]
         deep_mm = -min((float(part.vertices[part.faces.ravel(), 2].min()) for part in parts), default=0.0)
         sinks = build.on_plate and deep_mm > SINKING_MM
         if not parts or not (negatives or sinks):
@@ -27,7 +27,7 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
             continue
         left, repairs = repair(parts)
         if negatives:
-            left = subtract(left, [solid_of_volume(volume) for volume in negatives])
+            left = subtract(left, [solid_of_volume(*volume) for volume in negatives])
             subtracted += len(negatives)
         if sinks:
             left = above(left, 0.0)
@@ -41,10 +41,10 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
     return surfaces, notes
 
 
-def solid_of_volume(volume: BuildVolume) -> Surface:
+def solid_of_volume(surface: Surface, role: Role) -> Surface:
     """A volume as a closed solid. Raises MeshError, which names it."""
     try:
         with np.errstate(all="ignore"):  # one that lies too far away for its volume to be a number is refused as any other
-            return repair([volume.surface])[0]
+            return repair([surface])[0]
     except MeshError as error:
-        raise MeshError(f"its {volume.role.kind} {volume.role.name!r} {error}") from None
+        raise MeshError(f"its {role.kind} {role.name!r} {error}") from None

@@ -1,7 +1,6 @@
 """PLY, ASCII and binary: the elements `vertex` and `face`, their colours red, green and blue, whatever other properties they
 carry."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,27 +27,8 @@ OF_255 = {"f4": 255.0, "f8": 255.0, "u2": 255.0 / 65535.0}  # bytes count as the
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
-@dataclass(frozen=True)
-class Property:
-    """One column; `length` is the type of a list's count and empty for a plain value."""
-
-    name: str
-    kind: str
-    length: str = ""
-
-
-@dataclass(frozen=True)
-class Element:
-    """A table of the file."""
-
-    name: str
-    count: int
-    properties: tuple[Property, ...]
-
-    @property
-    def least_bytes(self) -> int:
-        """Size of one row with empty lists, so that an absurd count is refused before anything is allocated."""
-        return sum(np.dtype(column.length or column.kind).itemsize for column in self.properties)
+Column = tuple[str, str, str]  # its name and type, and the type of a list's count: "" for a plain value
+Element = tuple[str, int, list[Column]]  # a table of the file: its name, its rows, its columns
 
 
 def read(path: Path) -> list[Surface]:
@@ -61,22 +41,22 @@ def read(path: Path) -> list[Surface]:
     columns: dict[str, dict[str, Any]] = {}
     words = content[body:].split() if order == "" else []
     position = body if order else 0
-    for element in elements:
+    for name, count, properties in elements:
         try:
             if order:
-                columns[element.name], position = _binary_rows(content, position, element, order)
+                columns[name], position = _binary_rows(content, position, count, properties, order)
             else:
-                columns[element.name], position = _ascii_rows(words, position, element)
+                columns[name], position = _ascii_rows(words, position, count, properties)
         except (ValueError, IndexError, OverflowError):
-            raise MeshError(f"{path}: is cut short or malformed in its {element.count} rows of `{element.name}`") from None
-    plain = {(table.name, column.name) for table in elements for column in table.properties if not column.length}
-    listed = {(table.name, column.name) for table in elements for column in table.properties if column.length}
+            raise MeshError(f"{path}: is cut short or malformed in its {count} rows of `{name}`") from None
+    every = [(table, column) for table, _, properties in elements for column in properties]
+    kinds = {(table, name): kind for table, (name, kind, length) in every if not length}
+    listed = {(table, name) for table, (name, _, length) in every if length}
     corners = next((name for name in ("vertex_indices", "vertex_index") if ("face", name) in listed), None)
-    if corners is None or not {("vertex", axis) for axis in "xyz"} <= plain:
+    if corners is None or not {("vertex", axis) for axis in "xyz"} <= kinds.keys():
         raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with a list vertex_indices")
     vertex, polygons = columns["vertex"], columns["face"][corners]
     vertices = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
-    kinds = {(table.name, column.name): column.kind for table in elements for column in table.properties if not column.length}
     painted = _colours(columns["face"], kinds, "face")
     if painted is None:
         painted = _corner_colours(_colours(vertex, kinds, "vertex"), polygons)
@@ -125,85 +105,83 @@ def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
             if words[:1] == ["format"]:
                 order = ORDERS[words[1]]
             elif words[:1] == ["element"]:
-                elements.append(Element(words[1], int(words[2]), ()))
+                elements.append((words[1], int(words[2]), []))
             elif words[:1] == ["property"]:
-                last = elements.pop()
                 listed = words[1] == "list"
-                column = Property(words[4], TYPES[words[3]], TYPES[words[2]]) if listed else Property(words[2], TYPES[words[1]])
-                elements.append(Element(last.name, last.count, (*last.properties, column)))
+                column = (words[4], TYPES[words[3]], TYPES[words[2]]) if listed else (words[2], TYPES[words[1]], "")
+                elements[-1][2].append(column)
     except (KeyError, IndexError, ValueError):
         raise MeshError(f"{path}: the header line `{' '.join(words)}` is not understood") from None
     if order is None:
         raise MeshError(f"{path}: its header names no format; allowed are {', '.join(ORDERS)}")
-    for element in elements:
-        least = element.least_bytes if order else 2 * len(element.properties) - 1
-        if element.count < 0 or element.count * least > len(content) - body + 1:
-            raise MeshError(f"{path}: announces {element.count} rows of `{element.name}`, more than the file can hold")
+    for name, count, properties in elements:
+        # One row with empty lists: an absurd count is refused before anything is allocated.
+        least_bytes = sum(np.dtype(length or kind).itemsize for _, kind, length in properties)
+        if count < 0 or count * (least_bytes if order else 2 * len(properties) - 1) > len(content) - body + 1:
+            raise MeshError(f"{path}: announces {count} rows of `{name}`, more than the file can hold")
     return order, elements, body
 
 
-def _binary_rows(content: bytes, offset: int, element: Element, order: str) -> tuple[dict[str, Any], int]:
+def _binary_rows(content: bytes, offset: int, count: int, properties: list[Column], order: str) -> tuple[dict[str, Any], int]:
     """Rows read in one piece when all lists are as long as the first row's, else one by one."""
-    lengths = _first_lengths(content, offset, element, order) if element.count else {}
+    lengths = _first_lengths(content, offset, properties, order) if count else {}
     fields: list[Any] = []
-    for column in element.properties:
-        if column.length:
-            fields.append((f"{column.name} length", order + column.length))
-        fields.append((column.name, order + column.kind, *([(lengths.get(column.name, 0),)] if column.length else [])))
+    for name, kind, length in properties:
+        if length:
+            fields.append((f"{name} length", order + length))
+        fields.append((name, order + kind, *([(lengths.get(name, 0),)] if length else [])))
     record = np.dtype(fields)
-    if len(content) - offset >= record.itemsize * element.count:
-        rows = np.frombuffer(content, record, element.count, offset)
+    if len(content) - offset >= record.itemsize * count:
+        rows = np.frombuffer(content, record, count, offset)
         if all((rows[f"{name} length"] == length).all() for name, length in lengths.items()):
-            return _columns(rows, element), offset + record.itemsize * element.count
+            return {name: _values(rows[name], length) for name, _, length in properties}, offset + record.itemsize * count
     if not lengths:
         raise ValueError("cut short")
-    columns: dict[str, list[Any]] = {column.name: [] for column in element.properties}
-    for _ in range(element.count):
-        for column in element.properties:
-            count = 1
-            if column.length:
-                count = int(np.frombuffer(content, order + column.length, 1, offset)[0])
-                offset += np.dtype(column.length).itemsize
-            values = np.frombuffer(content, order + column.kind, count, offset).tolist()
-            offset += np.dtype(column.kind).itemsize * count
-            columns[column.name].append(values if column.length else values[0])
+    columns: dict[str, list[Any]] = {name: [] for name, _, _ in properties}
+    for _ in range(count):
+        for name, kind, length in properties:
+            held, offset = _count(content, offset, length, order)
+            values = np.frombuffer(content, order + kind, held, offset).tolist()
+            offset += np.dtype(kind).itemsize * held
+            columns[name].append(values if length else values[0])
     return columns, offset
 
 
-def _columns(rows: Any, element: Element) -> dict[str, Any]:
-    def column_of(column: Property) -> Any:
-        values = rows[column.name]
-        return values.tolist() if column.length and values.shape[1] != 3 else values.astype(np.int64) if column.length else values
+def _count(content: bytes, offset: int, length: str, order: str) -> tuple[int, int]:
+    """How many values a column has in a row, and where they begin. length: the type of a list's count, "" for a plain value."""
+    if not length:
+        return 1, offset
+    return int(np.frombuffer(content, order + length, 1, offset)[0]), offset + np.dtype(length).itemsize
 
-    return {column.name: column_of(column) for column in element.properties}
+
+def _values(values: Any, length: str) -> Any:
+    return values.tolist() if length and values.shape[1] != 3 else values.astype(np.int64) if length else values
 
 
-def _first_lengths(content: bytes, offset: int, element: Element, order: str) -> dict[str, int]:
+def _first_lengths(content: bytes, offset: int, properties: list[Column], order: str) -> dict[str, int]:
     lengths = {}
-    for column in element.properties:
-        count = 1
-        if column.length:
-            count = int(np.frombuffer(content, order + column.length, 1, offset)[0])
-            offset += np.dtype(column.length).itemsize
-            lengths[column.name] = count
-        offset += np.dtype(column.kind).itemsize * count
+    for name, kind, length in properties:
+        held, offset = _count(content, offset, length, order)
+        if length:
+            lengths[name] = held
+        offset += np.dtype(kind).itemsize * held
     return lengths
 
 
-def _ascii_rows(words: list[bytes], index: int, element: Element) -> tuple[dict[str, Any], int]:
-    width = len(element.properties)
-    if not any(column.length for column in element.properties):
-        table = np.array(words[index : index + width * element.count]).astype(np.float64).reshape(element.count, width)
-        return {column.name: table[:, k] for k, column in enumerate(element.properties)}, index + width * element.count
-    columns: dict[str, list[Any]] = {column.name: [] for column in element.properties}
-    for _ in range(element.count):
-        for column in element.properties:
-            count = int(words[index]) if column.length else 1
-            index += 1 if column.length else 0
-            if index + count > len(words) or count < 0:
+def _ascii_rows(words: list[bytes], index: int, count: int, properties: list[Column]) -> tuple[dict[str, Any], int]:
+    width = len(properties)
+    if not any(length for _, _, length in properties):
+        table = np.array(words[index : index + width * count]).astype(np.float64).reshape(count, width)
+        return {name: table[:, k] for k, (name, _, _) in enumerate(properties)}, index + width * count
+    columns: dict[str, list[Any]] = {name: [] for name, _, _ in properties}
+    for _ in range(count):
+        for name, kind, length in properties:
+            held = int(words[index]) if length else 1
+            index += 1 if length else 0
+            if index + held > len(words) or held < 0:
                 raise ValueError("cut short")
-            number = float if column.kind in ("f4", "f8") else int
-            values = [number(word) for word in words[index : index + count]]
-            columns[column.name].append(values if column.length else values[0])
-            index += count
+            number = float if kind in ("f4", "f8") else int
+            values = [number(word) for word in words[index : index + held]]
+            columns[name].append(values if length else values[0])
+            index += held
     return columns, index

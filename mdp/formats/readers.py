@@ -28,9 +28,9 @@ def _read(module: str, path: Path, plate: int | None) -> "Build":
         return read_build(path, plate)
     if plate is not None:
         raise MeshError(f"{path}: has no plates: --plate {plate} goes with a file of Bambu Studio or OrcaSlicer (.3mf)")
-    from mdp.formats.slicer_file import Build, BuildObject, BuildVolume
+    from mdp.formats.slicer_file import Build, BuildObject, Role
 
-    return Build([BuildObject([BuildVolume(surface) for surface in import_module(f"mdp.formats.{module}").read(path)])])
+    return Build([BuildObject([(surface, Role()) for surface in import_module(f"mdp.formats.{module}").read(path)])])
 
 
 READERS: dict[str, Reader] = {

@@ -40,6 +40,10 @@ ON = ("1", "true", "yes")
 # Keys beside the settings of an object or a volume, which say where it came from.
 ABOUT = frozenset({"name", "matrix", "modifier", "volume_type", "part_type", "extruder_nr", "print_order", "drop_to_buildplate"})
 ABOUT_PREFIXES = ("source_", "thumbnail_", "cut_", "text_")
+# A build plate: its number, its name, and objects by their numbers, each with the number of its instance.
+Plate = tuple[int, str, frozenset[tuple[str, int]]]
+# Settings between two heights above an object's lowest point, mm.
+Heights = Sequence[tuple[float, float, Mapping[str, str]]]
 ONE_EXTRUDER = {"extruder": ("0", "1")}  # which say nothing where there is one
 
 
@@ -52,63 +56,36 @@ class Role:
     settings: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Plate:
-    """A build plate: objects by their numbers, each with the number of its instance."""
-
-    number: int
-    name: str
-    instances: frozenset[tuple[str, int]]
-
-
-@dataclass(frozen=True)
-class Configs:
-    """What the configs of a slicer file say. objects: by their numbers; triangles: of an object's mesh, the first and the last of
-    each volume; parts: by the numbers of an object and its component; heights: settings between two heights above an object's
-    lowest point, mm, by the place of the object among all (PrusaSlicer: that have a mesh themselves), from 1."""
-
-    objects: Mapping[str, Role] = field(default_factory=dict)
-    triangles: Mapping[str, Sequence[tuple[int, int, Role]]] = field(default_factory=dict)
-    parts: Mapping[tuple[str, str], Role] = field(default_factory=dict)
-    heights: Mapping[str, Sequence[tuple[float, float, Mapping[str, str]]]] = field(default_factory=dict)
-    plates: Sequence[Plate] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class BuildVolume:
-    """A volume where the file has it, in mm, and its role."""
-
-    surface: Surface
-    role: Role = Role()
-
-
 @dataclass(frozen=True, eq=False)
 class BuildObject:
-    """An object on the plate: its volumes, the settings of them all and those between two heights above its lowest point."""
+    """An object on the plate: its volumes where the file has them, in mm, and the settings of them all."""
 
-    volumes: Sequence[BuildVolume]
+    volumes: Sequence[tuple[Surface, Role]]
     settings: Mapping[str, str] = field(default_factory=dict)
-    heights: Sequence[tuple[float, float, Mapping[str, str]]] = ()
+    heights: Heights = ()
     name: str = ""
 
     def surfaces(self, kind: str) -> list[Surface]:
         """The surfaces of a kind of volume."""
-        return [volume.surface for volume in self.volumes if volume.role.kind == kind]
+        return [surface for surface, role in self.volumes if role.kind == kind]
 
 
 @dataclass(frozen=True, eq=False)
 class Build:
     """The objects that a file prints, and notes on what it holds and is left out. on_plate: its z = 0 is the build plate, below
-    which nothing is printed; plates: all that hold something."""
+    which nothing is printed; plates: the names of all that hold something, by their numbers."""
 
     objects: Sequence[BuildObject]
     notes: Sequence[str] = ()
     on_plate: bool = False
-    plates: Sequence[Plate] = ()
+    plates: Mapping[int, str] = field(default_factory=dict)
 
 
 def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[tuple[int, int, Role]]]]:
-    """Read the objects and triangles of Configs. Raises ValueError where the number of a triangle is no number."""
+    """The objects by their numbers, and the volumes of each: the first and the last of their triangles in the object's mesh.
+
+    Raises ValueError where the number of a triangle is no number.
+    """
     objects, triangles = dict[str, Role](), dict[str, list[tuple[int, int, Role]]]()
     for element in config.iter("object"):
         number = element.get("id", "")
@@ -121,26 +98,32 @@ def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[t
 
 
 def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], Role], list[Plate]]:
-    """Read the objects, parts and plates of Configs. Raises ValueError for text that is not a number."""
+    """The objects by their numbers, parts by the numbers of an object and its component, and the plates.
+
+    Raises ValueError for text that is not a number.
+    """
     objects, parts = dict[str, Role](), dict[tuple[str, str], Role]()
     for element in config.findall("object"):
         number = element.get("id", "")
         objects[number] = _role(element)
         for part in element.findall("part"):
             parts[number, part.get("id", "")] = _role(part)
-    plates = []
+    plates = list[Plate]()
     for place, element in enumerate(config.findall("plate"), start=1):
         values = _values(element)
         instances = [_values(instance) for instance in element.findall("model_instance")]
         standing = frozenset(
             (instance.get("object_id", ""), _whole("instance_id", instance.get("instance_id", "0"))) for instance in instances
         )
-        plates.append(Plate(_whole("plater_id", values.get("plater_id", str(place))), values.get("plater_name", ""), standing))
+        plates.append((_whole("plater_id", values.get("plater_id", str(place))), values.get("plater_name", ""), standing))
     return objects, parts, plates
 
 
 def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[str, str]]]]:
-    """Read the heights of Configs. Raises ValueError for a height that is not a finite number."""
+    """Settings by heights, by the place of the object among all (PrusaSlicer: that have a mesh themselves), from 1.
+
+    Raises ValueError for a height that is not a finite number.
+    """
     heights: dict[str, list[tuple[float, float, Mapping[str, str]]]] = {}
     for element in config.iter("object"):
         for between in element.findall("range"):

@@ -2,14 +2,13 @@
 of their triangles (Materials and Properties Extension 1.2), and the roles that a slicer gives to volumes."""
 
 import re
-import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 from urllib.parse import unquote
 from xml.etree import ElementTree
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from mdp.formats.slicer_file import (
     PART,
     Build,
     BuildObject,
-    BuildVolume,
-    Configs,
+    Heights,
     Plate,
     Role,
     read_bambu,
@@ -72,101 +70,18 @@ _IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
 _Read = TypeVar("_Read")
 
 
-@dataclass(frozen=True)
-class Model:
+class Model(NamedTuple):
     """A model part of the package: its root element, its objects by their numbers, the colours of its groups of colours or of
     materials, what its triangles are painted for, and the surfaces made of them so far."""
 
     root: ElementTree.Element
     objects: dict[str, ElementTree.Element]
     palettes: dict[str, list[int]]
-    painted: tuple[str, ...] = ()
-    surfaces: dict[str, Surface] = field(default_factory=dict)
+    painted: tuple[str, ...]
+    surfaces: dict[str, Surface]
 
 
-@dataclass(frozen=True)
-class Package:
-    """An open 3MF file and the model parts of it that have been parsed."""
-
-    path: Path
-    archive: zipfile.ZipFile
-    models: dict[str, Model] = field(default_factory=dict)
-
-    def entry(self, name: str) -> str | None:
-        """The entry that holds a part, whose names know no case (Open Packaging Conventions, 6.2.2.3); None: there is none."""
-        wanted, entries = unquote(name).lstrip("/"), self.archive.namelist()
-        return wanted if wanted in entries else next((name for name in entries if name.lower() == wanted.lower()), None)
-
-    def sliced(self) -> bool:
-        """Whether it keeps the G-code of a plate."""
-        return any(name.lower().endswith(".gcode") for name in self.archive.namelist())
-
-    def content(self, name: str) -> bytes:
-        """The bytes of a part; raises MeshError when it is missing or too large."""
-        try:
-            entry = self.entry(name)
-            if entry is None:
-                raise LookupError("there is no such part")
-            if self.archive.getinfo(entry).file_size > LARGEST_MODEL_BYTES:
-                raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
-            content = self.archive.read(entry)
-        except DAMAGED_ZIP as error:
-            raise self._damaged(name, error) from None
-        if content.count(b"<") > MOST_ELEMENTS or content.count(b"=") > 4 * MOST_ELEMENTS:
-            raise MeshError(f"{self.path}: its part {name} has more than {MOST_ELEMENTS} elements or too many attributes")
-        return content
-
-    def parse(self, name: str, content: bytes) -> ElementTree.Element:
-        """The root element of a part; raises MeshError when it is malformed."""
-        try:
-            return _tree(content)
-        except (LookupError, ValueError, ElementTree.ParseError) as error:
-            raise self._damaged(name, error) from None
-
-    def config(self, names: tuple[str, ...], read: Callable[[ElementTree.Element], _Read]) -> _Read | None:
-        """What the first of some parts holds that the package has; None: it has none. Raises MeshError."""
-        name = next((name for name in names if self.entry(name) is not None), None)
-        if name is None:
-            return None
-        root = self.parse(name, self.content(name))
-        try:
-            return read(root)
-        except ValueError as error:
-            raise MeshError(f"{self.path}: its part {self.entry(name)} is malformed: {error}") from None
-
-    def model(self, name: str) -> Model:
-        """A model part, parsed once; raises MeshError, also for what it needs and is not read."""
-        name = name.lstrip("/")
-        if name not in self.models:
-            content = self.content(name)
-            root = self.parse(name, content)
-            if root.tag.rpartition("}")[2] != "model":
-                raise MeshError(f"{self.path}: its part {name} is no 3MF model: its first element is {root.tag[:60]!r}")
-            self._check_extensions(root, content)
-            objects = {element.get("id", ""): element for element in reversed(root.findall("{*}resources/{*}object"))}
-            painted = tuple(
-                what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % name.encode(), content) for name in names)
-            )
-            self.models[name] = Model(root, objects, _palettes(root), painted)
-        return self.models[name]
-
-    def _check_extensions(self, root: ElementTree.Element, content: bytes) -> None:
-        """Raise MeshError for an extension that a model needs to be understood and that is not read."""
-        for prefix in root.get("requiredextensions", "").split():
-            declared = re.search(rb"xmlns:%s\s*=\s*[\"']([^\"']*)" % re.escape(prefix.encode()), content)
-            namespace = declared[1].decode(errors="replace") if declared else prefix
-            named = EXTENSION.search(namespace)
-            if (named[1] if named else prefix) not in EXTENSIONS and prefix not in ("p", "m"):
-                raise MeshError(
-                    f"{self.path}: needs the 3MF extension {named[1] if named else namespace}, which is not read: {PLAIN}"
-                )
-
-    def _damaged(self, name: str, error: Exception) -> MeshError:
-        return MeshError(f"{self.path}: its part {name} is missing or malformed ({first_line(error)})")
-
-
-@dataclass(frozen=True)
-class Placement:
+class Placement(NamedTuple):
     """An object of a model part that a build item or a component places; a point p lies at [p 1] @ transform. within: the numbers
     of the objects that it is a component of, the item's own first; role: what these say that it is; None: nothing."""
 
@@ -184,37 +99,51 @@ def read_build(path: Path, plate: int | None = None) -> Build:
     extensions that are needed and not read.
     """
     try:
-        archive = zipfile.ZipFile(path)
+        archive = ZipFile(path)
     except DAMAGED_ZIP:
         raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
-        return _Builder(Package(path, archive)).build(plate)
+        return _Builder(path, archive).build(plate)
 
 
 class _Builder:
     """The build of a package."""
 
-    def __init__(self, package: Package) -> None:
-        self._package, self._path = package, package.path
-        self._start = _start_part(package)
-        self._configs = _configs(package)
+    def __init__(self, path: Path, archive: ZipFile) -> None:
+        self._path, self._archive = path, archive
+        self._models: dict[str, Model] = {}  # parsed so far
+        self._start = _start_part(archive)
+        heights = _config(archive, HEIGHTS, read_heights)
+        bambu = _config(archive, (BAMBU,), read_bambu)
+        prusaslicer = None if bambu else _config(archive, PRUSASLICER, read_prusaslicer)
+        self._heights = heights or {}
+        self._objects, self._parts, self._plates = bambu or (prusaslicer[0] if prusaslicer else {}, {}, [])
+        self._triangles = prusaslicer[1] if prusaslicer else {}
         self._notes: list[str] = []
-        self._plates: list[Plate] = []  # that hold something that is printed
         self._unpainted: Counter[str] = Counter()
         self._in_part = 0  # triangles that count as painted
         self._placed = self._meshes = self._faces = 0
-        objects = package.model(self._start).root.findall("{*}resources/{*}object")
-        if not self._configs.parts:
+        objects = self._model(self._start).root.findall("{*}resources/{*}object")
+        if not self._parts:
             objects = [element for element in objects if element.find("{*}mesh") is not None]
         self._rank = {element.get("id", ""): str(place) for place, element in enumerate(objects, start=1)}
 
     def build(self, plate: int | None) -> Build:
         """What is printed on a plate."""
-        package, notes = self._package, self._notes
-        items = self._items(package.model(self._start).root.findall("{*}build/{*}item"), plate)
-        built = [placed for item in items if (placed := self._object(item)) is not None]
+        notes = self._notes
+        items = self._model(self._start).root.findall("{*}build/{*}item")
+        counts: Counter[str] = Counter()
+        instances = []
+        for number in (item.get("objectid", "") for item in items):
+            instances.append((number, counts[number]))
+            counts[number] += 1
+        printed = {instance for instance, item in zip(instances, items, strict=True) if _is_printed(item)}
+        plates = [plate for plate in self._plates if plate[2] & printed]
+        chosen = self._items(items, instances, self._plate(plates, plate))
+        built = [placed for item in chosen if (placed := self._object(item)) is not None]
         if not any(placed.surfaces(PART) for placed in built):
-            why = f" that is printed: it {notes[0]}" if notes else f", it keeps {GCODE_ONLY}" if package.sliced() else ""
+            sliced = any(name.lower().endswith(".gcode") for name in self._archive.namelist())
+            why = f" that is printed: it {notes[0]}" if notes else f", it keeps {GCODE_ONLY}" if sliced else ""
             raise MeshError(f"{self._path}: its build places no mesh{why}")
         notes += [
             f"{count} triangle{'s' * (count > 1)} painted for {what} {'are' if count > 1 else 'is'} not taken"
@@ -225,58 +154,58 @@ class _Builder:
         if self._in_part:
             triangles = f"{self._in_part} triangles are" if self._in_part > 1 else "1 triangle is"
             notes.append(f"{triangles} painted in part, more than half of the area, and taken as a whole")
-        strange = sorted(self._configs.heights.keys() - set(self._rank.values()))
+        strange = sorted(self._heights.keys() - set(self._rank.values()))
         notes += [f"the height ranges of object {number} are left out: there is no such object" for number in strange]
-        notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if package.entry(name) is not None)
-        return Build(built, tuple(dict.fromkeys(notes)), on_plate=bool(self._configs.objects), plates=self._plates)
+        notes += dict.fromkeys(note for name, note in NOT_TAKEN.items() if _entry(self._archive, name) is not None)
+        return Build(built, tuple(dict.fromkeys(notes)), bool(self._objects), {number: name for number, name, _ in plates})
 
-    def _items(self, items: list[ElementTree.Element], plate: int | None) -> Iterator[ElementTree.Element]:
-        """The items that are printed on a plate."""
-        counts: Counter[str] = Counter()
-        instances = []
-        for item in items:
-            instances.append((item.get("objectid", ""), counts[item.get("objectid", "")]))
-            counts[item.get("objectid", "")] += 1
-        printed = {instance for instance, item in zip(instances, items, strict=True) if _is_printed(item)}
-        self._plates = [plate for plate in self._configs.plates if plate.instances & printed]
-        chosen = self._plate(plate)
+    def _items(
+        self, items: list[ElementTree.Element], instances: list[tuple[str, int]], chosen: Plate | None
+    ) -> Iterator[ElementTree.Element]:
+        """The items that are printed on a plate; None: there are no plates."""
         for item, instance in zip(items, instances, strict=True):
             if not _is_printed(item):
                 self._leave_out(item.get("objectid", ""), "which is switched off in its slicer")
-            elif chosen is None or instance in chosen.instances:
+            elif chosen is None or instance in chosen[2]:
                 yield item
-            elif not any(instance in plate.instances for plate in self._configs.plates):
+            elif not any(instance in standing for _, _, standing in self._plates):
                 self._leave_out(item.get("objectid", ""), "which stands on none of its plates")
 
-    def _plate(self, number: int | None) -> Plate | None:
-        """The plate of a number, or the first that holds something that is printed; None: there are no plates."""
-        plates = self._plates
-        if number is None:
+    def _plate(self, plates: list[Plate], wanted: int | None) -> Plate | None:
+        """Of plates that hold something that is printed that of a number, or the first; None: there are no plates."""
+        if wanted is None:
             if len(plates) > 1:
-                others = ", ".join(str(plate.number) for plate in plates[1:])
-                named = f" ({plates[0].name})" if plates[0].name else ""
-                self._notes.append(f"prints plate {plates[0].number}{named}; --plate prints another: {others}")
+                first, name, _ = plates[0]
+                others = ", ".join(str(number) for number, _, _ in plates[1:])
+                self._notes.append(f"prints plate {first}{f' ({name})' if name else ''}; --plate prints another: {others}")
             return plates[0] if plates else None
         if not plates:
-            raise MeshError(f"{self._path}: has no plates: --plate {number} goes with a file of Bambu Studio or OrcaSlicer")
+            raise MeshError(f"{self._path}: has no plates: --plate {wanted} goes with a file of Bambu Studio or OrcaSlicer")
         for plate in plates:
-            if plate.number == number:
+            if plate[0] == wanted:
                 return plate
-        known = ", ".join(str(plate.number) for plate in plates)
-        why = "is empty" if any(plate.number == number for plate in self._configs.plates) else "does not exist"
-        raise MeshError(f"{self._path}: --plate {number}: that plate {why}; plate{'s' * (len(plates) > 1)} with objects: {known}")
+        known = ", ".join(str(number) for number, _, _ in plates)
+        why = "is empty" if any(number == wanted for number, _, _ in self._plates) else "does not exist"
+        raise MeshError(f"{self._path}: --plate {wanted}: that plate {why}; plate{'s' * (len(plates) > 1)} with objects: {known}")
+
+    def _model(self, name: str) -> Model:
+        """A model part, parsed once. Raises MeshError."""
+        name = name.lstrip("/")
+        if name not in self._models:
+            self._models[name] = _model(self._archive, name)
+        return self._models[name]
 
     def _object(self, item: ElementTree.Element) -> BuildObject | None:
         """What an item places; None: nothing."""
-        volumes: list[BuildVolume] = []
+        volumes: list[tuple[Surface, Role]] = []
         settings: Mapping[str, str] = {}
-        heights: Sequence[tuple[float, float, Mapping[str, str]]] = ()
+        heights: Heights = ()
         pending = [self._placement(item, Placement(self._start, "", _IDENTITY))]
         while pending:
             placement = pending.pop()
             self._placed += 1
             check_placed(self._path, self._placed)
-            model = self._package.model(placement.part)
+            model = self._model(placement.part)
             element = model.objects.get(placement.identity)
             if element is None or len(placement.within) > DEEPEST:
                 why = "it does not exist" if element is None else "its components contain each other"
@@ -290,27 +219,27 @@ class _Builder:
                 volumes += self._volumes(placement, model, mesh, element.get("pid", ""))
                 whole = placement.identity if placement.part == self._start else ""
                 for number in (*placement.within[:1], whole):
-                    settings = {**settings, **self._configs.objects.get(number, Role()).settings}
-                    heights = self._configs.heights.get(self._rank.get(number, ""), heights)
+                    settings = {**settings, **self._objects.get(number, Role()).settings}
+                    heights = self._heights.get(self._rank.get(number, ""), heights)
                 continue
             components = element.findall("{*}components/{*}component")
             self._check_understood(element, bool(components))
             pending += [self._placement(component, placement) for component in reversed(components)]
-        name = self._configs.objects.get(item.get("objectid", ""), Role()).name
+        name = self._objects.get(item.get("objectid", ""), Role()).name
         return BuildObject(volumes, settings, heights, name) if volumes else None
 
     def _with_role(self, placement: Placement, element: ElementTree.Element) -> Placement:
         """The placement with the role that the slicer gives its object."""
-        within, parts = placement.within, self._configs.parts
+        within, parts = placement.within, self._parts
         role = parts.get(((*within, placement.identity)[0], placement.identity))
         cura = read_cura(element)
         if role is None and (cura.kind != PART or cura.settings):
             outer = Role() if placement.role is None else placement.role
             kind = cura.kind if outer.kind == PART else outer.kind
             role = Role(kind, cura.name or outer.name, {**outer.settings, **cura.settings})
-        return placement if role is None else Placement(placement.part, placement.identity, placement.transform, within, role)
+        return placement if role is None else placement._replace(role=role)
 
-    def _volumes(self, placement: Placement, model: Model, mesh: ElementTree.Element, pid: str) -> Iterator[BuildVolume]:
+    def _volumes(self, placement: Placement, model: Model, mesh: ElementTree.Element, pid: str) -> Iterator[tuple[Surface, Role]]:
         """The volumes of an object's mesh where a placement has them."""
         if placement.identity not in model.surfaces:
             model.surfaces[placement.identity] = _mesh_surface(self._path, mesh, pid, model.palettes)
@@ -321,9 +250,9 @@ class _Builder:
         surface = _transformed(self._path, surface, placement.transform, _unit_mm(self._path, model.root))
         if placement.role is None or placement.role.kind == PART:
             yield from self._painted(surface, mesh, model.painted)
-        triangles = self._configs.triangles.get(placement.identity, ()) if placement.part == self._start else ()
+        triangles = self._triangles.get(placement.identity, ()) if placement.part == self._start else ()
         if placement.role is not None or not triangles:
-            yield BuildVolume(surface, placement.role or Role())
+            yield surface, placement.role or Role()
             return
         rest = np.ones(len(surface.faces), dtype=np.bool_)
         for first, last, role in triangles:
@@ -331,11 +260,11 @@ class _Builder:
                 of = f"object {placement.identity}, which has {len(surface.faces)}"
                 raise MeshError(f"{self._path}: volume {role.name!r} has triangles {first} to {last} of {of} (counted from 0)")
             rest[first : last + 1] = False
-            yield BuildVolume(_piece(surface, slice(first, last + 1)), role)
+            yield _piece(surface, slice(first, last + 1)), role
         if rest.any():
-            yield BuildVolume(_piece(surface, np.flatnonzero(rest)))
+            yield _piece(surface, np.flatnonzero(rest)), Role()
 
-    def _painted(self, surface: Surface, mesh: ElementTree.Element, painted: Sequence[str]) -> Iterator[BuildVolume]:
+    def _painted(self, surface: Surface, mesh: ElementTree.Element, painted: Sequence[str]) -> Iterator[tuple[Surface, Role]]:
         """The triangles of a mesh that are painted on more than half for something that is known here; others are counted."""
         triangles = mesh.findall("{*}triangles/{*}triangle") if painted else []
         for what in painted:
@@ -348,7 +277,7 @@ class _Builder:
                     chosen.setdefault(kind, []).append(number)
             for kind, numbers in chosen.items():
                 if kind:
-                    yield BuildVolume(_piece(surface, np.array(numbers)), Role(kind))
+                    yield _piece(surface, np.array(numbers)), Role(kind)
 
     def _check_understood(self, element: ElementTree.Element, has_components: bool) -> None:
         """Raise MeshError for an object whose shape is told in a way that is not read."""
@@ -364,8 +293,8 @@ class _Builder:
         return Placement(element.get(PRODUCTION_PATH, outer.part), element.get("objectid", ""), transform, within, outer.role)
 
     def _leave_out(self, number: str, why: str) -> None:
-        element = self._package.model(self._start).objects.get(number)
-        name = self._configs.objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
+        element = self._model(self._start).objects.get(number)
+        name = self._objects.get(number, Role()).name or ("" if element is None else element.get("name", ""))
         self._notes.append(f"leaves out object {name or number}, {why}")
 
 
@@ -390,14 +319,70 @@ def _is_printed(item: ElementTree.Element) -> bool:
     return item.get("printable", "1").lower() not in ("0", "false")
 
 
-def _configs(package: Package) -> Configs:
-    """What the package's configs say of its objects. Raises MeshError."""
-    heights = package.config(HEIGHTS, read_heights) or {}
-    if (bambu := package.config((BAMBU,), read_bambu)) is not None:
-        objects, parts, plates = bambu
-        return Configs(objects, parts=parts, plates=plates, heights=heights)
-    objects, triangles = package.config(PRUSASLICER, read_prusaslicer) or ({}, {})
-    return Configs(objects, triangles, heights=heights)
+def _entry(archive: ZipFile, name: str) -> str | None:
+    """The entry that holds a part, whose names know no case (Open Packaging Conventions, 6.2.2.3); None: there is none."""
+    wanted, entries = unquote(name).lstrip("/"), archive.namelist()
+    return wanted if wanted in entries else next((name for name in entries if name.lower() == wanted.lower()), None)
+
+
+def _content(archive: ZipFile, name: str) -> bytes:
+    """The bytes of a part; raises MeshError when it is missing or too large."""
+    try:
+        entry = _entry(archive, name)
+        if entry is None:
+            raise LookupError("there is no such part")
+        if archive.getinfo(entry).file_size > LARGEST_MODEL_BYTES:
+            raise MeshError(f"{archive.filename}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
+        content = archive.read(entry)
+    except DAMAGED_ZIP as error:
+        raise _damaged(archive, name, error) from None
+    if content.count(b"<") > MOST_ELEMENTS or content.count(b"=") > 4 * MOST_ELEMENTS:
+        raise MeshError(f"{archive.filename}: its part {name} has more than {MOST_ELEMENTS} elements or too many attributes")
+    return content
+
+
+def _parse(archive: ZipFile, name: str, content: bytes) -> ElementTree.Element:
+    """The root element of a part; raises MeshError when it is malformed."""
+    try:
+        return _tree(content)
+    except (LookupError, ValueError, ElementTree.ParseError) as error:
+        raise _damaged(archive, name, error) from None
+
+
+def _damaged(archive: ZipFile, name: str, error: Exception) -> MeshError:
+    return MeshError(f"{archive.filename}: its part {name} is missing or malformed ({first_line(error)})")
+
+
+def _config(archive: ZipFile, names: tuple[str, ...], read: Callable[[ElementTree.Element], _Read]) -> _Read | None:
+    """What the first of some parts holds that the package has; None: it has none. Raises MeshError."""
+    name = next((name for name in names if _entry(archive, name) is not None), None)
+    if name is None:
+        return None
+    root = _parse(archive, name, _content(archive, name))
+    try:
+        return read(root)
+    except ValueError as error:
+        raise MeshError(f"{archive.filename}: its part {_entry(archive, name)} is malformed: {error}") from None
+
+
+def _model(archive: ZipFile, name: str) -> Model:
+    """A model part. Raises MeshError, also for what it needs and is not read."""
+    content = _content(archive, name)
+    root = _parse(archive, name, content)
+    if root.tag.rpartition("}")[2] != "model":
+        raise MeshError(f"{archive.filename}: its part {name} is no 3MF model: its first element is {root.tag[:60]!r}")
+    for prefix in root.get("requiredextensions", "").split():
+        declared = re.search(rb"xmlns:%s\s*=\s*[\"']([^\"']*)" % re.escape(prefix.encode()), content)
+        namespace = declared[1].decode(errors="replace") if declared else prefix
+        named = EXTENSION.search(namespace)
+        if (named[1] if named else prefix) not in EXTENSIONS and prefix not in ("p", "m"):
+            needed = named[1] if named else namespace
+            raise MeshError(f"{archive.filename}: needs the 3MF extension {needed}, which is not read: {PLAIN}")
+    objects = {element.get("id", ""): element for element in reversed(root.findall("{*}resources/{*}object"))}
+    painted = tuple(
+        what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % name.encode(), content) for name in names)
+    )
+    return Model(root, objects, _palettes(root), painted, {})
 
 
 def _tree(content: bytes) -> ElementTree.Element:
@@ -415,13 +400,13 @@ def _tree(content: bytes) -> ElementTree.Element:
     return ElementTree.fromstring(content[: root.end()] + declared + content[root.end() :])
 
 
-def _start_part(package: Package) -> str:
+def _start_part(archive: ZipFile) -> str:
     """Name of the part that the package's relationships call the 3D model."""
     name = "_rels/.rels"
-    for relation in package.parse(name, package.content(name)).iter(RELATION):
+    for relation in _parse(archive, name, _content(archive, name)).iter(RELATION):
         if relation.get("Type") == MODEL_TYPE:
             return relation.get("Target", "").lstrip("/")
-    raise MeshError(f"{package.path}: its relationships name no 3D model")
+    raise MeshError(f"{archive.filename}: its relationships name no 3D model")
 
 
 def _piece(surface: Surface, chosen: slice | Indices) -> Surface:

@@ -54,5 +54,5 @@ def test_a_polygon_without_a_normal_still_has_all_its_edges(points: Floats) -> N
 def test_triangles_and_polygons_of_one_file_stay_in_their_order(tmp_path: Path) -> None:
     box = "OFF\n8 7 0\n0 0 0\n9 0 0\n9 9 0\n0 9 0\n0 0 9\n9 0 9\n9 9 9\n0 9 9\n"
     faces = "3 0 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n3 0 3 2\n"
-    surface = READERS[".off"](save(tmp_path / "a.off", (box + faces).encode()), None).objects[0].volumes[0].surface
+    surface = READERS[".off"](save(tmp_path / "a.off", (box + faces).encode()), None).objects[0].volumes[0][0]
     assert surface.faces[[0, 1, 2, -1]].tolist() == [[0, 2, 1], [4, 5, 6], [4, 6, 7], [0, 3, 2]]
