@@ -10,7 +10,7 @@ from mdp.overhang import Mask
 from mdp.plane import UP, Plane
 from mdp.pose import Pose
 from mdp.zone import UNMARKED, Marked, Modifier
-from profiles.errors import DecompositionError
+from profiles.errors import UserError
 
 VOLUME_TOLERANCE = 1e-6  # of the model's: 200 cuts at random lost 4e-16 of it at most, and a sliver left out is more
 ORDER_TOLERANCE_MM = 1e-4  # the same cuts left corners 5e-14 mm off their planes; no print shows a ten thousandth
@@ -161,19 +161,19 @@ class Decomposition:
     def _check_volume(self) -> None:
         whole, together = self.mesh.volume_mm3, self.volume_mm3
         if abs(together - whole) > VOLUME_TOLERANCE * whole + self.folded_mm3:
-            raise DecompositionError(f"the parts of {self.name} add up to {together:.6g} mm3, the model has {whole:.6g} mm3")
+            raise UserError(f"the parts of {self.name} add up to {together:.6g} mm3, the model has {whole:.6g} mm3")
 
     def _check_order(self) -> None:
         """A part lies above its base plane; everything printed before it lies below, unless the part is a limb."""
         for position, part in enumerate(self.parts):
             if part.index != position + 1:
-                raise DecompositionError(f"part {part.index} of {self.name} stands at place {position + 1} of the print order")
+                raise UserError(f"part {part.index} of {self.name} stands at place {position + 1} of the print order")
             lowest = float(part.base.heights_mm(part.mesh.vertices).min())
             if lowest < -ORDER_TOLERANCE_MM:
-                raise DecompositionError(f"part {part.index} of {self.name} reaches {-lowest:.4g} mm below its base plane")
+                raise UserError(f"part {part.index} of {self.name} reaches {-lowest:.4g} mm below its base plane")
             for earlier in self.parts[:position] if part.base.limbs_mm is None else ():
                 highest = float(np.max(part.base.heights_mm(earlier.mesh.vertices)))
                 if highest > ORDER_TOLERANCE_MM:
-                    raise DecompositionError(
+                    raise UserError(
                         f"part {earlier.index} of {self.name} stands {highest:.4g} mm above the base plane of part {part.index}"
                     )

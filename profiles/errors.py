@@ -1,21 +1,17 @@
-"""The tree of errors a person can fix; each class is raised in one package, machine/app/cli.py makes sentences of them.
+"""The tree of errors a person can fix; each class below it is raised in one package, machine/app/cli.py makes sentences of them.
 
-UserError                         message (one sentence: thing, value, what is allowed) and exit 1
+UserError                         message (one sentence: thing, value, what is allowed) and exit 1; by itself where nobody
+                                  catches an error of its kind apart from others
   ProfileError                    profiles: all problems of a file or of the --set options at once
   MeshError                       mdp: unreadable, empty, open, flat: says what and where
-  DecompositionError              mdp: an invariant of the decomposition cannot be met
   PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why
-  RankerError                     mdp: an .onnx file that is no ranker, a ranker that is not known
-  BatchError                      mdp/batch: a scheduler that cannot be reached, a table or folder that cannot be gone on with
-  LearningError                   mdp/learning: records, a checkpoint or a ranker that cannot be learnt from or judged
   SliceError                      slicer: a setting that cannot be sliced with
   MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
   GcodeError                      machine: a G-code text that cannot be read, with the line
   OutputError                     machine: a file that cannot be written
-  PrinterError                    machine/link
+  PrinterError                    machine/link; by itself what the protocol does not allow a printer to say
     PortError                     cannot open, lost
     LocalProtocolError            we broke the protocol
-    RemoteProtocolError           the printer asked for something impossible
     FirmwareError                 the printer reported an error; its own text is kept
     SilenceError                silence beyond the bound
     ServerError                 machine/network: a print server that cannot be reached or that refuses
@@ -77,24 +73,8 @@ class MeshError(UserError):
     """The model file cannot become a valid solid; the message says what is wrong and where."""
 
 
-class DecompositionError(UserError):
-    """The parts of a model cannot be made consistent."""
-
-
 class PlanError(UserError):
     """A plan file that cannot be used; the message names the key or the plane, and why."""
-
-
-class RankerError(UserError):
-    """A ranker that does not exist or cannot be used; the message names it and says why."""
-
-
-class BatchError(UserError):
-    """Many calls that cannot begin or go on; the message names the scheduler, the worker, the folder or the table."""
-
-
-class LearningError(UserError):
-    """Records or a training that no ranker can be learnt from; the message names the file, and the model at fault."""
 
 
 class SliceError(UserError):
@@ -123,10 +103,6 @@ class PortError(PrinterError):
 
 class LocalProtocolError(PrinterError):
     """This program was about to break the serial protocol."""
-
-
-class RemoteProtocolError(PrinterError):
-    """The printer said something that the protocol does not allow."""
 
 
 class FirmwareError(PrinterError):

@@ -37,7 +37,7 @@ from mdp.model_file import locate
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.read import read_mesh
 from mdp.search.search import SearchRequest, decompose
-from profiles.errors import LearningError, MeshError
+from profiles.errors import MeshError, UserError
 from profiles.profile import Profile, load
 
 Key = tuple[str, str, str, int, str]
@@ -108,7 +108,7 @@ def _main(arguments: Sequence[str] | None) -> None:
     print("\n".join([f"{len(failed)} of {len(records)} searches failed", *failed]))
     comparisons = compare(searches, options.least_removed)
     if options.summary and not comparisons:
-        raise LearningError(f"table {options.out}: {NOTHING_COMMON}")
+        raise UserError(f"table {options.out}: {NOTHING_COMMON}")
     for comparison in comparisons:
         print(f"\n{table(comparison)}")
 
@@ -122,7 +122,7 @@ def _search_models(options: argparse.Namespace) -> None:
         ranker_named(ranker)
     done, models = {row.key for row in read(options.out)}, _models(options)
     if not models:
-        raise LearningError(f"folder {options.folder}: holds no model (*.npz) that is asked for")
+        raise UserError(f"folder {options.folder}: holds no model (*.npz) that is asked for")
     with _opened(options.out) as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Row)], lineterminator="\n")
         if file.tell() == 0:
@@ -142,7 +142,7 @@ def _opened(table: Path) -> TextIO:
     try:
         return table.open("a", newline="", encoding="utf-8")
     except OSError as error:
-        raise LearningError(f"table {table}: cannot be written ({error.strerror})") from None
+        raise UserError(f"table {table}: cannot be written ({error.strerror})") from None
 
 
 def _models(options: argparse.Namespace) -> list[Path]:
@@ -220,7 +220,7 @@ def searched(key: Key, mesh: Mesh) -> Row:
 
 
 def read(path: Path) -> list[Row]:
-    """The lines of a file; none when there is no such file. Raises LearningError for a file that is no such table."""
+    """The lines of a file; none when there is no such file. Raises UserError for a file that is no such table."""
     if not path.exists():
         return []
     kinds: dict[str, Callable[[str], Any]] = get_type_hints(Row)
@@ -232,10 +232,10 @@ def read(path: Path) -> list[Row]:
             ]
             lines = list(reader)
         if absent and lines:
-            raise LearningError(f"table {path}: has no column {', '.join(absent)}; this command did not write it")
+            raise UserError(f"table {path}: has no column {', '.join(absent)}; this command did not write it")
         return [Row(**{key: kinds[key](value) for key, value in line.items() if key in kinds}) for line in lines]
     except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
-        raise LearningError(f"table {path}: cannot be read ({error})") from None
+        raise UserError(f"table {path}: cannot be read ({error})") from None
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from machine.link.protocol.framing import command_of, name_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
 from machine.link.watchdog import PrinterReports, Watchdog
-from profiles.errors import RemoteProtocolError
+from profiles.errors import PrinterError
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
@@ -208,9 +208,9 @@ class Feed:
         self._record()
 
     def _verify_position(self, when: str) -> None:
-        """Compare the printer's own position with the program's; raises RemoteProtocolError when they differ."""
+        """Compare the printer's own position with the program's; raises PrinterError when they differ."""
         if wrong := self._position_errors():
-            raise RemoteProtocolError(f"{when} the printer stands at {', '.join(wrong)}: its position can no longer be trusted")
+            raise PrinterError(f"{when} the printer stands at {', '.join(wrong)}: its position can no longer be trusted")
 
     def _rest(self, why: str = "") -> None:
         """A pause; why: shown meanwhile. The print goes on where it stopped."""

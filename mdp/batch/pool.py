@@ -15,7 +15,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Protocol, TypeVar
 
 from mdp.kernels.workers import CallError, KilledError, Worker
-from profiles.errors import BatchError
+from profiles.errors import UserError
 
 REACHED_WITHIN_S = 10.0  # a scheduler that is there, also by a slow network
 POLL_S = 0.1  # Ctrl-C is answered within that
@@ -44,14 +44,14 @@ class Pool(Protocol):
 
     def submit(self, call: Call, number: int) -> Any: ...
     def is_there(self) -> bool: ...
-    def lost(self) -> BatchError: ...
+    def lost(self) -> UserError: ...
 
 
 @contextmanager
 def connected(workers: Workers) -> Iterator["Queue"]:
     """What works calls off; processes of our own are gone at the end, whatever ends it.
 
-    Raises BatchError when the scheduler cannot be reached, or where its workers cannot work.
+    Raises UserError when the scheduler cannot be reached, or where its workers cannot work.
     """
     with _on_cores(workers.count) if workers.scheduler is None else _on_cluster(workers.scheduler, workers.folders) as pool:
         yield Queue(pool, workers)
@@ -68,7 +68,7 @@ class Queue:
     ) -> Iterator[tuple[Key, Any]]:
         """The key and the result of every call as it is done, the first calls first; a CallError where a call failed for good.
 
-        on_wait: called some times a second. Raises BatchError when the scheduler is lost.
+        on_wait: called some times a second. Raises UserError when the scheduler is lost.
         """
         done: SimpleQueue[Any] = SimpleQueue()
         futures: dict[Any, Key] = {}
@@ -150,8 +150,8 @@ class _Cores:
     def is_there(self) -> bool:
         return True
 
-    def lost(self) -> BatchError:
-        return BatchError("the work was stopped")
+    def lost(self) -> UserError:
+        return UserError("the work was stopped")
 
 
 @contextmanager
@@ -182,8 +182,8 @@ class _Cluster:
     def is_there(self) -> bool:
         return bool(self._client.status == "running")
 
-    def lost(self) -> BatchError:
-        return BatchError(f"scheduler {self._address}: is gone; started again, the work goes on where it stopped")
+    def lost(self) -> UserError:
+        return UserError(f"scheduler {self._address}: is gone; started again, the work goes on where it stopped")
 
 
 @contextmanager
@@ -191,18 +191,18 @@ def _on_cluster(address: str, folders: tuple[Path, ...]) -> Iterator[_Cluster]:
     try:
         from distributed import Client
     except ModuleNotFoundError:
-        raise BatchError("a scheduler needs dask, which is not installed: pip install 'tiltprint[batch]'") from None
+        raise UserError("a scheduler needs dask, which is not installed: pip install 'tiltprint[batch]'") from None
     for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
         if name.startswith(("distributed", "tornado", "asyncio")):  # what goes wrong is told in our own words
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         client = Client(address, timeout=REACHED_WITHIN_S)
     except (OSError, TimeoutError, ValueError) as error:
-        raise BatchError(f"scheduler {address}: cannot be reached ({error})") from None
+        raise UserError(f"scheduler {address}: cannot be reached ({error})") from None
     try:
         for worker, missing in client.run(folders_missing, folders, on_error="return").items():
             if missing:
-                raise BatchError(f"worker {worker} of scheduler {address} cannot work: {_in_words(missing)}")
+                raise UserError(f"worker {worker} of scheduler {address} cannot work: {_in_words(missing)}")
         yield _Cluster(client, address)
     finally:
         with suppress(Exception):  # what does not answer any more need not be told

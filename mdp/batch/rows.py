@@ -8,7 +8,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from profiles.errors import BatchError
+from profiles.errors import UserError
 from profiles.files import SHARED, write_whole
 from profiles.files import lock as locked
 
@@ -21,22 +21,22 @@ Row = TypeVar("Row")  # a dataclass of text and numbers
 def writing_alone(folder: Path, lock: str) -> Iterator[None]:
     """A folder, made where it is missing, that nobody else writes into meanwhile. lock: name of the file that says so.
 
-    Raises BatchError when somebody does, and for what cannot be written.
+    Raises UserError when somebody does, and for what cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / lock).open("w") as file:
             if not locked(file.fileno()):
-                raise BatchError(f"folder {folder}: another run writes into it; wait for it or take another")
+                raise UserError(f"folder {folder}: another run writes into it; wait for it or take another")
             yield
     except OSError as error:
-        raise BatchError(f"folder {folder}: cannot be written ({error})") from None
+        raise UserError(f"folder {folder}: cannot be written ({error})") from None
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
     """The rows of a table, in its order; none where there is no table, and none for a last line that was cut off.
 
-    Raises BatchError for a damaged table.
+    Raises UserError for a damaged table.
     """
     if not path.is_file():
         return []
@@ -46,7 +46,7 @@ def read_rows(path: Path, kind: type[Row]) -> list[Row]:
     with path.open(newline="", encoding="utf-8", errors=NO_TEXT) as file:
         lines = csv.DictReader(file)
         if lines.fieldnames != columns:
-            raise BatchError(f"{path}: its columns are not {', '.join(columns)}: it is no table of this version")
+            raise UserError(f"{path}: its columns are not {', '.join(columns)}: it is no table of this version")
         for line in lines:
             number = lines.line_num
             try:
@@ -54,7 +54,7 @@ def read_rows(path: Path, kind: type[Row]) -> list[Row]:
             except (TypeError, ValueError):
                 if next(lines, None) is None:  # cut off while it was written: that call is done again
                     break
-                raise BatchError(f"{path}: line {number} is not of this table: {line}") from None
+                raise UserError(f"{path}: line {number} is not of this table: {line}") from None
     return rows
 
 

@@ -21,7 +21,7 @@ from mdp.learning import command
 from mdp.learning.index import FAILED, INDEX, LOCK, Row, Search, read_index, summary, unfinished, write_index
 from mdp.learning.models import model_files, name_of
 from mdp.learning.task import TERMS, Result, Settings, run
-from profiles.errors import LearningError
+from profiles.errors import UserError
 from profiles.files import SHARED, write_whole
 from profiles.profile import DEFAULTS
 
@@ -59,7 +59,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     options.terms = list(dict.fromkeys(options.terms.split(",")))
     for terms in options.terms:
         if terms not in TERMS:
-            raise LearningError(f"--terms has {terms!r}: {', '.join(TERMS)} are allowed")
+            raise UserError(f"--terms has {terms!r}: {', '.join(TERMS)} are allowed")
     return options
 
 
@@ -83,7 +83,7 @@ def collect(arguments: Sequence[str] | None) -> None:
     found = [rows[search] for search in wanted]
     sys.stdout.write("\n\n".join(summary(found)) + "\n")
     if all(row.excluded for row in found):
-        raise LearningError(f"folder {options.out}: nothing was collected")
+        raise UserError(f"folder {options.out}: nothing was collected")
 
 
 def _name_or_path(profile: str) -> str:
@@ -92,11 +92,11 @@ def _name_or_path(profile: str) -> str:
 
 
 def _rows(out: Path, settings: Settings) -> dict[Search, Row]:
-    """What is there already; LearningError where it is of other settings."""
+    """What is there already; UserError where it is of other settings."""
     rows = {row.search: row for row in read_index(out)}
     others = sorted({row.settings for row in rows.values()} - {settings.in_words})
     if others:
-        raise LearningError(f"folder {out}: holds searches with {others[0]}, not {settings.in_words}: take another folder")
+        raise UserError(f"folder {out}: holds searches with {others[0]}, not {settings.in_words}: take another folder")
     return rows
 
 

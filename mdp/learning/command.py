@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mdp.learning.sources import FOLDS
 from mdp.ranking.features import CHECKED, COLUMNS, PAPER_COLUMNS
-from profiles.errors import LearningError, UserError
+from profiles.errors import UserError
 
 COLUMN_SETS = {  # cheap: those that are known of a candidate before it is checked
     "paper": PAPER_COLUMNS,
@@ -23,8 +23,8 @@ class Parser(argparse.ArgumentParser):
     """A parser whose complaints are sentences like all others."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise LearningError in the place of printing how the command is used."""
-        raise LearningError(f"{message}; --help shows what is allowed")
+        """Raise UserError in the place of printing how the command is used."""
+        raise UserError(f"{message}; --help shows what is allowed")
 
 
 def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str] | None, interrupted: str) -> int:
@@ -69,11 +69,11 @@ def split_names(text: str) -> tuple[str, ...]:
 
 
 def check_range(options: argparse.Namespace, name: str, least: float, most: float = inf) -> None:
-    """Raise LearningError where an option was given a value that is not within its range."""
+    """Raise UserError where an option was given a value that is not within its range."""
     value = getattr(options, name)
     if value is not None and not least <= value <= most:
         allowed = f"{least:g} or more" if most == inf else f"{least:g} to {most:g}"
-        raise LearningError(f"--{name.replace('_', '-')} is {value:g}: {allowed} is allowed")
+        raise UserError(f"--{name.replace('_', '-')} is {value:g}: {allowed} is allowed")
 
 
 def commit() -> str:

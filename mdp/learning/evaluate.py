@@ -22,7 +22,7 @@ from mdp.learning.ndcg import NDCGS, REGRETS, Measure, Scores, as_searched, at, 
 from mdp.learning.sources import Side
 from mdp.mesh import Floats
 from mdp.ranking.ranker import Network
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 ALWAYS = ("M2", "M6")  # what lines are fitted in
 SHUFFLES, CUT = 10, 5  # importance is what NDCG@5 loses, as a mean of this many shuffles
@@ -63,9 +63,9 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     check_range(options, "least_removed", 0.0, 1.0)
     unknown = [name for name in options.without if name not in BASELINES]
     if unknown:
-        raise LearningError(f"--without {unknown[0]}: is no baseline; {'; '.join(BASELINES)} are there")
+        raise UserError(f"--without {unknown[0]}: is no baseline; {'; '.join(BASELINES)} are there")
     if options.folder is None and options.figure7 is None:
-        raise LearningError("a folder of records or --figure7 is needed; --help shows what is allowed")
+        raise UserError("a folder of records or --figure7 is needed; --help shows what is allowed")
     return options
 
 
@@ -78,7 +78,7 @@ def _compare(options: argparse.Namespace) -> None:
     sides = {side: [rated for rated in of_side(lists, side, options.fold) if rated.teaches] for side in Side}
     for side, some in sides.items():
         if not some:
-            raise LearningError(f"folder {options.folder}: no list of it is on the side {side}; record models of more sources")
+            raise UserError(f"folder {options.folder}: no list of it is on the side {side}; record models of more sources")
     rankers = {str(network.file): _scores(network) for network in networks}
     for name, fit in BASELINES.items():
         if name not in options.without:
@@ -158,7 +158,7 @@ def _draw_widths(options: argparse.Namespace) -> None:
 
     comparisons = compare(read_searches(options.figure7), options.least_removed)
     if not comparisons:
-        raise LearningError(f"table {options.figure7}: {NOTHING_COMMON}")
+        raise UserError(f"table {options.figure7}: {NOTHING_COMMON}")
     file = options.pictures / "figure7.png"
     save(draw_widths(comparisons), file)
     sys.stdout.write(f"![J and time against the beam's width]({file})\n")

@@ -66,7 +66,7 @@ class Row:
 def read_index(folder: Path) -> list[Row]:
     """The rows of a collection, the last one of each search; none where there is no index.
 
-    Raises BatchError for a damaged one.
+    Raises UserError for a damaged one.
     """
     return list({row.search: row for row in read_rows(folder / INDEX, Row)}.values())
 

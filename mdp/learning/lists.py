@@ -21,7 +21,7 @@ from mdp.learning.sources import Side, model_id, place, read_sources, side
 from mdp.mesh import Floats, Ints
 from mdp.ranking.features import PAPER_COLUMNS
 from mdp.ranking.record import VERSION, Arrays
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 NEEDED = ("model", "columns", "features", "stage", "outcome")
 BEST = 5  # candidates of a list that are rated
@@ -82,35 +82,35 @@ def read_lists(
 
     terms: only those of searches on one of these terms, MODEL.ORIENTATION.TERMS.npz.
 
-    Raises LearningError for a folder without records of each of the terms, and for a record of another version, without one of
+    Raises UserError for a folder without records of each of the terms, and for a record of another version, without one of
     the columns, of a model that the manifest does not know, or with a feature that is no finite number.
     """
     known, files = list(folder.glob("*.npz")), set[Path]()
     for ending in [f".{name}.npz" for name in terms] or [".npz"]:
         some = [file for file in known if file.name.endswith(ending)]
         if not some:
-            raise LearningError(f"folder {folder}: holds no record (*{ending}); python -m mdp.learning.collect makes them")
+            raise UserError(f"folder {folder}: holds no record (*{ending}); python -m mdp.learning.collect makes them")
         files.update(some)
     sources = None if manifest is None else read_sources(manifest)
     lists: list[RatedList] = []
     for file in sorted(files):
         source = model_id(file) if sources is None else sources.get(model_id(file))
         if source is None:
-            raise LearningError(f"record {file}: its model {model_id(file)} is not in {manifest}")
+            raise UserError(f"record {file}: its model {model_id(file)} is not in {manifest}")
         lists += _lists(read_record(file, columns), file, source, columns)
     return lists
 
 
 def read_record(file: Path, columns: Sequence[str] = PAPER_COLUMNS) -> Arrays:
-    """The arrays of a record file that can be learnt from; LearningError as for `read_lists`."""
+    """The arrays of a record file that can be learnt from; UserError as for `read_lists`."""
     try:
         with np.load(file, allow_pickle=False) as archive:
             arrays: Arrays = dict(archive)
     except (OSError, ValueError, BadZipFile, EOFError) as error:
-        raise LearningError(f"record {file}: cannot be read ({error})") from None
+        raise UserError(f"record {file}: cannot be read ({error})") from None
     version = int(arrays["version"]) if "version" in arrays else 1
     if version != VERSION:
-        raise LearningError(f"record {file}: is of version {version}, only {VERSION} is understood; record the search again")
+        raise UserError(f"record {file}: is of version {version}, only {VERSION} is understood; record the search again")
     _check(file, arrays, columns)
     return arrays
 
@@ -118,18 +118,18 @@ def read_record(file: Path, columns: Sequence[str] = PAPER_COLUMNS) -> Arrays:
 def _check(file: Path, arrays: Arrays, columns: Sequence[str]) -> None:
     missing = [name for name in NEEDED if name not in arrays]
     if missing:
-        raise LearningError(f"record {file}: holds no {', '.join(missing)}")
+        raise UserError(f"record {file}: holds no {', '.join(missing)}")
     absent = [name for name in columns if name not in arrays["columns"]]
     if absent:
-        raise LearningError(f"record {file}: has no feature {', '.join(absent)}; it has {', '.join(arrays['columns'])}")
+        raise UserError(f"record {file}: has no feature {', '.join(absent)}; it has {', '.join(arrays['columns'])}")
     rows = len(arrays["stage"])
     if arrays["features"].shape != (rows, len(arrays["columns"])) or arrays["outcome"].shape != (rows,):
-        raise LearningError(f"record {file}: its features, stages and outcomes are not of the same candidates")
+        raise UserError(f"record {file}: its features, stages and outcomes are not of the same candidates")
     unusable = ~np.isfinite(arrays["features"])
     if unusable.any():
         row, column = np.argwhere(unusable)[0]
         name, value = arrays["columns"][column], arrays["features"][row, column]
-        raise LearningError(f"record {file}: feature {name} of a candidate of model {arrays['model']} is {value}")
+        raise UserError(f"record {file}: feature {name} of a candidate of model {arrays['model']} is {value}")
 
 
 def _lists(record: Arrays, file: Path, source: str, columns: Sequence[str]) -> Iterator[RatedList]:

@@ -15,7 +15,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import UP
 from mdp.read import read_mesh
 from mdp.repair.repair import repair
-from profiles.errors import LearningError, MeshError
+from profiles.errors import MeshError, UserError
 
 ARRAYS = ".npz"
 MOST_MOVED = 0.002  # share of the diagonal by which a coarser surface may lie off
@@ -26,18 +26,18 @@ SIDES_APART_DEG = 20.0  # directions of two sides that count as different
 def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
     """The models of a folder by name: npz files and mesh files whose name has `only` in it, of these every nth (`every`).
 
-    Raises LearningError for a folder without any, and for two models of one name.
+    Raises UserError for a folder without any, and for two models of one name.
     """
     if not folder.is_dir():
-        raise LearningError(f"folder {folder}: there is none; models to learn from are expected in it")
+        raise UserError(f"folder {folder}: there is none; models to learn from are expected in it")
     kinds = (ARRAYS, *READERS)
     files = sorted(file for file in folder.iterdir() if file.suffix.lower() in kinds and only in file.stem)[::every]
     if not files:
         words = f" with {only!r} in its name" if only else ""
-        raise LearningError(f"folder {folder}: holds no model{words}; {', '.join(kinds)} are read")
+        raise UserError(f"folder {folder}: holds no model{words}; {', '.join(kinds)} are read")
     for file, next_file in pairwise(files):
         if name_of(file) == name_of(next_file):
-            raise LearningError(f"folder {folder}: {file.name} and {next_file.name} would have the same records; rename one")
+            raise UserError(f"folder {folder}: {file.name} and {next_file.name} would have the same records; rename one")
     return files
 
 

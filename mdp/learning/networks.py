@@ -17,7 +17,7 @@ from mdp.learning.lists import SMALLEST_RANGE, RatedList, Singles
 from mdp.learning.ndcg import Scores
 from mdp.mesh import Floats
 from mdp.ranking.ranker import INPUT, OUTPUT
-from profiles.errors import LearningError
+from profiles.errors import UserError
 from profiles.files import SHARED, write_whole
 
 OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of the last years
@@ -211,8 +211,8 @@ def export(networks: Sequence[Network], columns: Sequence[str], metadata: Mappin
 
 
 def write(file: Path, content: bytes) -> None:
-    """Write a ranker whole or not at all; LearningError where that cannot be done."""
+    """Write a ranker whole or not at all; UserError where that cannot be done."""
     try:
         write_whole(file, content, SHARED)
     except OSError as error:
-        raise LearningError(f"ranker {file}: cannot be written ({error.strerror})") from None
+        raise UserError(f"ranker {file}: cannot be written ({error.strerror})") from None

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from mdp.learning.widths import Comparison
 from mdp.mesh import Floats
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 INCHES, DOTS = 4.2, 150  # of a panel, per inch
 DARK = 0.6  # correlation from which its square is too dark for black figures
@@ -69,9 +69,9 @@ def draw_features(columns: Sequence[str], importance: Floats, correlation: Float
 
 
 def save(figure: Figure, file: Path) -> None:
-    """Write a picture as PNG; LearningError where that cannot be done."""
+    """Write a picture as PNG; UserError where that cannot be done."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(file, dpi=DOTS, format="png", metadata={"Software": None})
     except OSError as error:
-        raise LearningError(f"picture {file}: cannot be written ({error.strerror})") from None
+        raise UserError(f"picture {file}: cannot be written ({error.strerror})") from None

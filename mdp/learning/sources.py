@@ -9,7 +9,7 @@ from enum import StrEnum
 from hashlib import sha256
 from pathlib import Path
 
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 NEEDED = ("id", "source_repo", "source_path")
 TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest judges
@@ -45,14 +45,14 @@ def model_id(file: Path) -> str:
 def read_sources(manifest: Path) -> dict[str, str]:
     """Model -> its repository and folder, of a table with the columns id, source_repo and source_path.
 
-    Raises LearningError for a file that is no such table.
+    Raises UserError for a file that is no such table.
     """
     try:
         with manifest.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise LearningError(f"manifest {manifest}: cannot be read ({error})") from None
+        raise UserError(f"manifest {manifest}: cannot be read ({error})") from None
     missing = [name for name in NEEDED if not rows or not rows[0].get(name)]
     if missing:
-        raise LearningError(f"manifest {manifest}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
+        raise UserError(f"manifest {manifest}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
     return {row["id"]: f"{row['source_repo']}/{row['source_path'].rpartition('/')[0]}" for row in rows}

@@ -18,7 +18,7 @@ from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, 
 from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists
 from mdp.learning.ndcg import NDCGS, Scores, as_searched
 from mdp.learning.sources import Side
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 if TYPE_CHECKING:
     from mdp.learning.networks import Network
@@ -100,7 +100,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     for name, least, most in (("rate", 1e-9, 10.0), ("seed", 0, 1e9), ("share", 0.01, 1.0)):
         check_range(options, name, least, most)
     if options.output.is_dir() or not options.output.parent.is_dir():
-        raise LearningError(f"ranker {options.output}: cannot be written; a file in a folder that exists is needed")
+        raise UserError(f"ranker {options.output}: cannot be written; a file in a folder that exists is needed")
     return options
 
 

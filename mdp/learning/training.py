@@ -13,7 +13,7 @@ import torch
 from mdp.learning.lists import RatedList
 from mdp.learning.networks import Network
 from mdp.learning.objective import OBJECTIVES, Figures, Objective, Padded, thin
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,13 @@ def train(
 ) -> Figures:
     """Train a network in place on the named features of lists for training and for validation; the best figures.
 
-    Lists of one candidate are left out. Raises LearningError if no others remain.
+    Lists of one candidate are left out. Raises UserError if no others remain.
     """
     torch.set_num_threads(1)
     training, validation = ([rated for rated in side if rated.teaches] for side in lists)
     for side, name in ((training, "train"), (validation, "validate")):
         if not side:
-            raise LearningError(f"no list to {name} with: record more models, of more repositories and folders")
+            raise UserError(f"no list to {name} with: record more models, of more repositories and folders")
     objective = OBJECTIVES[schedule.loss]
     padded, held_out = objective.pad(training, columns), objective.pad(validation, columns)
     network.prepare(padded.features, padded.present)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from mdp.mesh import Floats, Ints
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 NEEDED = ("mesh", "settings", "method", "width", "share", "core_s")
 CLASSIC = "classic"
@@ -62,17 +62,17 @@ class Comparison:
 
 
 def read_searches(table: Path) -> list[Search]:
-    """The searches that did not fail, of models with a risky face; LearningError for a file that is no such table."""
+    """The searches that did not fail, of models with a risky face; UserError for a file that is no such table."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             missing = [name for name in NEEDED if name not in (reader.fieldnames or ())]
             rows = list(reader)
         if missing:
-            raise LearningError(f"table {table}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
+            raise UserError(f"table {table}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
         return [_search(row) for row in rows if not row.get("error") and float(row.get("risky_mm2") or 1.0) > 0.0]
     except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
-        raise LearningError(f"table {table}: cannot be read ({error})") from None
+        raise UserError(f"table {table}: cannot be read ({error})") from None
 
 
 def _search(row: dict[str, str]) -> Search:
@@ -102,7 +102,7 @@ def _comparison(method: tuple[str, str], searches: Sequence[Search], least_remov
     known = {(search.ranker, search.width, search.mesh): search for search in searches}
     if len(known) < len(searches):
         (ranker, width, mesh), _ = Counter((search.ranker, search.width, search.mesh) for search in searches).most_common(1)[0]
-        raise LearningError(f"{mesh} was searched twice with {ranker} at width {width}: rankers need files of different names")
+        raise UserError(f"{mesh} was searched twice with {ranker} at width {width}: rankers need files of different names")
     kinds = sorted({(search.ranker, search.width) for search in searches}, key=lambda kind: (kind[0] != CLASSIC, *kind))
     models = [mesh for mesh in sorted({search.mesh for search in searches}) if all((*kind, mesh) in known for kind in kinds)]
     widest = max((width for ranker, width in kinds if ranker == CLASSIC), default=None)

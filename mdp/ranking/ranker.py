@@ -19,7 +19,7 @@ from mdp.ranking import SUFFIX
 from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import FEATURES, features
 from mdp.ranking.ranking import RankedCandidate
-from profiles.errors import RankerError, first_line
+from profiles.errors import UserError, first_line
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -37,7 +37,7 @@ class Network:
         self.file = file
 
     def check(self) -> None:
-        """Raise RankerError unless the file holds a ranker."""
+        """Raise UserError unless the file holds a ranker."""
         self.scores(np.zeros((2, len(self.columns))))
 
     def rank(self, offered: Iterable[RankedCandidate], tables: Sequence[CandidateTable]) -> Iterator[RankedCandidate]:
@@ -56,9 +56,9 @@ class Network:
         try:
             (scores,) = session.run([OUTPUT], {INPUT: rows.astype(np.float32)})
         except Exception as error:  # noqa: BLE001 - onnxruntime's own have no common base
-            raise RankerError(f"ranker {self.file}: cannot score candidates ({first_line(error)})") from None
+            raise UserError(f"ranker {self.file}: cannot score candidates ({first_line(error)})") from None
         if np.shape(scores) != (len(rows),) or not np.isfinite(scores).all():
-            raise RankerError(f"ranker {self.file}: gives no number for each of {len(rows)} candidates")
+            raise UserError(f"ranker {self.file}: gives no number for each of {len(rows)} candidates")
         rounded: Floats = np.asarray(np.round(np.asarray(scores, np.float64), DECIMALS), np.float64)
         return rounded
 
@@ -70,10 +70,10 @@ class Network:
         unknown = [name for name in columns if name not in FEATURES]
         if not columns or unknown:
             wrong = f"wants the feature {unknown[0]}, which this version does not know" if unknown else "names no features"
-            raise RankerError(f"ranker {self.file}: {wrong}; train it anew with this version")
+            raise UserError(f"ranker {self.file}: {wrong}; train it anew with this version")
         (given,) = self._session.get_inputs()
         if list(given.shape)[1:] != [len(columns)]:
-            raise RankerError(f"ranker {self.file}: takes {given.shape}, {len(columns)} features a candidate are named")
+            raise UserError(f"ranker {self.file}: takes {given.shape}, {len(columns)} features a candidate are named")
         return columns
 
     def _features(self, candidates: Sequence[RankedCandidate], tables: Sequence[CandidateTable]) -> Floats:
@@ -92,7 +92,7 @@ class Network:
         from onnxruntime import InferenceSession, SessionOptions, set_default_logger_severity
 
         if not self.file.is_file():
-            raise RankerError(f"ranker {self.file}: there is no such file")
+            raise UserError(f"ranker {self.file}: there is no such file")
         set_default_logger_severity(4)
         options: Any = SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
@@ -100,25 +100,25 @@ class Network:
         try:
             session = InferenceSession(self.file.read_bytes(), options, providers=["CPUExecutionProvider"])
         except OSError as error:
-            raise RankerError(f"ranker {self.file}: cannot be read ({error.strerror})") from None
+            raise UserError(f"ranker {self.file}: cannot be read ({error.strerror})") from None
         except Exception as error:  # noqa: BLE001 - as above
-            raise RankerError(f"ranker {self.file}: is no ONNX file ({first_line(error)})") from None
+            raise UserError(f"ranker {self.file}: is no ONNX file ({first_line(error)})") from None
         named = ([value.name for value in session.get_inputs()], [value.name for value in session.get_outputs()])
         if named != ([INPUT], [OUTPUT]):
-            raise RankerError(f"ranker {self.file}: takes {named[0]} and gives {named[1]}; {INPUT} and {OUTPUT} are needed")
+            raise UserError(f"ranker {self.file}: takes {named[0]} and gives {named[1]}; {INPUT} and {OUTPUT} are needed")
         return session
 
 
 @cache
 def ranker_named(name: str) -> Network | None:
     """The ranker of a name: None is the classic ranking, `learned` the network that ships, the name of an .onnx file a network of
-    one's own. Raises RankerError for a name that is none and for a file that holds no ranker."""
+    one's own. Raises UserError for a name that is none and for a file that holds no ranker."""
     if name == CLASSIC:
         return None
     if name == LEARNED:
         return shipped()
     if not name.endswith(SUFFIX):
-        raise RankerError(f"--ranker {name}: {CLASSIC}, {LEARNED} or the name of an {SUFFIX} file is allowed")
+        raise UserError(f"--ranker {name}: {CLASSIC}, {LEARNED} or the name of an {SUFFIX} file is allowed")
     own = Network(Path(name))
     own.check()
     return own

@@ -32,7 +32,7 @@ from mdp.batch.rows import append_row, read_rows, write_rows, writing_alone
 from mdp.formats.readers import READERS
 from mdp.kernels.workers import CallError
 from mdp.ranking.ranker import ranker_named
-from profiles.errors import BatchError, counted
+from profiles.errors import UserError, counted
 
 LOCK = "batch.lock"
 NO_FILES = "estimate"  # makes none
@@ -44,7 +44,7 @@ NUMBER = re.compile(r"\d+([.,]\d+)*")
 def batch(request: BatchRequest) -> int:
     """Do what is asked with every model of a folder; 1 unless all of them are done."""
     if request.do not in ACTIONS:
-        raise BatchError(f"--do {request.do}: {', '.join(ACTIONS)} is expected")
+        raise UserError(f"--do {request.do}: {', '.join(ACTIONS)} is expected")
     files = model_files(request.folder)
     check_folder(request.out)
     ranker_named(request.asked.ranker)
@@ -70,13 +70,13 @@ def batch(request: BatchRequest) -> int:
 
 
 def model_files(folder: Path) -> dict[str, Path]:
-    """The models of a folder by name, absolute. Raises BatchError for a folder without any."""
+    """The models of a folder by name, absolute. Raises UserError for a folder without any."""
     if not folder.is_dir():
-        raise BatchError(f"{folder}: there is no such folder; models are expected in it")
+        raise UserError(f"{folder}: there is no such folder; models are expected in it")
     files = (file for file in folder.resolve().iterdir() if file.suffix.lower() in READERS and not file.name.startswith("."))
     named = {file.name: file for file in sorted(files)}
     if not named:
-        raise BatchError(f"folder {folder} holds no model; {', '.join(READERS)} are read")
+        raise UserError(f"folder {folder} holds no model; {', '.join(READERS)} are read")
     return named
 
 

@@ -17,7 +17,7 @@ from machine.firmware.line import LineRules
 from machine.link.identification import Answer, Kind, ask, ask_at_any_rate
 from machine.link.port import Port, open_port
 from machine.program import Program
-from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError, SilenceError
+from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -81,7 +81,7 @@ NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
         "a printer that has stopped with an error ({words}), at {baud} baud",
     ),
     Kind.STRANGER: (
-        RemoteProtocolError,
+        PrinterError,
         "what answers at {port} is no printer: {stranger} instead of answering M115",
         "something answers but is no printer: {stranger}",
     ),

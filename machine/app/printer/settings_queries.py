@@ -20,7 +20,7 @@ from machine.network.address import is_server_address
 from machine.network.duet import SETTINGS_ARRAYS, SETTINGS_KEYS
 from machine.network.servers import open_server
 from machine.simulator.simulator import SimulatedPrinter
-from profiles.errors import PrinterError, RemoteProtocolError, SilenceError
+from profiles.errors import PrinterError, SilenceError
 from profiles.machine import Machine
 
 ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
@@ -62,7 +62,7 @@ def _conversation(wire: Port, baud: int) -> str:
     if name not in QUESTIONS:
         words, known = answer.firmware or "of no firmware that it names", ", ".join(QUESTIONS)
         unknown = f"the printer at {wire.name} is {words}, whose settings cannot be asked for over a port: those of {known} can"
-        raise RemoteProtocolError(OTHERWISE.get(name, unknown))
+        raise PrinterError(OTHERWISE.get(name, unknown))
     _hear_out(wire)
     return "\n".join(line for question in QUESTIONS[name] for line in _pages(wire, question))
 

@@ -3,7 +3,7 @@
 from machine.firmware.line import BAUDS
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.window import GREETING_LINES
-from profiles.errors import FirmwareError, PrinterError, RemoteProtocolError, SilenceError
+from profiles.errors import FirmwareError, PrinterError, SilenceError
 
 SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
 RUBBISH_TRIES = 2  # boot loaders speak at rates of their own; what comes after that is the firmware's
@@ -15,14 +15,14 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: s
     at = "this baud rate" if baud is None else f"{baud} baud"
     if tries >= RUBBISH_TRIES and decoder.rubbish:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
-        return RemoteProtocolError(f"what comes at {at} is rubbish: the printer speaks at another rate, try --baud {others}")
+        return PrinterError(f"what comes at {at} is rubbish: the printer speaks at another rate, try --baud {others}")
     if tries < SYNC_TRIES:
         return None
     if decoder.foreign:
         text = f"what answers there is no printer that this program knows: to {tries} greetings it said {decoder.foreign[:60]!r}"
-        return RemoteProtocolError(text)
+        return PrinterError(text)
     if heard:
-        return RemoteProtocolError(f"the printer did not take {tries} greetings: the last that it said was {heard[:60]!r}")
+        return PrinterError(f"the printer did not take {tries} greetings: the last that it said was {heard[:60]!r}")
     return SilenceError(
         f"the printer did not answer {tries} greetings (M110, M115 with line numbers): it may be off, or speak at another "
         f"rate than {at}"
@@ -31,7 +31,7 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: s
 
 def no_line_numbers() -> PrinterError:
     """It answers a line without number, and none that has one."""
-    return RemoteProtocolError(
+    return PrinterError(
         "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
         "lines, for a damaged one could not be told"
     )
@@ -54,12 +54,12 @@ def firmware_fault(text: str) -> PrinterError:
 
 def torn_line(line: int) -> PrinterError:
     """A piece of a line was run without number and checksum."""
-    return RemoteProtocolError(f"the printer ran part of a torn line after line {line}: what it did is not known")
+    return PrinterError(f"the printer ran part of a torn line after line {line}: what it did is not known")
 
 
 def lost_answer(line: int, command: str, firmware: str) -> PrinterError:
     """A line without answer, to a firmware that does not say which line it wants."""
-    return RemoteProtocolError(
+    return PrinterError(
         f"line {line} ({command}) was not answered, and {firmware} never asks for a lost line again: "
         "whether it was done is not known"
     )
@@ -68,7 +68,7 @@ def lost_answer(line: int, command: str, firmware: str) -> PrinterError:
 def refused_line(line: int, command: str, times: int, words: str) -> PrinterError:
     """One line is asked for again and again while those before it passed. words: the printer's, "" when it says no more."""
     said = f": {words[:80]!r}" if words else ""
-    return RemoteProtocolError(
+    return PrinterError(
         f"the printer has refused line {line} ({command}) {times} times{said}; lines before it passed, so its firmware does not "
         "take this command as it is, or the cable has just become too noisy"
     )
@@ -76,13 +76,13 @@ def refused_line(line: int, command: str, times: int, words: str) -> PrinterErro
 
 def noise(line: int, too_much: str) -> PrinterError:
     """Too many lines had to be repeated."""
-    return RemoteProtocolError(f"the printer asked for {too_much} again, now for {line}: the cable or the adapter is too noisy")
+    return PrinterError(f"the printer asked for {too_much} again, now for {line}: the cable or the adapter is too noisy")
 
 
 def implausible_resend(line: int, sent: int, acknowledged: int) -> PrinterError:
     """The printer insists on a line that it cannot mean; on one of the greeting, because its numbers have begun again."""
     if line <= GREETING_LINES:
         return restart(acknowledged, "without a word")
-    return RemoteProtocolError(
+    return PrinterError(
         f"the printer asks for line {line}, although line {sent} is the last one sent and {acknowledged} are acknowledged"
     )

@@ -15,7 +15,7 @@ from machine.link.progress import Progress
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.virtual import PATH, VirtualPrinter
-from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError
+from profiles.errors import FirmwareError, PortError, PrinterError
 from profiles.profile import Profile, load
 
 PROFILE = load()
@@ -314,7 +314,7 @@ def test_a_line_that_was_torn_with_the_port_is_never_done_twice_or_left_out(dial
     watcher, error = watched({}, Fault("disconnect", at=byte, seconds=2.0), profile=UNASKING[dialect]), ""
     try:
         watcher.run(PROGRAM)
-    except RemoteProtocolError as stopped:
+    except PrinterError as stopped:
         error = str(stopped)
     done, program = strokes(watcher.printer), planned(PROGRAM)
     assert np.abs(done - program[: len(done)]).max() < 1e-6
@@ -326,7 +326,7 @@ def test_a_firmware_that_restarted_behind_the_lost_port_is_seen_by_its_place(dia
     watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=2.0), profile=UNASKING[dialect])
     reset = watcher.printer.firmware.reset
     watcher.when = {"reconnecting": lambda: reset(False)}
-    with pytest.raises(RemoteProtocolError, match=r"was not answered|can no longer be trusted"):
+    with pytest.raises(PrinterError, match=r"was not answered|can no longer be trusted"):
         watcher.run(PROGRAM)
     assert len(strokes(watcher.printer)) < len(planned(PROGRAM))
 

@@ -40,7 +40,6 @@ from profiles.errors import (
     LocalProtocolError,
     PortError,
     PrinterError,
-    RemoteProtocolError,
     SilenceError,
 )
 from profiles.profile import load
@@ -280,7 +279,7 @@ def test_scenario_14_a_spurious_resend_of_an_acknowledged_line(build: BuildOptio
 @pytest.mark.parametrize("number", [9999, 3])
 def test_scenario_15_a_resend_beyond_history_or_in_the_future_ends_the_print_safely(build: BuildOptions, number: int) -> None:
     done = printed([Fault("spurious resend", LINE + k, value=number) for k in range(3)], build)
-    assert isinstance(done.error, RemoteProtocolError)
+    assert isinstance(done.error, PrinterError)
     assert f"asks for line {number}" in str(done.error)
     assert_exact(done, whole=False)
     assert_cold(done)
@@ -289,7 +288,7 @@ def test_scenario_15_a_resend_beyond_history_or_in_the_future_ends_the_print_saf
 def test_scenario_16_the_same_line_asked_for_again_and_again() -> None:
     begin, size = byte(LINE, 9, PLAIN), byte(LINE + 1, 0, PLAIN) - byte(LINE, 0, PLAIN)
     done = printed([Fault("drop", begin + k * size) for k in range(40)], PLAIN)
-    assert isinstance(done.error, RemoteProtocolError)
+    assert isinstance(done.error, PrinterError)
     assert re.match(rf"the printer has refused line \d+ \(G1 .*\) {ASKED_LIMIT} times: .Error:checksum mismatch", str(done.error))
     assert times(done, LINE) <= ASKED_LIMIT + 1
     assert_exact(done, whole=False)

@@ -14,7 +14,7 @@ import pytest
 from mdp.batch import pool
 from mdp.batch.pool import Workers, connected
 from mdp.kernels.workers import CallError
-from profiles.errors import BatchError
+from profiles.errors import UserError
 from tests.mdp.batch.calls import begin, die, greet, process, refuse, sleep
 
 NOTHING = lambda: None  # noqa: E731
@@ -48,7 +48,7 @@ def interrupt_after(note: Path) -> None:
 
 def test_without_dask_a_scheduler_is_refused_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(BatchError, match=r"^a scheduler needs dask, which is not installed: pip install 'tiltprint\[batch\]'$"):
+    with pytest.raises(UserError, match=r"^a scheduler needs dask, which is not installed: pip install 'tiltprint\[batch\]'$"):
         run_on("tcp://127.0.0.1:9")
 
 
@@ -56,7 +56,7 @@ def test_without_dask_a_scheduler_is_refused_in_one_sentence(monkeypatch: pytest
 def test_a_scheduler_that_is_not_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr(pool, "REACHED_WITHIN_S", 0.3)
-    with pytest.raises(BatchError, match=r"^scheduler tcp://127.0.0.1:9: cannot be reached \("):
+    with pytest.raises(UserError, match=r"^scheduler tcp://127.0.0.1:9: cannot be reached \("):
         run_on("tcp://127.0.0.1:9")
 
 
@@ -65,7 +65,7 @@ def test_a_scheduler_that_dies_is_one_sentence() -> None:
     distributed = pytest.importorskip("distributed")
     cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
     with (
-        pytest.raises(BatchError, match="is gone; started again, the work goes on where it stopped"),
+        pytest.raises(UserError, match="is gone; started again, the work goes on where it stopped"),
         connected(Workers(cluster.scheduler_address, 1, 0)) as queue,
     ):
         list(queue.completed(time.sleep, {"long": (2.0,)}, cluster.close))
@@ -133,7 +133,7 @@ def slow_at_first(note: Path, result: int) -> int:
 def test_a_worker_that_does_not_see_a_folder_is_told(scheduler: str, tmp_path: Path) -> None:
     run = worker(scheduler, tmp_path)
     nowhere = tmp_path / "nowhere"
-    with pytest.raises(BatchError, match=f"cannot work: it does not see {nowhere}$"):
+    with pytest.raises(UserError, match=f"cannot work: it does not see {nowhere}$"):
         until_refused(scheduler, nowhere)
     run.kill()
 

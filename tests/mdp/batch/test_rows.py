@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mdp.batch.rows import append_row, read_rows, write_rows, writing_alone
-from profiles.errors import BatchError
+from profiles.errors import UserError
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,13 @@ def test_where_there_is_no_table_there_are_no_rows(tmp_path: Path) -> None:
 )
 def test_a_damaged_table_is_refused(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "t.csv").write_text(text)
-    with pytest.raises(BatchError, match=message):
+    with pytest.raises(UserError, match=message):
         read_rows(tmp_path / "t.csv", Row)
 
 
 def test_two_runs_do_not_write_into_one_folder(tmp_path: Path) -> None:
     message = "another run writes into it; wait for it or take another"
-    with writing_alone(tmp_path, "lock"), pytest.raises(BatchError, match=message), writing_alone(tmp_path, "lock"):
+    with writing_alone(tmp_path, "lock"), pytest.raises(UserError, match=message), writing_alone(tmp_path, "lock"):
         pass
     with writing_alone(tmp_path, "lock"):
         pass

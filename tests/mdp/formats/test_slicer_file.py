@@ -253,7 +253,7 @@ def test_a_negative_volume_inside_leaves_a_void(tmp_path: Path) -> None:
 def test_the_family_of_readers_tells_parts_of_a_slicer_file_from_negative_volumes(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "negative")], [AT_ORIGIN])])
     (built,) = READERS[".3mf"](path, None).objects
-    assert [volume.role.kind for volume in built.volumes] == ["part", "negative volume"]
+    assert [role.kind for _, role in built.volumes] == ["part", "negative volume"]
 
 
 def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -> None:

@@ -3,13 +3,13 @@ from collections.abc import Sequence
 import pytest
 
 from mdp.learning.command import run
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 
 @pytest.mark.parametrize(
     ("wrong", "code", "sentence"),
     [
-        (LearningError("record a: is torn"), 1, "error: record a: is torn\n"),
+        (UserError("record a: is torn"), 1, "error: record a: is torn\n"),
         (ModuleNotFoundError("no", name="torch"), 1, "error: torch is not installed; in a clone: pip install -e '.[train]'\n"),
         (KeyboardInterrupt(), 130, "interrupted; begin anew\n"),
     ],

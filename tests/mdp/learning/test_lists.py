@@ -7,7 +7,7 @@ import pytest
 from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists, scale
 from mdp.learning.sources import FOLDS, Side, side
 from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
-from profiles.errors import LearningError
+from profiles.errors import UserError
 from tests.mdp.learning.records import write_record
 
 OUTCOME = np.array([0.5, np.nan, 0.3, 0.2])
@@ -30,9 +30,9 @@ def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
     for name in ("a.0.paper.npz", "a.0.ours.npz", "b.1.paper.npz"):
         write_record(tmp_path / name, OUTCOME)
     assert [entry.model for entry in read_lists(tmp_path, terms=("paper",))] == ["a", "b"]
-    with pytest.raises(LearningError, match=r"holds no record \(\*\.yours\.npz\)"):
+    with pytest.raises(UserError, match=r"holds no record \(\*\.yours\.npz\)"):
         read_lists(tmp_path, terms=("paper", "yours"))
-    with pytest.raises(LearningError, match=r"holds no record \(\*\.\*\*\.npz\)"):
+    with pytest.raises(UserError, match=r"holds no record \(\*\.\*\*\.npz\)"):
         read_lists(tmp_path, terms=("**",))
 
 
@@ -110,15 +110,15 @@ def test_a_list_is_on_the_side_of_its_source(tmp_path: Path) -> None:
 )
 def test_a_record_that_cannot_be_learnt_from_is_refused(tmp_path: Path, others: dict[str, object], sentence: str) -> None:
     write_record(tmp_path / "kitten.0.x.npz", **({"outcome": OUTCOME} | others))
-    with pytest.raises(LearningError, match=re.escape(sentence)):
+    with pytest.raises(UserError, match=re.escape(sentence)):
         read_lists(tmp_path)
 
 
 def test_what_is_no_record_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(LearningError, match="holds no record"):
+    with pytest.raises(UserError, match="holds no record"):
         read_lists(tmp_path)
     (tmp_path / "a.npz").write_bytes(b"PK torn")
-    with pytest.raises(LearningError, match=r"record .*a\.npz: cannot be read"):
+    with pytest.raises(UserError, match=r"record .*a\.npz: cannot be read"):
         read_lists(tmp_path)
 
 
@@ -126,10 +126,10 @@ def test_a_model_that_the_manifest_does_not_know_and_a_manifest_without_sources_
     write_record(tmp_path / "a.0.x.npz", OUTCOME)
     manifest = tmp_path / "manifest.csv"
     manifest.write_text("id,source_repo,source_path\nb,me/things,b.stl\n")
-    with pytest.raises(LearningError, match="its model a is not in"):
+    with pytest.raises(UserError, match="its model a is not in"):
         read_lists(tmp_path, manifest)
     manifest.write_text("id,faces\na,12\n")
-    with pytest.raises(LearningError, match="has no column source_repo, source_path"):
+    with pytest.raises(UserError, match="has no column source_repo, source_path"):
         read_lists(tmp_path, manifest)
 
 

@@ -18,7 +18,7 @@ from mdp.mesh import Floats
 from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
 from mdp.ranking.ranker import Network as SearchNetwork
 from mdp.ranking.ranker import ranker_named
-from profiles.errors import LearningError
+from profiles.errors import UserError
 from tests.mdp.learning.records import drawn_list
 
 pytestmark = pytest.mark.train
@@ -162,5 +162,5 @@ def test_the_file_says_what_it_is(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_is_told_in_a_sentence(tmp_path: Path) -> None:
-    with pytest.raises(LearningError, match="cannot be written"):
+    with pytest.raises(UserError, match="cannot be written"):
         write(tmp_path / "nowhere" / "ranker.onnx", b"")

@@ -12,7 +12,7 @@ from mdp.learning.index import INDEX, Row, Search, read_index, summary, unfinish
 from mdp.learning.models import coarser, model_files, oriented, read_model
 from mdp.learning.task import Settings, run
 from mdp.mesh import Mesh
-from profiles.errors import LearningError, MeshError
+from profiles.errors import MeshError, UserError
 from profiles.profile import load
 from tests import shapes
 
@@ -84,7 +84,7 @@ def test_an_npz_without_faces_is_refused_by_name(tmp_path: Path) -> None:
 def test_models_whose_records_would_have_one_name_are_refused(tmp_path: Path) -> None:
     for name in ("a.b.npz", "a_b.stl"):
         (tmp_path / name).touch()
-    with pytest.raises(LearningError, match=r"a\.b\.npz and a_b\.stl would have the same records"):
+    with pytest.raises(UserError, match=r"a\.b\.npz and a_b\.stl would have the same records"):
         model_files(tmp_path)
 
 

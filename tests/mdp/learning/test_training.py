@@ -7,7 +7,7 @@ torch = pytest.importorskip("torch", reason="the extra `train` is not installed"
 from mdp.learning.networks import PaperNetwork
 from mdp.learning.training import Epoch, Schedule, train
 from mdp.ranking.features import PAPER_COLUMNS
-from profiles.errors import LearningError
+from profiles.errors import UserError
 from tests.mdp.learning.records import drawn_list
 
 pytestmark = pytest.mark.train
@@ -47,5 +47,5 @@ def test_a_training_stops_when_nothing_gets_better_and_keeps_the_best_network() 
 
 
 def test_lists_of_one_candidate_are_no_lists_to_train_with() -> None:
-    with pytest.raises(LearningError, match="no list to validate with"):
+    with pytest.raises(UserError, match="no list to validate with"):
         train(small(), PAPER_COLUMNS, (LISTS[0], [drawn_list(1, 1)]), SHORT)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdp.learning.widths import Search, compare, read_searches, table
-from profiles.errors import LearningError
+from profiles.errors import UserError
 
 HEAD = "mesh,settings,method,width,risky_mm2,share,core_s,error"
 
@@ -79,22 +79,22 @@ def test_ranker_files_of_the_same_name_count_as_one_ranker(tmp_path: Path) -> No
 
 def test_a_file_that_is_no_table_of_searches_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "widths.csv"
-    with pytest.raises(LearningError, match="cannot be read"):
+    with pytest.raises(UserError, match="cannot be read"):
         read_searches(file)
     file.write_text("mesh,share\na,1\n")
-    with pytest.raises(LearningError, match="has no column settings, method, width, core_s"):
+    with pytest.raises(UserError, match="has no column settings, method, width, core_s"):
         read_searches(file)
     for figures in ("wide,9,0.5,2", "1,9,nan,2", "1,9,0.5,inf", "1,9"):
         file.write_text(f"{HEAD}\na,s,best,{figures},\n")
-        with pytest.raises(LearningError, match="cannot be read"):
+        with pytest.raises(UserError, match="cannot be read"):
             read_searches(file)
     file.write_text(f"{HEAD}\n")
     assert not read_searches(file)
     file.write_text("")
-    with pytest.raises(LearningError, match="has no column mesh, settings"):
+    with pytest.raises(UserError, match="has no column mesh, settings"):
         read_searches(file)
 
 
 def test_a_model_that_one_ranker_searched_twice_is_named() -> None:
-    with pytest.raises(LearningError, match="a was searched twice with learned at width 2"):
+    with pytest.raises(UserError, match="a was searched twice with learned at width 2"):
         compare([search("a", "learned", 2, 0.5), search("a", "learned", 1, 0.5), search("a", "learned", 2, 0.4)])

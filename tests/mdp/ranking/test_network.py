@@ -16,7 +16,7 @@ from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, sho
 from mdp.search.beam import Beam, search_as_published
 from mdp.search.problem import Problem
 from mdp.search.search import SearchRequest, decompose
-from profiles.errors import RankerError
+from profiles.errors import UserError
 from profiles.profile import load
 from tests import shapes
 
@@ -154,7 +154,7 @@ def test_where_nothing_on_the_shortlist_can_be_cut_the_next_candidates_are_taken
 
 
 def test_a_name_that_is_no_ranker_is_told_with_those_that_are() -> None:
-    with pytest.raises(RankerError, match=r"--ranker oracle: classic, learned or the name of an \.onnx file is allowed"):
+    with pytest.raises(UserError, match=r"--ranker oracle: classic, learned or the name of an \.onnx file is allowed"):
         ranker_named("oracle")
 
 
@@ -168,13 +168,13 @@ def test_a_missing_a_foreign_and_a_truncated_file_are_a_sentence(
     file = tmp_path / "mine.onnx"
     if content is not None:
         file.write_bytes(shipped().file.read_bytes()[:content] if isinstance(content, int) else content)
-    with pytest.raises(RankerError, match=rf"^ranker \S+mine\.onnx: {sentence}[^\n]*$"):
+    with pytest.raises(UserError, match=rf"^ranker \S+mine\.onnx: {sentence}[^\n]*$"):
         ranker_named(str(file))
 
 
 def test_candidates_without_a_number_are_a_sentence() -> None:
     rows = np.full((2, len(shipped().columns)), np.nan)
-    with pytest.raises(RankerError, match="gives no number for each of 2 candidates"):
+    with pytest.raises(UserError, match="gives no number for each of 2 candidates"):
         shipped().scores(rows)
 
 
@@ -202,7 +202,7 @@ def test_a_network_with_other_names_or_another_shape_is_a_sentence(
     helper.set_model_props(model, {"features": ",".join(columns)})
     file = tmp_path / "other.onnx"
     file.write_bytes(model.SerializeToString())
-    with pytest.raises(RankerError, match=sentence):
+    with pytest.raises(UserError, match=sentence):
         ranker_named(str(file))
 
 

@@ -22,7 +22,7 @@ from mdp.ranking.features import COLUMNS
 from mdp.search.front import Front, Price
 from mdp.search.parts import folded_mm3
 from mdp.search.search import Progress, SearchRequest, decompose
-from profiles.errors import DecompositionError
+from profiles.errors import UserError
 from profiles.profile import load
 from tests import shapes
 from tests.checks import assert_closed
@@ -227,7 +227,7 @@ def test_space_that_a_fold_winds_around_twice_is_reported_and_no_other_differenc
     assert folded_mm3(folded, decomposition.parts) == pytest.approx(0.4)
     allowed = Decomposition(**vars(decomposition) | {"mesh": folded, "folded_mm3": 0.4001})
     assert allowed.volume_mm3 == pytest.approx(decomposition.volume_mm3)
-    with pytest.raises(DecompositionError, match="add up to"):
+    with pytest.raises(UserError, match="add up to"):
         Decomposition(**vars(decomposition) | {"mesh": folded})
 
 
@@ -235,7 +235,7 @@ def test_swapped_parts_are_refused() -> None:
     decomposition = _found("branch")
     swapped = [decomposition.parts[1], decomposition.parts[0]]
     fields = vars(decomposition) | {"parts": tuple(swapped)}
-    with pytest.raises(DecompositionError, match="stands at place 1"):
+    with pytest.raises(UserError, match="stands at place 1"):
         Decomposition(**fields)
 
 

@@ -65,7 +65,7 @@ class Found:
 
 
 def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
-    """What a search as `decompose` makes it has found. Raises RankerError."""
+    """What a search as `decompose` makes it has found. Raises UserError."""
     ranker_named(way.ranker)
     assert bench.model is not None
     tell(Searched(f"reading {bench.model.faces:,} faces"))

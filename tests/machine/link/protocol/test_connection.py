@@ -29,7 +29,7 @@ from machine.link.protocol.states import State
 from machine.link.protocol.timeout import Timing
 from machine.link.protocol.verdict import SYNC_TRIES
 from machine.link.protocol.window import HISTORY
-from profiles.errors import FirmwareError, LocalProtocolError, RemoteProtocolError, SilenceError
+from profiles.errors import FirmwareError, LocalProtocolError, PrinterError, SilenceError
 
 PATIENT = Timing(stall_s=4.0, stall_mute_s=30.0, sync_s=3.0, drain_s=0.5, quiet_s=0.12)
 HELLO = b"N1 M115*39\n"
@@ -381,7 +381,7 @@ def test_a_resend_of_an_impossible_line_is_an_error_when_it_is_repeated(number: 
     table.say(b"Resend: %d\nok\n" % asked)
     assert table.connection.fault is None
     table.say(b"Resend: %d\nok\n" % asked)
-    assert isinstance(table.connection.fault, RemoteProtocolError)
+    assert isinstance(table.connection.fault, PrinterError)
 
 
 def test_a_single_damaged_resend_number_does_no_harm() -> None:
@@ -401,7 +401,7 @@ def test_a_single_damaged_resend_number_does_no_harm() -> None:
     (b"start\n", State.LOST, FirmwareError),
     (b"Error:Thermal Runaway, system stopped! Heater_ID: 0\nok\n", State.HALTED, FirmwareError),
     (b"!! Lost communication with MCU\nok\n", State.HALTED, FirmwareError),
-    (b"ok P15 B3\n", State.LOST, RemoteProtocolError),
+    (b"ok P15 B3\n", State.LOST, PrinterError),
 ])  # fmt: skip
 def test_fatal_words_end_the_conversation(size: int, said: bytes, state: State, error: type[Exception]) -> None:
     table = opened(size)
@@ -466,7 +466,7 @@ def test_a_line_without_answer_is_never_repeated_to_a_firmware_that_asks_for_non
     table.wait(4.1)
     assert table.wire() == frame(4, "M105")
     table.say(b"ok T:20.00 /0.00\n")
-    assert isinstance(table.connection.fault, RemoteProtocolError)
+    assert isinstance(table.connection.fault, PrinterError)
     assert "line 3 (G1 X7) was not answered" in str(table.connection.fault)
 
 
