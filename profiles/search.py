@@ -1,20 +1,20 @@
 """The search: how the parts of a model are looked for; a table of a process profile."""
 
-from typing import Literal
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
 
 from profiles.frozen import Frozen, advanced, rare, simple
+from profiles.toml_text import read_toml
 
-PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
-OF_SCARS = {"seam_mm": 0.0, "nozzle_load_n": 0.0, "single_limb": False}  # what the paper's terms do not know
-OF_SEAMS = {
-    "cut_mm2": 0.0,
-    "second_mm2": 0.0,
-    "metre_mm2": 0.0,
-    "hidden_seam_share": 1.0,
-    "stair_weight": 0.0,
-    "feature_weight": 1.0,
-    "feature_mm2": 0.0,
-}
+
+@cache
+def _mode(name: str) -> dict[str, Any]:
+    """The settings that hold in a mode of the search, with those of the mode that it inherits."""
+    file = resources.files("profiles") / "searches" / f"{name}.toml"
+    document = read_toml(file.read_text(encoding="utf-8"))
+    below = _mode(document["inherits"]) if "inherits" in document else {}
+    return {**below, **document["search"]}
 
 
 class Search(Frozen):
@@ -159,7 +159,8 @@ class Search(Frozen):
         >>> Search(objective="risky").effective.cut_mm2
         0.0
         """
-        published = PUBLISHED if self.method == "published" else {}
-        paper = OF_SCARS if published or self.objective == "risky" else {}
-        free = OF_SEAMS if paper or self.seam_mm == 0.0 else {}
-        return self.model_copy(update={**published, **paper, **free})
+        if self.method == "published":
+            return self.model_copy(update=_mode("published"))
+        if self.objective == "risky":
+            return self.model_copy(update=_mode("risky"))
+        return self.model_copy(update=_mode("seamless")) if self.seam_mm == 0.0 else self

@@ -117,7 +117,7 @@ def test_a_module_imports_only_from_its_left_and_third_parties_only_where_they_b
         ("mdp/a.py", "def late():\n    from machine import gcode", 1),
         ("profiles/a.py", "import mdp.mesh, pydantic", 1),
         ("slicer/a.py", "import trimesh.repair", 1),
-        ("mdp/formats/off.py", "import trimesh", 1),
+        ("mdp/formats/ply.py", "import trimesh", 1),
         ("mdp/formats/scene.py", "import trimesh", 0),
         ("machine/link/port.py", "import serial", 0),
         ("machine/link/stream.py", "import serial", 1),

@@ -37,8 +37,8 @@ READERS: dict[str, Reader] = {
     suffix: partial(_read, module)
     for suffix, module in {
         ".stl": "stl",
-        ".obj": "obj",
-        ".off": "off",
+        ".obj": "polygons",
+        ".off": "polygons",
         ".ply": "ply",
         ".3mf": "threemf",
         ".glb": "glb",

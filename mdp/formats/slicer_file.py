@@ -7,13 +7,16 @@ OrcaSlicer have a component for each and say in model_settings.config what it is
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import isfinite, nan
 from xml.etree.ElementTree import Element
 
-from mdp.formats.painted import AGAINST, FOR
 from mdp.formats.surface import Surface
 
 PART, NEGATIVE, MODIFIER, SUPPORT, NO_SUPPORT = "part", "negative volume", "modifier", "support enforcer", "support blocker"
+FOR, AGAINST = 1, 2  # paints; 0: none
+CHILDREN = ((), (0.5, 0.5), (0.25, 0.25, 0.5), (0.25, 0.25, 0.25, 0.25))  # shares of the area, by how many sides are halved
+LONG = 3  # as a paint: the next digit tells which
 # Kinds that are triangles of a part, by what they are painted for and with which paint.
 PAINT_SUPPORT, PAINT_NO_SUPPORT, PAINT_NO_SEAM = "paint for support", "paint against support", "paint against seams"
 PAINTS = {("support", FOR): PAINT_SUPPORT, ("support", AGAINST): PAINT_NO_SUPPORT, ("seams", AGAINST): PAINT_NO_SEAM}
@@ -185,3 +188,33 @@ def _settings(values: Mapping[str, str]) -> dict[str, str]:
         for key, text in values.items()
         if key and key not in ABOUT and not key.startswith(ABOUT_PREFIXES) and text not in ONE_EXTRUDER.get(key, ())
     }
+
+
+@lru_cache(maxsize=4096)  # most triangles are painted whole
+def painted_shares(digits: str) -> Mapping[int, float]:
+    """The share of a triangle's area by its paint, where a brush covers it in part.
+
+    Hexadecimal digits, read from the last, walk a tree of triangles. A digit's lower two bits tell how many sides are halved.
+    Where none is, its upper two bits are the paint, and 3 there adds 3 to the next digit. Children follow, the last one first
+    (PrusaSlicer, src/libslic3r/TriangleSelector.cpp, Model.cpp: FacetsAnnotation). Raises ValueError for digits that are no such
+    tree.
+    """
+    shares, pending, codes = dict[int, float](), [1.0], [int(digit, 16) for digit in digits]
+    while pending:
+        share, code = pending.pop(), _next(codes)
+        sides, paint = code & 3, code >> 2
+        if sides:
+            pending += [share * part for part in CHILDREN[sides]]
+        else:
+            paint = LONG + _next(codes) if paint == LONG else paint
+            shares[paint] = shares.get(paint, 0.0) + share
+    if codes:
+        raise ValueError(f"{len(codes)} of the digits belong to nothing")
+    return shares
+
+
+def _next(codes: list[int]) -> int:
+    """The last of the digits that are left."""
+    if not codes:
+        raise ValueError("digits are missing")
+    return codes.pop()

@@ -12,7 +12,6 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from mdp.formats.painted import painted_shares
 from mdp.formats.slicer_file import (
     PAINTS,
     PART,
@@ -21,6 +20,7 @@ from mdp.formats.slicer_file import (
     Heights,
     Plate,
     Role,
+    painted_shares,
     read_bambu,
     read_cura,
     read_heights,

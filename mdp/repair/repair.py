@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdp.formats.surface import Surface, concatenate
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from mdp.repair.holes import fill_holes
-from mdp.repair.overlap import overlaps_itself, resolve_overlap
 from mdp.repair.sheets import cancel_opposite_faces, drop_duplicate_faces, drop_loose_sheets
 from mdp.repair.shells import (
     FLAT_SHEETS,
@@ -39,6 +38,10 @@ SHRINK = 0.01  # of the model's size: what a repair may take off its box
 SAME_VOLUME = 1e-5  # share that two readings of one surface may differ by: float32 files move corners by 6e-8 of a size
 MOST_CHANGED = 0.01  # of the volume: what the reading of edges that many faces share may change
 MOST_READINGS = 5  # each pairs edges anew; a surface that has not settled by then is judged by what it is
+SECTIONS = 23  # an overlap missed by all of them reaches over less than a 24th of the height
+EXCESS = 1e-3  # of the area of all sections; folds of less are left alone, since mending them would re-triangulate the model
+DEEPEST, TOGETHER = 5, 8  # halvings, and pieces that are united at once
+LEAST_MOST, MOST_GROWTH = 1000, 2  # faces that a union may have, and for each face of its pieces
 SHARED = 0.5  # of the volume: a body that counts half of itself twice is not understood
 
 
@@ -76,7 +79,7 @@ def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
     solid, whole = _read_as_solid(solid, notes)
     if whole.volume() <= 0:
         raise MeshError(f"encloses no volume: {FLAT_SHEETS}")
-    return (_count_once(solid, whole, notes) if overlaps_itself(whole) else solid), notes
+    return (_count_once(solid, whole, notes) if _overlaps_itself(whole) else solid), notes
 
 
 def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
@@ -119,7 +122,7 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
 def _count_once(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surface:
     """The solid without what it counts twice; as it is when that cannot be told apart."""
     mended = resolve_overlap(whole)
-    left = mended is None or any(overlaps_itself(piece) for piece in mended.decompose())
+    left = mended is None or any(_overlaps_itself(piece) for piece in mended.decompose())
     shared_mm3 = 0.0 if mended is None else whole.volume() - mended.volume()
     if mended is None or left or not 0 < shared_mm3 < SHARED * whole.volume():
         notes.append("left a body that passes through itself as it is: some of its volume may count twice")
@@ -212,3 +215,65 @@ def _unite_shells(closed: list[Surface], size: float, notes: list[str]) -> Surfa
 def _note(notes: list[str], count: int, text: str, endings: tuple[str, str] = ("", "s")) -> None:
     if count:
         notes.append(text.format(count, endings[count != 1]))
+
+
+def _overlaps_itself(solid: "m3.Manifold") -> bool:
+    """Whether the horizontal sections of the solid have less area than their outlines wind around."""
+    mesh = solid.to_mesh64()
+    vertices, faces = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+    _, _, low, _, _, high = solid.bounding_box()
+    # Odd fractions of the height, since models are made in steps that even ones would hit.
+    heights = (low + (np.arange(1, SECTIONS + 1) - 0.0137) * (high - low) / (SECTIONS + 1)).tolist()
+    wound = sum(_section_area(vertices, faces, height) for height in heights)
+    return bool(wound - sum(solid.slice(height).area() for height in heights) > EXCESS * wound)
+
+
+def _section_area(vertices: Floats, faces: Indices, height: float) -> float:
+    """Area of a section at a height, every region as often as the outline winds around it: Green's theorem over the cut faces."""
+    above = vertices[:, 2] > height
+    sides = above[faces]
+    cut = faces[sides.any(axis=1) & ~sides.all(axis=1)]
+    origin = vertices.mean(axis=0)[:2]
+    ends: list[Floats] = []
+    for rising in (False, True):
+        point = np.zeros((len(cut), 2))
+        for k in range(3):
+            p, q = cut[:, k], cut[:, (k + 1) % 3]
+            here = (above[q] if rising else above[p]) & ~(above[p] if rising else above[q])
+            run = ((height - vertices[p, 2]) / np.where(here, vertices[q, 2] - vertices[p, 2], 1.0))[:, None]
+            point = np.where(here[:, None], vertices[p, :2] + run * (vertices[q, :2] - vertices[p, :2]) - origin, point)
+        ends.append(point)
+    start, end = ends
+    return abs(0.5 * float((start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum()))
+
+
+def resolve_overlap(solid: "m3.Manifold") -> "m3.Manifold | None":
+    """The solid with every point counted once; None for one so tangled that its union would have many times its faces.
+
+    Halved across its longest side until no piece overlaps itself: pieces that were one body far along the surface
+    are bodies of their own then, and their union counts nothing twice.
+    """
+    return _united(solid, 0)
+
+
+def _united(solid: "m3.Manifold", depth: int) -> "m3.Manifold | None":
+    import manifold3d as m3
+
+    whole: list[m3.Manifold] = []
+    for piece in solid.decompose():
+        if depth == DEEPEST or not _overlaps_itself(piece):
+            whole.append(piece)
+            continue
+        box = np.array(piece.bounding_box()).reshape(2, 3)
+        normal = np.eye(3)[np.argmax(box[1] - box[0])]
+        for half in piece.split_by_plane(tuple(normal), float(normal @ box.mean(axis=0))):
+            resolved = _united(half, depth + 1)
+            if resolved is None:
+                return None
+            whole.append(resolved)
+    most = LEAST_MOST + MOST_GROWTH * sum(piece.num_tri() for piece in whole)
+    while len(whole) > 1:  # few at a time: the union of what crosses everywhere is noticed before it fills the memory
+        whole = [m3.Manifold.batch_boolean(whole[k : k + TOGETHER], m3.OpType.Add) for k in range(0, len(whole), TOGETHER)]
+        if sum(piece.num_tri() for piece in whole) > most:
+            return None
+    return whole[0] if whole else m3.Manifold()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdp.formats.painted import painted_shares
+from mdp.formats.slicer_file import painted_shares
 from mdp.mesh import Floats
 
 

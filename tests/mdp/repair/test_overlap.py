@@ -3,7 +3,7 @@
 import manifold3d as m3
 import numpy as np
 
-from mdp.repair.overlap import resolve_overlap
+from mdp.repair.repair import resolve_overlap
 
 
 def test_a_body_tangled_everywhere_is_given_up_before_its_union_fills_the_memory() -> None:
