@@ -55,10 +55,11 @@ UNITS = (  # what the names of keys end with -> how a page shows the unit
 
 
 def _key(level: str, title: str, synonyms: str = "", **allowed: Any) -> Callable[[Any, str], Any]:
-    """A key that takes its default (...: none) and its meaning, mm and the like included, in a second call.
+    """A key of a profile, whose default (`...` where it has none) and meaning are the arguments of what is returned.
 
-    level: who needs it; title: in its place on a page; synonyms: words of other slicers that neither title nor key has; allowed:
-    what pydantic's Field takes to restrict values.
+    Two calls keep a key within a few lines: in one call each argument would have a line of its own. level: who needs the key;
+    title: what a page calls it; synonyms: words of other slicers that neither title nor key has; allowed: what pydantic's Field
+    takes to restrict values.
     """
 
     def field(default: Any, description: str) -> Any:
