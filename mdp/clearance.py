@@ -15,7 +15,6 @@ the two surfaces. Both are divided into triangles so small that the slack covers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot
-from typing import NamedTuple
 
 import numpy as np
 
@@ -36,18 +35,14 @@ Share = tuple[int, int]
 MOST_TRIED = 1000  # corners per surface for the first, quick test
 
 
-class LowestBody(NamedTuple):
-    """The body of the head that asks for the greatest height of the tip above the table, clearance included, and its point that
-    comes nearest to the table, from the tip in the machine frame, mm."""
-
-    needed_mm: float
-    name: str
-    point_mm: Vector
+# The body of the head that asks for the greatest height of the tip above the table: that height, clearance included, its name,
+# and its point that comes nearest to the table, from the tip in the machine frame, mm.
+LowestBody = tuple[float, str, Vector]
 
 
 def least_tip_height_mm(machine: Machine, pose: Pose) -> float:
     """Least height of the tip above the table's plane at a pose; 0 at a level table."""
-    return lowest_body(machine, pose).needed_mm
+    return lowest_body(machine, pose)[0]
 
 
 def lowest_body(machine: Machine, pose: Pose) -> LowestBody:
@@ -55,19 +50,19 @@ def lowest_body(machine: Machine, pose: Pose) -> LowestBody:
     normal = rotation(machine, pose) @ UP
     across, along = hypot(normal[0], normal[1]), float(normal[2])
     if across < 1e-9:
-        return LowestBody(0.0, "nozzle tip", (0.0, 0.0, 0.0))
+        return 0.0, "nozzle tip", (0.0, 0.0, 0.0)
     aside = -normal[:2] / across
     needed: list[LowestBody] = []
     for radius, height in machine.head.silhouette_mm:
         point = float(radius * aside[0]), float(radius * aside[1]), float(height)
-        needed.append(LowestBody(radius * across - height * along, "hot end", point))
+        needed.append((radius * across - height * along, "hot end", point))
     for box in machine.head.boxes:
         points = corners(box.min_mm, box.max_mm)
         heights = points @ normal
         x, y, z = (float(value) for value in points[int(np.argmin(heights))])
-        needed.append(LowestBody(float(-heights.min()), box.name, (x, y, z)))
-    lowest = max(needed)
-    return lowest._replace(needed_mm=max(0.0, lowest.needed_mm + machine.clearance_mm))
+        needed.append((float(-heights.min()), box.name, (x, y, z)))
+    needed_mm, name, point_mm = max(needed)
+    return max(0.0, needed_mm + machine.clearance_mm), name, point_mm
 
 
 def least_height_mm(machine: Machine, direction: Floats) -> float:
@@ -116,18 +111,17 @@ def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str,
 @dataclass(frozen=True, eq=False)
 class Standing:
     """What stands beside a limb, and the head that must pass it. points_mm (k, 3): x, y and top of each printed column in the
-    part's frame, highest first; slack_mm: how far a column may extend beyond its point; clearance_mm: the distance to keep."""
+    part's frame, highest first; slack_mm: how far a column may extend beyond its point."""
 
     points_mm: Floats
     slack_mm: float
     head: Head
-    clearance_mm: float
 
     @classmethod
     def of(cls, points_mm: Floats, slack_mm: float, machine: Machine) -> "Standing":
         """The standing columns for (k, 3) points of the part's frame."""
         highest_first = np.argsort(-points_mm[:, 2], kind="stable")
-        return cls(np.ascontiguousarray(points_mm[highest_first]), slack_mm, head_of(machine), machine.clearance_mm)
+        return cls(np.ascontiguousarray(points_mm[highest_first]), slack_mm, head_of(machine))
 
     def least_tip_mm(self, places_mm: Floats, known_mm: float = NOTHING) -> Floats:
         """(n,) the lowest safe heights of the tip at (n, 2) places; NOTHING where any height is safe.
@@ -135,8 +129,7 @@ class Standing:
         known_mm: a height that the tip has anyway; results at or below it may come out too low.
         """
         count = int(np.searchsorted(-self.points_mm[:, 2], self.slack_mm - known_mm))
-        places, points = np.ascontiguousarray(places_mm), self.points_mm[:count]
-        return _least_tip(places, points, self.slack_mm, self.head, self.clearance_mm)
+        return _least_tip(np.ascontiguousarray(places_mm), self.points_mm[:count], self.slack_mm, self.head)
 
 
 def highest_in_cells(points_mm: Floats, cell_mm: float) -> Floats:
@@ -155,14 +148,14 @@ def _per_cell(places: Floats, heights: Floats, cell_mm: float, extreme: np.ufunc
 
 
 @no_nrt
-def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head, clearance: float) -> float:
+def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head) -> float:
     """The lowest safe height of the tip beside a column that ends at `top`. square: of the distance to its point; beyond: how
     much nearer the column may be."""
     widest = head.silhouette[len(head.silhouette) - 1, 0] + beyond
     if square > widest * widest:
         return NOTHING
     under = lowest_of_hot_end(max(np.sqrt(square) - beyond, 0.0), head.silhouette)
-    return float(top - max(under - clearance, 0.0))
+    return float(top - max(under - head.clearance_mm, 0.0))
 
 
 @no_nrt
@@ -173,8 +166,8 @@ def _is_under(box: Floats, across: float, along: float, beyond: float) -> bool:
 
 
 @kernel
-def _least_tip(places: Floats, points: Floats, slack: float, head: Head, clearance: float) -> Floats:
-    least, beyond = floats(len(places), NOTHING), slack + clearance
+def _least_tip(places: Floats, points: Floats, slack: float, head: Head) -> Floats:
+    least, beyond = floats(len(places), NOTHING), slack + head.clearance_mm
     for i in range(len(places)):
         for j in range(len(points)):
             top = points[j, 2] + slack
@@ -182,58 +175,54 @@ def _least_tip(places: Floats, points: Floats, slack: float, head: Head, clearan
                 break
             across, along = points[j, 0] - places[i, 0], points[j, 1] - places[i, 1]
             square = across * across + along * along
-            least[i] = max(least[i], _asked_by_hot_end(square, top, beyond, head, clearance))
+            least[i] = max(least[i], _asked_by_hot_end(square, top, beyond, head))
             for k in range(len(head.boxes)):
                 if _is_under(head.boxes[k], across, along, beyond):
-                    least[i] = max(least[i], top - max(head.boxes[k, 2] - clearance, 0.0))
+                    least[i] = max(least[i], top - max(head.boxes[k, 2] - head.clearance_mm, 0.0))
     return least
 
 
-@dataclass(frozen=True, eq=False)
-class _Meeting:
-    """A head that prints a limb. around_mm (2, 3): the bounding box of the limb, where the tip goes."""
-
-    head: Head
-    clearance_mm: float
-    around_mm: Floats
-
-    def within_reach(self, points: Floats, slack_mm: float) -> Mask:
-        """(j,) which of (j, 3) standing points the head might hit with the tip on the limb's base plane in its bounding box."""
-        outside = np.maximum(np.maximum(self.around_mm[0] - points, points - self.around_mm[1]), 0.0)
-        boxes, beyond = self.head.boxes, slack_mm + self.clearance_mm
-        low, high = self.around_mm[0, :2] + boxes[:, :2] - beyond, self.around_mm[1, :2] + boxes[:, 3:5] + beyond
-        under = np.all((points[:, None, :2] >= low) & (points[:, None, :2] <= high), axis=2)
-        met = under & (points[:, None, 2] > np.maximum(boxes[:, 2] - self.clearance_mm, 0.0))
-        squares, tops = (outside[:, :2] ** 2).sum(axis=1), np.ascontiguousarray(points[:, 2])
-        reached: Mask = _under_hot_end(squares, tops, beyond, self.head, self.clearance_mm) | met.any(axis=1)
-        return reached
-
-    def close(self, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
-        """(i,) which tips may make the head hit any of (j, 3) standing points, and (j,) which of those points are hit.
-
-        The tips lie on the limb's surface only. Extending every box to the nozzle makes the outline the worst case inside the
-        limb, too; a box is tested only against points that it can reach from somewhere in the limb's bounding box.
-        """
-        boxes, beyond = self.head.boxes, slack_mm + self.clearance_mm
-        low, high = self.around_mm[0, :2] + boxes[:, :2] - beyond, self.around_mm[1, :2] + boxes[:, 3:5] + beyond
-        places = points[:, None, :2]
-        reached: Mask = np.all((places >= low) & (places <= high), axis=2)
-        wide = boxes.copy()
-        wide[:, :2], wide[:, 3:5] = np.minimum(boxes[:, :2], 0.0), np.maximum(boxes[:, 3:5], 0.0)
-        return _find_close(tips, points, slack_mm, Head(self.head.silhouette, wide), self.clearance_mm, reached)
+def _within_reach(head: Head, around_mm: Floats, points: Floats, slack_mm: float) -> Mask:
+    """(j,) which of (j, 3) standing points the head might hit with the tip on a limb's base plane in its bounding box, (2, 3)."""
+    outside = np.maximum(np.maximum(around_mm[0] - points, points - around_mm[1]), 0.0)
+    met = _under_boxes(head, around_mm, points, slack_mm)
+    met &= points[:, None, 2] > np.maximum(head.boxes[:, 2] - head.clearance_mm, 0.0)
+    squares, tops = (outside[:, :2] ** 2).sum(axis=1), np.ascontiguousarray(points[:, 2])
+    reached: Mask = _under_hot_end(squares, tops, slack_mm + head.clearance_mm, head) | met.any(axis=1)
+    return reached
 
 
-def passes_clear(
-    machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float, cells_mm: Sequence[float] = CELLS_MM
-) -> bool:
-    """Whether the head clears everything that stands while a limb is printed.
+def _under_boxes(head: Head, around_mm: Floats, points: Floats, slack_mm: float) -> Mask:
+    """(j, b) which of (j, 3) points lie under which box of the head, the tip somewhere in a box around a limb."""
+    boxes, beyond = head.boxes, slack_mm + head.clearance_mm
+    low, high = around_mm[0, :2] + boxes[:, :2] - beyond, around_mm[1, :2] + boxes[:, 3:5] + beyond
+    under: Mask = np.all((points[:, None, :2] >= low) & (points[:, None, :2] <= high), axis=2)
+    return under
 
-    limb, standing: (m, 3, 3) corners of the faces of both surfaces in the workpiece frame; base_mm: the base plane's offset.
+
+def _close(head: Head, around_mm: Floats, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
+    """(i,) which tips may make the head hit any of (j, 3) standing points, and (j,) which of those points are hit.
+
+    The tips lie on the limb's surface only. Extending every box to the nozzle makes the outline the worst case inside the limb,
+    too; a box is tested only against points that it can reach from somewhere in the limb's bounding box, around_mm (2, 3).
+    """
+    wide = head.boxes.copy()
+    wide[:, :2], wide[:, 3:5] = np.minimum(head.boxes[:, :2], 0.0), np.maximum(head.boxes[:, 3:5], 0.0)
+    return _find_close(tips, points, slack_mm, head._replace(boxes=wide), _under_boxes(head, around_mm, points, slack_mm))
+
+
+Surfaces = tuple[Floats, Floats]  # (m, 3, 3) corners of the faces of a limb, and of all that stands, in the workpiece frame
+
+
+def passes_clear(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float, cells_mm: Sequence[float] = CELLS_MM) -> bool:
+    """Whether the head clears everything that stands while a limb is printed; base_mm: the offset of the limb's base plane.
+
     Triangles below the base plane are ignored. False also where there are too many triangles to compare, and where the finest of
     cells_mm leaves it in doubt, which is so within five of them.
     """
-    tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
-    if meeting.close(_few(tips), _few(stands), 0.0)[0].any():
+    tips, stands, around_mm = _above_base(machine, pose, surfaces, base_mm)
+    head = head_of(machine)
+    if _close(head, around_mm, _few(tips), _few(stands), 0.0)[0].any():
         return False
     for cell_mm in cells_mm:
         if max(count_divided(corners, cell_mm) for corners in (tips, stands)) > MOST_TRIANGLES:
@@ -244,32 +233,31 @@ def passes_clear(
         low, of_tip = _per_cell(tips[:, 0, :2], np.maximum(tips[:, :, 2], 0.0).min(axis=1), cell_mm, np.minimum)
         high, of_stand = _per_cell(stands[:, 0, :2], stands[:, :, 2].max(axis=1), cell_mm, np.maximum)
         slack_mm = hypot(cell_mm, cell_mm) + 2.0 * cell_mm  # two half diagonals of cells and two edges of triangles
-        near = meeting.within_reach(high, slack_mm)
+        near = _within_reach(head, around_mm, high, slack_mm)
         if len(low) * int(near.sum()) > MOST_PAIRS:
             return False
         close_stands = np.zeros(len(high), np.bool_)
-        close_tips, close_stands[near] = meeting.close(low, high[near], slack_mm)
+        close_tips, close_stands[near] = _close(head, around_mm, low, high[near], slack_mm)
         tips, stands = tips[close_tips[of_tip]], stands[close_stands[of_stand]]
     return len(tips) == 0
 
 
-def _meeting(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> tuple[Floats, Floats, _Meeting]:
-    """Both surfaces above the base plane in the part's frame, and the head over the limb."""
+def _above_base(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float) -> tuple[Floats, Floats, Floats]:
+    """Both surfaces above the base plane in the part's frame, and (2, 3) the bounding box of the limb, where the tip goes."""
     turn, down = rotation(machine, pose), np.array([0.0, 0.0, base_mm])
-    tips = _above(np.ascontiguousarray(limb @ turn.T - down))
-    stands = _above(np.ascontiguousarray(standing @ turn.T - down - np.array([0.0, 0.0, EVEN_MM])))
+    tips = _above(np.ascontiguousarray(surfaces[0] @ turn.T - down))
+    stands = _above(np.ascontiguousarray(surfaces[1] @ turn.T - down - np.array([0.0, 0.0, EVEN_MM])))
     places = tips.reshape(-1, 3) if len(tips) else np.zeros((1, 3))
-    around_mm = np.stack([places.min(axis=0), places.max(axis=0)])
-    return tips, stands, _Meeting(head_of(machine), machine.clearance_mm, around_mm)
+    return tips, stands, np.stack([places.min(axis=0), places.max(axis=0)])
 
 
-def places_met(machine: Machine, pose: Pose, limb: Floats, standing: Floats, base_mm: float) -> Floats:
+def places_met(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float) -> Floats:
     """(k, 3) points of what stands that the head certainly hits while a limb is printed, highest first; see passes_clear."""
-    tips, stands, meeting = _meeting(machine, pose, limb, standing, base_mm)
+    tips, stands, around_mm = _above_base(machine, pose, surfaces, base_mm)
     if max(count_divided(corners, CELLS_MM[0]) for corners in (tips, stands)) <= MOST_TRIANGLES:
         tips, stands = (subdivide(corners, CELLS_MM[0]) for corners in (tips, stands))
     points = _few(stands)
-    _, met = meeting.close(_few(tips), points, 0.0)
+    _, met = _close(head_of(machine), around_mm, _few(tips), points, 0.0)
     places: Floats = (np.unique(points[met], axis=0) + np.array([0.0, 0.0, base_mm])) @ rotation(machine, pose)
     return places[np.argsort(-places[:, 2], kind="stable")]
 
@@ -288,18 +276,18 @@ def _few(corners: Floats) -> Floats:
 
 
 @kernel
-def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearance: float, reached: Mask) -> tuple[Mask, Mask]:
-    """See _Meeting.close; reached (j, b): which points each box can reach."""
-    close_tips, close_points, beyond = flags(len(tips)), flags(len(points)), slack + clearance
+def _find_close(tips: Floats, points: Floats, slack: float, head: Head, reached: Mask) -> tuple[Mask, Mask]:
+    """See _close; reached (j, b): which points each box can reach."""
+    close_tips, close_points, beyond = flags(len(tips)), flags(len(points)), slack + head.clearance_mm
     for i in range(len(tips)):
         for j in range(len(points)):
             top = points[j, 2]
             if top <= tips[i, 2]:
                 continue
             across, along = points[j, 0] - tips[i, 0], points[j, 1] - tips[i, 1]
-            meets = _asked_by_hot_end(across * across + along * along, top, beyond, head, clearance) > tips[i, 2]
+            meets = _asked_by_hot_end(across * across + along * along, top, beyond, head) > tips[i, 2]
             for k in range(len(head.boxes)):
-                if reached[j, k] and top - max(head.boxes[k, 2] - clearance, 0.0) > tips[i, 2]:
+                if reached[j, k] and top - max(head.boxes[k, 2] - head.clearance_mm, 0.0) > tips[i, 2]:
                     meets = meets or _is_under(head.boxes[k], across, along, beyond)
             if meets:
                 close_tips[i], close_points[j] = True, True
@@ -307,11 +295,11 @@ def _find_close(tips: Floats, points: Floats, slack: float, head: Head, clearanc
 
 
 @kernel
-def _under_hot_end(squares: Floats, tops: Floats, beyond: float, head: Head, clearance: float) -> Mask:
+def _under_hot_end(squares: Floats, tops: Floats, beyond: float, head: Head) -> Mask:
     """(n,) whether columns at (n,) squared distances from the nearest place of the tip reach the hot end, the tip at height 0."""
     met = flags(len(tops))
     for i in range(len(tops)):
-        met[i] = _asked_by_hot_end(squares[i], tops[i], beyond, head, clearance) > 0.0
+        met[i] = _asked_by_hot_end(squares[i], tops[i], beyond, head) > 0.0
     return met
 
 

@@ -125,7 +125,9 @@ class Decomposition:
     uncut: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
-        self._check_volume()
+        whole, together = self.mesh.volume_mm3, self.volume_mm3
+        if abs(together - whole) > VOLUME_TOLERANCE * whole + self.folded_mm3:
+            raise UserError(f"the parts of {self.name} add up to {together:.6g} mm3, the model has {whole:.6g} mm3")
         self._check_order()
 
     @property
@@ -157,11 +159,6 @@ class Decomposition:
     def volume_mm3(self) -> float:
         """What the parts add up to."""
         return sum(part.volume_mm3 for part in self.parts)
-
-    def _check_volume(self) -> None:
-        whole, together = self.mesh.volume_mm3, self.volume_mm3
-        if abs(together - whole) > VOLUME_TOLERANCE * whole + self.folded_mm3:
-            raise UserError(f"the parts of {self.name} add up to {together:.6g} mm3, the model has {whole:.6g} mm3")
 
     def _check_order(self) -> None:
         """A part lies above its base plane; everything printed before it lies below, unless the part is a limb."""

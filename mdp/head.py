@@ -55,17 +55,18 @@ Body = Ring | Block
 
 
 class Head(NamedTuple):
-    """The head for kernels: (k, 2) radii and heights of the hot end's lowest points, and (j, 6) least and greatest x y z of boxes
-    that go with the tip."""
+    """The head for kernels: (k, 2) radii and heights of the hot end's lowest points, (j, 6) least and greatest x y z of boxes
+    that go with the tip, and the distance to keep."""
 
     silhouette: Floats
     boxes: Floats
+    clearance_mm: float
 
 
 def head_of(machine: Machine) -> Head:
     """The machine's head as the kernels take it."""
     boxes = np.array([[*box.min_mm, *box.max_mm] for box in machine.head.boxes], dtype=np.float64).reshape(-1, 6)
-    return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes)
+    return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes, float(machine.clearance_mm))
 
 
 @no_nrt

@@ -5,7 +5,7 @@ Faces are named by a colour of the model's file or by a point and how far they r
 person's to say: a colour alone marks nothing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from math import cos, radians
@@ -68,7 +68,7 @@ class Zone:
         centre, reach = own @ middle, np.abs(own) @ half
         return np.stack([centre - reach, centre + reach], axis=1)[:, None]
 
-    def touches(self, mesh: Mesh) -> Mask:
+    def faces(self, mesh: Mesh) -> Mask:
         """(m,) which faces reach into the box: no axis of a box, a triangle or two edges parts them (Akenine-Moeller)."""
         middle, half = 0.5 * np.add(self.min_mm, self.max_mm), 0.5 * np.subtract(self.max_mm, self.min_mm)
         places, normals = self.along(mesh.vertices)[mesh.faces] - middle, self.along(mesh.normals)
@@ -79,7 +79,7 @@ class Zone:
         for axis in axes:
             heights, reach = np.einsum("fci,fi->fc", places, axis), np.abs(axis) @ half
             inside &= (heights.min(axis=1) <= reach) & (heights.max(axis=1) >= -reach)
-        return inside if self.room is None else inside & self.room.touches(mesh)
+        return inside if self.room is None else inside & self.room.faces(mesh)
 
 
 @dataclass(frozen=True)
@@ -88,16 +88,24 @@ class Painted:
 
     colour: int
 
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Painted":
+        """The same, for they stay those wherever the model is."""
+        return self
+
+    def faces(self, mesh: Mesh) -> Mask:
+        """(m,) which faces of a mesh they are."""
+        return np.zeros(len(mesh.faces), dtype=np.bool_) if mesh.colours is None else mesh.colours == self.colour
+
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class KeptFaces:
     """Faces of a model by what hangs together: the vertices of each patch, one patch after the other, and where each begins."""
 
     points: Floats
     starts: Indices
 
     @classmethod
-    def of(cls, mesh: Mesh, chosen: Mask) -> "Patches":
+    def of(cls, mesh: Mesh, chosen: Mask) -> "KeptFaces":
         """The chosen (m,) faces of a mesh."""
         faces = mesh.faces[chosen]
         label = vertex_components(len(mesh.vertices), faces)
@@ -199,9 +207,9 @@ class MeshVolume:
         (x0, y0, z0), (x1, y1, z1) = self.mesh.bounds_mm.tolist()
         return Zone((x0, y0, z0), (x1, y1, z1), room=self.room)
 
-    def touches(self, mesh: Mesh) -> Mask:
-        """(m,) which faces reach into the box around it."""
-        return self.box.touches(mesh)
+    def faces(self, mesh: Mesh) -> Mask:
+        """(m,) which faces of a mesh reach into the box around it."""
+        return self.box.faces(mesh)
 
 
 Volume = Zone | MeshVolume
@@ -213,15 +221,6 @@ def in_room(volume: Volume, room: Zone) -> Volume:
 
 
 AnyZone = Zone | MeshVolume | Painted | Grown | Triangles
-
-
-def faces_of(mesh: Mesh, zone: MeshVolume | Painted | Grown | Triangles) -> Mask:
-    """(m,) the faces of a mesh that a zone means."""
-    if isinstance(zone, Grown | Triangles):
-        return zone.faces(mesh)
-    if isinstance(zone, MeshVolume):
-        return zone.touches(mesh)
-    return np.zeros(len(mesh.faces), dtype=np.bool_) if mesh.colours is None else mesh.colours == zone.colour
 
 
 @dataclass(frozen=True)
@@ -253,20 +252,17 @@ class Zones:
 
     def on(self, mesh: Mesh) -> "ZonesOnModel":
         """The zones with the faces that they mean on a model."""
-        keep = tuple(zone if isinstance(zone, Zone) else Patches.of(mesh, faces_of(mesh, zone)) for zone in self.keep)
+        keep = tuple(zone if isinstance(zone, Zone) else KeptFaces.of(mesh, zone.faces(mesh)) for zone in self.keep)
         no_seam, no_support, support = (Marked.of(mesh, zones) for zones in (self.no_seam, self.no_support, self.support))
         return ZonesOnModel(keep, no_seam, no_support, support, self.modifiers)
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Zones":
-        """The zones with every place p at rotation @ p + shift_mm; faces of a colour stay those."""
+        """The zones with every place p at rotation @ p + shift_mm."""
+        return self._each(lambda zones: tuple(zone.transform(rotation, shift_mm) for zone in zones))
 
-        def moved(zone: AnyZone) -> AnyZone:
-            return zone if isinstance(zone, Painted) else zone.transform(rotation, shift_mm)
-
-        kinds = (self.keep, self.no_seam, self.no_support, self.support)
-        keep, no_seam, no_support, support = (tuple(map(moved, zones)) for zones in kinds)
-        modifiers = tuple(modifier.transform(rotation, shift_mm) for modifier in self.modifiers)
-        return Zones(keep, no_seam, no_support, support, modifiers)
+    def _each(self, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> "Zones":
+        """The zones with every kind of them changed, and the modifiers."""
+        return Zones(*(change(getattr(self, kind.name)) for kind in fields(self)))
 
     @property
     def count(self) -> int:
@@ -276,22 +272,20 @@ class Zones:
     @property
     def boxes(self) -> "Zones":
         """Those that are boxes."""
-        return self._where(True)
+        return self._each(lambda zones: tuple(filter(_is_box, zones)))
 
     @property
     def shapes(self) -> "Zones":
         """Those that are none."""
-        return self._where(False)
-
-    def _where(self, boxes: bool) -> "Zones":
-        kinds = (self.keep, self.no_seam, self.no_support, self.support)
-        keep, no_seam, no_support, support = (tuple(zone for zone in zones if isinstance(zone, Zone) == boxes) for zones in kinds)
-        modifiers = tuple(modifier for modifier in self.modifiers if isinstance(modifier.volume, Zone) == boxes)
-        return Zones(keep, no_seam, no_support, support, modifiers)
+        return self._each(lambda zones: tuple(zone for zone in zones if not _is_box(zone)))
 
     def beside(self, others: "Zones") -> "Zones":
         """These zones and others; where modifiers of both meet, the others' settings hold."""
         return Zones(*(getattr(self, entry.name) + getattr(others, entry.name) for entry in fields(self)))
+
+
+def _is_box(zone: "AnyZone | Modifier") -> bool:
+    return isinstance(zone.volume if isinstance(zone, Modifier) else zone, Zone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,7 +298,7 @@ class Marked:
     @classmethod
     def of(cls, mesh: Mesh, zones: Sequence[AnyZone]) -> "Marked":
         """What zones mark of a mesh."""
-        named = [faces_of(mesh, zone) for zone in zones if not isinstance(zone, Volume)]
+        named = [zone.faces(mesh) for zone in zones if not isinstance(zone, Volume)]
         volumes = tuple(zone for zone in zones if isinstance(zone, Volume))
         return cls(volumes, np.any(named, axis=0) if named else None)
 
@@ -347,7 +341,7 @@ class Marked:
 class ZonesOnModel:
     """The zones of a search, with the faces of the model that they mean."""
 
-    keep: tuple[Zone | Patches, ...] = ()
+    keep: tuple[Zone | KeptFaces, ...] = ()
     no_seam: Marked = Marked()
     no_support: Marked = Marked()
     support: Marked = Marked()
@@ -374,10 +368,10 @@ def touched(mesh: Mesh, zones: Sequence[Volume]) -> Mask:
     """(m,) which faces reach into any of the zones."""
     faces = np.zeros(len(mesh.faces), dtype=np.bool_)
     for zone in zones:
-        faces |= zone.touches(mesh)
+        faces |= zone.faces(mesh)
     return faces
 
 
-def spans_mm(directions: Floats, zones: Sequence[Zone | Patches]) -> Floats:
+def spans_mm(directions: Floats, zones: Sequence[Zone | KeptFaces]) -> Floats:
     """(k, n, 2) spans of direction . p between which a plane passes through a zone, for (k, 3) directions."""
     return np.concatenate([np.zeros((len(directions), 0, 2)), *(zone.spans_mm(directions) for zone in zones)], axis=1)

@@ -15,7 +15,7 @@ from machine.planning.stops import Stop
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.search.parts import Outcome, decomposition_of, make_parts
+from mdp.search.parts import decomposition_of, make_parts
 from mdp.search.problem import Problem
 from profiles.profile import Profile, load
 from slicer.paths import SlicedPart
@@ -41,7 +41,7 @@ def decomposed(mesh: Mesh, profile: Profile, *planes: Plane) -> Decomposition:
         cut = problem.cut(node, plane)
         assert cut is not None
         node = cut
-    return decomposition_of(problem, make_parts(problem, node), (), Outcome("limbs", "classic", 0, 0, 0.0, ()))
+    return decomposition_of(problem, "limbs", make_parts(problem, node), ())
 
 
 def posts(*at_mm: float, height_mm: float = 20.0, bar_mm: float = 0.0) -> Mesh:

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import ModelRequest, Outputs
 from machine.dryrun.dryrun import summary
-from mdp.plans.writing import plan_text
+from mdp.search.plan_writing import plan_text
 from profiles.errors import UserError
 from profiles.profile import load
 

@@ -10,7 +10,7 @@ that are there already are not searched again, so an interrupted run goes on whe
 (told apart by the column `settings`) may share the file. --summary prints the tables and searches nothing. --paper-terms:
 seams cost nothing, faces on the platform count as risky, head and axes do not limit (`search.objective=risky`,
 `search.count_platform_faces=true`, `search.clearance=false`). --faces: larger models are made coarser first; --side: only models
-whose sources are on one side of the split of mdp.learning.sources, test: those that no training saw.
+whose sources are on one side of the split of mdp.learning.lists, test: those that no training saw.
 --least-removed: the tables are of the models of which the widest plain beam removes at least this share of the risky area: on the
 others the width of the beam makes no difference.
 """
@@ -27,10 +27,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any, TextIO, get_type_hints
 
+from mdp.learning.collection import PAPER_TERMS
 from mdp.learning.command import Parser, check_range, run
+from mdp.learning.lists import FOLDS, Side, read_sources, side
 from mdp.learning.models import coarser, read_model
-from mdp.learning.sources import FOLDS, Side, read_sources, side
-from mdp.learning.task import PAPER_TERMS
 from mdp.learning.widths import NOTHING_COMMON, compare, read_searches, table
 from mdp.mesh import Mesh
 from mdp.model_file import locate

@@ -34,13 +34,13 @@ from mdp.joint import is_sound
 from mdp.mesh import Floats
 from mdp.overhang import UP, Mask
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
+from mdp.ranking.node import Node
 from mdp.read import read_mesh
 from mdp.search.by_hand import cut_by_hand
-from mdp.search.front import Price, front_row
-from mdp.search.node import Node
+from mdp.search.front import front_row
 from mdp.search.orient import NARROW, TURNED, UNSTEADY
 from mdp.search.parts import make_parts
+from mdp.search.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.search.problem import SIZE_MM, Problem
 from mdp.sweep.limbs import limb_faces
 from profiles.profile import Profile, load
@@ -136,14 +136,14 @@ def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[
     problem = problem_of(tuple(map(tuple, turn)))
     node = cut_by_hand(problem, PlanFile("", parts=tuple(PlannedPart.of(plane_of(p)) for p in reversed(alternative["planes"]))))
     row, parts, of_file = front_row(node), make_parts(problem, node), turn[2][2] > 1.0 - 1e-6
-    price = pricing(profile)(parts) or Price(nan, nan)
+    price = pricing(profile)(parts) or (nan, nan)
     seen_mm, hidden_mm = seams_by_sight(node, profile.search.hidden_seam_share)
     revolution = find_revolution(problem.mesh)
     footing = Plate.under(problem.mesh, profile).footing(np.eye(3))
     askew = revolution is not None and not revolution.is_square_to(UP)
-    scars_mm2, stairs_mm2 = sum(cut.cost.seam_mm2 for cut in node.cuts), row.stairs_mm2 / weight_of_stairs(profile)
+    scars_mm2, stairs_mm2 = sum(cut.cut_cost.seam_mm2 for cut in node.cuts), row.stairs_mm2 / weight_of_stairs(profile)
     support_mm2 = row.cost_mm2 - scars_mm2 - row.stairs_mm2
-    costs = (support_mm2, seen_mm, hidden_mm, stairs_mm2, len(node.cuts), price.time_s, price.filament_mm / 1000.0)
+    costs = (support_mm2, seen_mm, hidden_mm, stairs_mm2, len(node.cuts), price[0], price[1] / 1000.0)
     shares = (footing.narrow, footing.unsteady, not of_file, askew, not is_sound(problem.mesh, parts, profile))
     return {name: round(float(value), 3) for name, value in zip((*COSTS, *SHARES), (*costs, *shares), strict=True)}
 
@@ -159,7 +159,7 @@ def seams_by_sight(node: Node, hidden_share: float) -> tuple[float, float]:
     much a hidden mm counts."""
     weights, seen_mm, hidden_mm = node.places.by_source, 0.0, 0.0
     for step, before in _cuts(node):
-        sources, base = before.piece.sources, step.cuts[-1].base
+        sources, base = before.piece.sources, step.base
         seen = np.where(
             sources == MADE_BY_A_CUT, 0.0, np.clip((weights[sources] - hidden_share) / (1.0 - hidden_share), 0.0, 1.0)
         )

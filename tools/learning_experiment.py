@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from mdp.learning.sources import FOLDS
+from mdp.learning.lists import FOLDS
 
 ROOT = Path(__file__).resolve().parents[1]
 SEEDS = range(5)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from mdp.kernels.kernel import kernel
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
-from mdp.plans.writing import plan_text
 from mdp.read import read_mesh
+from mdp.search.plan_file import PlanFile, PlannedPart, mesh_sha256
+from mdp.search.plan_writing import plan_text
 
 FOLDER = Path(__file__).resolve().parents[1] / "mdp" / "demos"
 Point = tuple[float, float, float]

@@ -32,9 +32,9 @@ from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import resting_orientations, standing_still
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.read import read_mesh
 from mdp.search.orient import forecast_orientations, orient_and_decompose
+from mdp.search.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load

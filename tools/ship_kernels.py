@@ -3,7 +3,7 @@
     python tools/ship_kernels.py -o dist      a wheel of this checkout with kernels
     PYTHON tools/ship_kernels.py              the packages that this PYTHON imports get them
 
-They fit the Python, numba and llvmlite that run this script, on processors of the same kind (mdp.kernels.target); with others the
+They fit the Python, numba and llvmlite that run this script, on processors of the same kind (mdp.kernels.cache); with others the
 program compiles as it does without them. What lies in the folder that NUMBA_CACHE_DIR names is not compiled again.
 """
 

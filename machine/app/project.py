@@ -40,8 +40,8 @@ from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
 from mdp.mesh import Mesh
 from mdp.model_file import DEMO
-from mdp.plans.plan_file import ZONE_KINDS, PlanFile
 from mdp.save import MODEL_PART, model_xml, write_package
+from mdp.search.plan_file import ZONE_KINDS, PlanFile
 from mdp.zone import MeshVolume
 from profiles.errors import PlanError, first_line, reason
 from profiles.files import DAMAGED_ZIP, lock_folder, remove_locked, whole_file, write_whole
@@ -154,7 +154,7 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
     model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
-        from mdp.plans.writing import plan_text  # loads tomlkit, which only projects need
+        from mdp.search.plan_writing import plan_text  # loads tomlkit, which only projects need
 
         write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
     given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
@@ -315,7 +315,7 @@ def _check_inside(folder: Path, project: Project) -> None:
         if Path(str(mesh)).name != mesh:
             raise PlanError(f"{PLAN}: mesh is {mesh!r}: a file of the project is expected")
     try:
-        from mdp.plans.reading import read_plan  # takes 30 ms to load; only projects need it
+        from mdp.search.plan_reading import read_plan  # takes 30 ms to load; only projects need it
 
         plan = read_plan(project.plan)
     except PlanError as error:

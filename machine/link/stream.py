@@ -70,8 +70,8 @@ def print_lines(
 
     A set `stop` flag ends the print: feeding stops, moves are stopped, heaters and fan go off, the tip is lifted, nothing homes
     or turns; the Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises LocalProtocolError for a
-    line that cannot be sent, PortError, FirmwareError, SilenceError or PrinterError; the heaters are switched off first and the
-    message says whether the printer confirmed it.
+    line that cannot be sent, PortError, FirmwareError, SilenceError or PrinterError; the heaters are
+    switched off first and the message says whether the printer confirmed it.
     """
     if isinstance(lines, str):
         lines = lines.splitlines()

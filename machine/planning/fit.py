@@ -283,7 +283,7 @@ class Plate:
         if key not in self._known:
             beside = self._hull(standing) + np.array([*away_mm, 0.0])
             base_mm = part.base.offset_mm - part.lifted_mm  # with its raft
-            self._known[key] = passes_clear(self._machine, pose, self._hull(part), beside, base_mm, CELLS_MM)
+            self._known[key] = passes_clear(self._machine, pose, (self._hull(part), beside), base_mm, CELLS_MM)
         return self._known[key]
 
     def _hull(self, part: Part) -> Floats:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from mdp.kernels.workers import CallError, KilledError, Worker
 from profiles.errors import UserError
@@ -23,7 +23,6 @@ IDLE_S = 60.0  # then a process gives its memory back
 CLOSED_WITHIN_S = 1.0  # a scheduler that is gone does not answer the goodbye either
 
 Key = TypeVar("Key")
-Call = tuple[Callable[..., Any], tuple[Any, ...], int, float | None]
 
 
 @dataclass(frozen=True)
@@ -39,29 +38,14 @@ class Workers:
     folders: tuple[Path, ...] = ()
 
 
-class Pool(Protocol):
-    """Futures of calls, as concurrent.futures and dask have them; lost: what to raise when no more of them will have a result."""
+@dataclass(frozen=True)
+class Pool:
+    """Processes that work calls off. submit: gives the future of a task with its arguments, as concurrent.futures and dask have
+    it, lower numbers first; is_there: whether there will be more results; lost: why not, where there will be none."""
 
-    def submit(self, call: Call, number: int) -> Any: ...
-    def is_there(self) -> bool: ...
-    def lost(self) -> UserError: ...
-
-
-@contextmanager
-def connected(workers: Workers) -> Iterator["Queue"]:
-    """What works calls off; processes of our own are gone at the end, whatever ends it.
-
-    Raises UserError when the scheduler cannot be reached, or where its workers cannot work.
-    """
-    with _on_cores(workers.count) if workers.scheduler is None else _on_cluster(workers.scheduler, workers.folders) as pool:
-        yield Queue(pool, workers)
-
-
-class Queue:
-    """Calls and their results, in the order in which these come."""
-
-    def __init__(self, pool: Pool, workers: Workers) -> None:
-        self._pool, self._workers = pool, workers
+    submit: Callable[[Callable[..., Any], tuple[Any, ...], int], Any]
+    is_there: Callable[[], bool]
+    lost: str
 
     def completed(
         self, task: Callable[..., Any], calls: Mapping[Key, tuple[Any, ...]], on_wait: Callable[[], None]
@@ -73,7 +57,7 @@ class Queue:
         done: SimpleQueue[Any] = SimpleQueue()
         futures: dict[Any, Key] = {}
         for number, (key, arguments) in enumerate(calls.items()):
-            future = self._pool.submit((task, arguments, self._workers.retries, self._workers.limit_s), number)
+            future = self.submit(task, arguments, number)
             futures[future] = key
             future.add_done_callback(done.put)
         while futures:
@@ -81,22 +65,22 @@ class Queue:
             try:
                 future = done.get(timeout=POLL_S)
             except Empty:
-                if not self._pool.is_there():
-                    raise self._pool.lost() from None
+                if not self.is_there():
+                    raise UserError(self.lost) from None
                 continue
             yield futures.pop(future), self._outcome(future)
 
     def _outcome(self, future: Any) -> Any:
         """What a call returned, or the CallError that it came to."""
         if future.cancelled():
-            raise self._pool.lost()
+            raise UserError(self.lost)
         try:
             return future.result()
         except CallError as error:
             return error
         except Exception as error:  # noqa: BLE001 - whatever a cluster says of what it could not do
-            if not self._pool.is_there():
-                raise self._pool.lost() from None
+            if not self.is_there():
+                raise UserError(self.lost) from None
             return CallError(f"its workers were lost ({type(error).__name__})")
 
 
@@ -140,25 +124,23 @@ class Isolation:
         return worker
 
 
-class _Cores:
-    def __init__(self, executor: ThreadPoolExecutor, isolation: Isolation) -> None:
-        self._executor, self._isolation = executor, isolation
-
-    def submit(self, call: Call, number: int) -> Any:
-        return self._executor.submit(self._isolation.call, *call)
-
-    def is_there(self) -> bool:
-        return True
-
-    def lost(self) -> UserError:
-        return UserError("the work was stopped")
-
-
 @contextmanager
-def _on_cores(count: int) -> Iterator[_Cores]:
-    isolation, executor = Isolation(), ThreadPoolExecutor(count, thread_name_prefix="batch")
+def connected(workers: Workers) -> Iterator[Pool]:
+    """What works calls off; processes of our own are gone at the end, whatever ends it.
+
+    Raises UserError when the scheduler cannot be reached, or where its workers cannot work.
+    """
+    if workers.scheduler is not None:
+        with _on_cluster(workers, workers.scheduler) as pool:
+            yield pool
+        return
+    isolation, executor = Isolation(), ThreadPoolExecutor(workers.count, thread_name_prefix="batch")
+
+    def submit(task: Callable[..., Any], arguments: tuple[Any, ...], number: int) -> Any:
+        return executor.submit(isolation.call, task, arguments, workers.retries, workers.limit_s)
+
     try:
-        yield _Cores(executor, isolation)
+        yield Pool(submit, lambda: True, "the work was stopped")
     finally:
         isolation.end()
         executor.shutdown(cancel_futures=True)
@@ -172,22 +154,8 @@ def call_on_worker(*call: Any) -> Any:
     return _on_worker.call(*call)
 
 
-class _Cluster:
-    def __init__(self, client: Any, address: str) -> None:
-        self._client, self._address = client, address
-
-    def submit(self, call: Call, number: int) -> Any:
-        return self._client.submit(call_on_worker, *call, pure=False, priority=-number)
-
-    def is_there(self) -> bool:
-        return bool(self._client.status == "running")
-
-    def lost(self) -> UserError:
-        return UserError(f"scheduler {self._address}: is gone; started again, the work goes on where it stopped")
-
-
 @contextmanager
-def _on_cluster(address: str, folders: tuple[Path, ...]) -> Iterator[_Cluster]:
+def _on_cluster(workers: Workers, address: str) -> Iterator[Pool]:
     try:
         from distributed import Client
     except ModuleNotFoundError:
@@ -199,11 +167,17 @@ def _on_cluster(address: str, folders: tuple[Path, ...]) -> Iterator[_Cluster]:
         client = Client(address, timeout=REACHED_WITHIN_S)
     except (OSError, TimeoutError, ValueError) as error:
         raise UserError(f"scheduler {address}: cannot be reached ({error})") from None
+
+    def submit(task: Callable[..., Any], arguments: tuple[Any, ...], number: int) -> Any:
+        call = (task, arguments, workers.retries, workers.limit_s)
+        return client.submit(call_on_worker, *call, pure=False, priority=-number)
+
+    lost = f"scheduler {address}: is gone; started again, the work goes on where it stopped"
     try:
-        for worker, missing in client.run(folders_missing, folders, on_error="return").items():
+        for worker, missing in client.run(folders_missing, workers.folders, on_error="return").items():
             if missing:
                 raise UserError(f"worker {worker} of scheduler {address} cannot work: {_in_words(missing)}")
-        yield _Cluster(client, address)
+        yield Pool(submit, lambda: bool(client.status == "running"), lost)
     finally:
         with suppress(Exception):  # what does not answer any more need not be told
             client.close(timeout=CLOSED_WITHIN_S)

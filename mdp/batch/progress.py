@@ -5,13 +5,12 @@ import time
 from types import TracebackType
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.progress import Progress as Bar
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 EVERY_S = 20.0  # where lines stay, in a log: ten hours are 1,800 of them
 
 
-class Progress:
+class BatchProgress:
     """Told of every call that ends, and some times a second that others go on. things: what the calls are, as `searches`."""
 
     def __init__(self, total: int, things: str) -> None:
@@ -26,10 +25,10 @@ class Progress:
             TimeRemainingColumn(),
             TextColumn("{task.description}", markup=False),
         )
-        self._bar = Bar(*columns, console=Console(file=sys.stderr), disable=not self._live)
+        self._bar = Progress(*columns, console=Console(file=sys.stderr), disable=not self._live)
         self._task = self._bar.add_task(self._last, total=total)
 
-    def __enter__(self) -> "Progress":
+    def __enter__(self) -> "BatchProgress":
         self._bar.start()
         return self
 

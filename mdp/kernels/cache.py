@@ -2,10 +2,18 @@
 
 A folder's name tells all that its kernels depend on, so a match is always valid: the text of the file and of those that its
 helpers and constants come from (numba looks at the file alone), and the target. Where the program is installed does not matter.
+
+The target is one processor for all machines of a kind, so that compiled kernels can be shipped. x86-64-v3 is what processors of
+PCs have since 2013 (Intel) and 2015 (AMD); older ones and other kinds compile for themselves. NUMBA_CPU_NAME names another one.
+
+Machine code is loaded without what numba prepares for compiling. Whenever numba loads it, it imports everything that it can
+compile, compiles its runtime, parses the kernel's LLVM code and lists its symbols: .4 s for the 58 kernels of an export, and
+28 MB of LLVM. That waits until a kernel is compiled, which most runs never do.
 """
 
 import os
 import re
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -16,10 +24,15 @@ from shutil import rmtree
 from time import time
 from typing import Any
 
+import llvmlite
+import numba
+from llvmlite import binding
+from numba import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.registry import cpu_target
+from numba.core.runtime import _nrt_python
 
-from mdp.kernels.loading import prepare_loading
-from mdp.kernels.target import TARGET
 from profiles.folders import cache_folder, lost_at_end
 
 PACKAGES = Path(__file__).resolve().parents[2]
@@ -29,8 +42,37 @@ HAS_KERNELS = b"from mdp.kernels.kernel import"
 UNREADABLE = (OSError, EOFError, ValueError, UnpicklingError)  # what a file raises that may not be read or is cut short
 UNUSED_S = 60 * 86400.0  # folders of older versions go after this time: a program that still runs may be using them
 
+COMMON = "x86-64-v3"
+INSTRUCTIONS = {
+    *("cx16", "sahf", "popcnt", "sse3", "ssse3", "sse4.1", "sse4.2"),
+    *("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave"),
+}
+
 _loaded: set[str] = set()  # names of the folders of the files whose kernels are loaded and were not shipped
 _troubles: list[str] = []
+
+
+def _choose() -> None:
+    """Have numba compile for the common target where this processor can run it, unless the environment names another."""
+    try:
+        known = binding.get_host_cpu_features()
+    except RuntimeError:  # a kind of processor that LLVM cannot tell anything of
+        return
+    named = {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"} & os.environ.keys()
+    in_use = "_toplevel_target_context" in vars(cpu_target)  # somebody else has kernels in this process
+    if not named and not in_use and all(known.get(name) for name in INSTRUCTIONS):
+        os.environ.update(NUMBA_CPU_NAME=COMMON, NUMBA_CPU_FEATURES="")  # numba reads them again whenever one has changed
+        config.reload_config()
+
+
+_choose()
+# What machine code depends on beside its sources.
+TARGET = " ".join(
+    [
+        f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')} numba {numba.__version__} llvmlite {llvmlite.__version__}",
+        *("SVML" * config.USING_SVML, *cpu_target.target_context.codegen().magic_tuple()),
+    ]
+)
 
 
 def home() -> Path:
@@ -87,12 +129,20 @@ def folder_name(file: Path) -> str:
     return f"{file.parent.name}.{file.stem}-{whole.hexdigest()[:16]}"
 
 
-class _Folder:
-    """Where numba keeps a kernel that is compiled here; the stamp of a source needs to tell nothing that the name does not."""
+class _Entries(CompileResultCacheImpl):
+    """numba's entries of a kernel, and the locator that says where they are: in our folder and no other.
 
-    def __init__(self, file: Path) -> None:
+    Where NUMBA_CACHE_LOCATOR_CLASSES points it knows no sources; the stamp of a source needs to tell nothing that the folder's
+    name does not.
+    """
+
+    def __init__(self, function: Any) -> None:
+        file = Path(function.__code__.co_filename).resolve()
         self._py_file = str(file)  # numba's warnings name it
         self._path = home() / folder_name(file)
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = self
+        self._filename_base = f"{function.__name__}-{self._lineno}"
 
     def get_cache_path(self) -> str:
         return str(self._path)
@@ -107,13 +157,43 @@ class _Folder:
         self._path.mkdir(parents=True, exist_ok=True)
 
 
-class _Entries(CompileResultCacheImpl):
-    """numba's entries of a kernel, in our folder and no other: where NUMBA_CACHE_LOCATOR_CLASSES points it knows no sources."""
+class LoadedLibrary(JITCodeLibrary):
+    """A library of machine code; one that comes from the cache parses its LLVM code when another kernel is compiled with it."""
 
-    def __init__(self, function: Any) -> None:
-        self._lineno = function.__code__.co_firstlineno
-        self._locator = _Folder(Path(function.__code__.co_filename).resolve())
-        self._filename_base = f"{function.__name__}-{self._lineno}"
+    _bitcode = b""
+    _shared_module: Any
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> Any:
+        name, kind, data = state
+        if kind != "object":
+            return super()._unserialize(codegen, state)
+        library = cls(codegen, name)
+        machine_code, library._bitcode = data
+        library.enable_object_caching()
+        library._set_compiled_object(machine_code)
+        library._finalize_final_module()
+        return library
+
+    def _get_module_for_linking(self) -> Any:
+        if self._bitcode and self._shared_module is None:
+            self._shared_module = binding.parse_bitcode(self._bitcode)
+        return super()._get_module_for_linking()
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Address of a function of the library."""
+        if self._bitcode:
+            address: int = self._codegen._engine.get_function_address(name)
+            return address
+        return int(super().get_pointer_to_function(name))
+
+
+def prepare_loading(context: Any) -> None:
+    """What numba's target context needs before it loads machine code, which calls the functions of numba's runtime by name."""
+    if context.codegen()._library_class is not LoadedLibrary:
+        for name, address in _nrt_python.c_helpers.items():
+            binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+        context.codegen()._library_class = LoadedLibrary
 
 
 class KernelCache(FunctionCache):

@@ -34,12 +34,7 @@ _forked = False  # whether copies are at work or this is one
 
 
 def parallel_map(
-    work: Callable[[int], Result],
-    count: int,
-    fewest: int = 2,
-    *,
-    helps: bool = True,
-    on_wait: Callable[[], None] | None = None,
+    work: Callable[[int], Result], count: int, fewest: int = 2, *, helps: bool = True, on_wait: Callable[[], None] | None = None
 ) -> Iterator[Result]:
     """work(0), work(1) .. work(count - 1), in this order; copies of this process work ahead while the caller uses the results.
 
@@ -94,6 +89,8 @@ def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int
     global _forked  # one mark for the process
     answers: list[BinaryIO] = []
     copies: list[int] = []
+    import fcntl  # where there is no fork there is none
+
     parent, _forked = os.getpid(), True
     try:
         for _ in range(count):
@@ -102,7 +99,8 @@ def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int
             except OSError:  # too many open files: the copies that are there do the work
                 break
             answers.append(os.fdopen(answer, "rb", 0))  # what is held back there nobody waits for with select
-            _widen(end)
+            with suppress(AttributeError, OSError):  # where the system does not allow it
+                fcntl.fcntl(end, fcntl.F_SETPIPE_SZ, ROOM)
             try:
                 with global_compiler_lock:  # held by another thread it would never be free in the copy
                     copy = os.fork()
@@ -121,14 +119,6 @@ def _copies(count: int, results: Callable[[int], Iterator[object]], numbers: int
         for copy in copies:
             os.kill(copy, signal.SIGKILL)  # one that has answered, or that nobody waits for
             os.waitpid(copy, 0)
-
-
-def _widen(pipe: int) -> None:
-    """Let a pipe hold ROOM bytes, where the system allows it."""
-    import fcntl  # where there is no fork there is none
-
-    with suppress(AttributeError, OSError):
-        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, ROOM)
 
 
 def _answer(results: Callable[[int], Iterator[object]], numbers: int, end: int, parent: int) -> None:

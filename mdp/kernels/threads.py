@@ -60,12 +60,8 @@ def come_to_rest() -> bool:
     do what they have to do and are gone then; others begin with the next work."""
     main = threading.main_thread()
     others = [thread for thread in threading.enumerate() if thread is not main and not hasattr(thread, HARMLESS)]
-    if threading.current_thread() is not main or any(_pool_of(thread) not in POOLS for thread in others):
+    if threading.current_thread() is not main or any(thread.name.rpartition("_")[0] not in POOLS for thread in others):
         return False
     while _pools:
         _pools.pop(min(_pools)).shutdown()  # those for work ahead first, which shares out rows
     return True
-
-
-def _pool_of(thread: threading.Thread) -> str:
-    return thread.name.rpartition("_")[0]

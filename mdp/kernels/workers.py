@@ -152,7 +152,8 @@ class Worker(Interpreter):
             yield True, value
             return
         code = self.process.wait()
-        raise KilledError(f"its process was ended by {_signal_name(-code)}" if code < 0 else "its process ended")
+        name = signal.Signals(-code).name if -code in signal.valid_signals() else f"signal {-code}"
+        raise KilledError(f"its process was ended by {name}" if code < 0 else "its process ended")
 
     def call(self, task: Task, *given: Any, limit_s: float | None = None) -> Any:
         """The result of a call. limit_s: seconds after which it is given up and the worker ended.
@@ -173,10 +174,6 @@ class Worker(Interpreter):
             timer.cancel()
             if limit_s is not None:
                 timer.join()  # it may be ending the worker, which must not be asked again then
-
-
-def _signal_name(number: int) -> str:
-    return signal.Signals(number).name if number in signal.valid_signals() else f"signal {number}"
 
 
 def take_pipes() -> tuple[BinaryIO, BinaryIO]:

@@ -9,18 +9,31 @@ run, it goes on when it is started again.
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
 from mdp.batch.pool import Workers, connected
-from mdp.batch.progress import Progress
+from mdp.batch.progress import BatchProgress
 from mdp.batch.rows import append_row, writing_alone
 from mdp.kernels.threads import THREADS
 from mdp.kernels.workers import CallError
 from mdp.learning import command
-from mdp.learning.index import FAILED, INDEX, LOCK, Row, Search, read_index, summary, unfinished, write_index
+from mdp.learning.collection import (
+    FAILED,
+    INDEX,
+    LOCK,
+    TERMS,
+    Key,
+    Row,
+    Settings,
+    read_index,
+    run,
+    summary,
+    unfinished,
+    write_index,
+)
 from mdp.learning.models import model_files, name_of
-from mdp.learning.task import TERMS, Result, Settings, run
 from profiles.errors import UserError
 from profiles.files import SHARED, write_whole
 from profiles.profile import DEFAULTS
@@ -71,16 +84,16 @@ def collect(arguments: Sequence[str] | None) -> None:
     for terms in options.terms:
         settings.profile(terms)  # a wrong one is told before anything begins
     files = {name_of(file): file.resolve() for file in model_files(options.folder, options.only, options.every)}
-    wanted = [Search(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
+    wanted = [(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
     with writing_alone(options.out, LOCK):
         rows = _rows(options.out, settings)
         missing = unfinished(options.out, rows.values(), wanted)
-        rows = {search: row for search, row in rows.items() if search not in set(missing)}
+        rows = {key: row for key, row in rows.items() if key not in set(missing)}
         write_index(options.out, rows.values())
         if missing:
-            _run(options, settings, {search: files[search.id] for search in missing}, rows)
+            _run(options, settings, {key: files[key[0]] for key in missing}, rows)
             write_index(options.out, rows.values())
-    found = [rows[search] for search in wanted]
+    found = [rows[key] for key in wanted]
     sys.stdout.write("\n\n".join(summary(found)) + "\n")
     if all(row.excluded for row in found):
         raise UserError(f"folder {options.out}: nothing was collected")
@@ -91,29 +104,30 @@ def _name_or_path(profile: str) -> str:
     return str(Path(profile).resolve()) if Path(profile).is_file() else profile
 
 
-def _rows(out: Path, settings: Settings) -> dict[Search, Row]:
+def _rows(out: Path, settings: Settings) -> dict[Key, Row]:
     """What is there already; UserError where it is of other settings."""
-    rows = {row.search: row for row in read_index(out)}
+    rows = {row.key: row for row in read_index(out)}
     others = sorted({row.settings for row in rows.values()} - {settings.in_words})
     if others:
         raise UserError(f"folder {out}: holds searches with {others[0]}, not {settings.in_words}: take another folder")
     return rows
 
 
-def _run(options: argparse.Namespace, settings: Settings, files: dict[Search, Path], rows: dict[Search, Row]) -> None:
+def _run(options: argparse.Namespace, settings: Settings, files: dict[Key, Path], rows: dict[Key, Row]) -> None:
     """Search, and write each record and line as soon as it is there."""
-    calls = {search: (search, file, settings) for search, file in files.items()}
+    calls = {key: (Row(*key, settings.in_words), file, settings) for key, file in files.items()}
     workers = Workers(options.scheduler, options.workers, options.retries, folders=(options.folder.resolve(),))
-    with connected(workers) as queue, Progress(len(calls), "searches") as progress:
-        for search, result in queue.completed(run, calls, progress.tick):
+    with connected(workers) as pool, BatchProgress(len(calls), "searches") as progress:
+        for key, result in pool.completed(run, calls, progress.tick):
             if isinstance(result, CallError):
-                reason = f"{FAILED}{result}".splitlines()[0]
-                result = Result(Row(search.id, search.orientation, search.terms, settings.in_words, excluded=reason))
-            if result.record:
-                write_whole(options.out / search.file, result.record, SHARED)
-            append_row(options.out / INDEX, result.row)
-            rows[search] = result.row
-            progress.show(f"{search.file.removesuffix('.npz')}: {result.row.in_words}", result.row.excluded.startswith(FAILED))
+                row, record = replace(calls[key][0], excluded=f"{FAILED}{result}".splitlines()[0]), b""
+            else:
+                row, record = result
+            if record:
+                write_whole(options.out / row.file, record, SHARED)
+            append_row(options.out / INDEX, row)
+            rows[key] = row
+            progress.show(f"{row.file.removesuffix('.npz')}: {row.in_words}", row.excluded.startswith(FAILED))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from math import inf
 from pathlib import Path
 
-from mdp.learning.sources import FOLDS
+from mdp.learning.lists import FOLDS
 from mdp.ranking.features import CHECKED, COLUMNS, PAPER_COLUMNS
 from profiles.errors import UserError
 
@@ -74,6 +74,12 @@ def check_range(options: argparse.Namespace, name: str, least: float, most: floa
     if value is not None and not least <= value <= most:
         allowed = f"{least:g} or more" if most == inf else f"{least:g} to {most:g}"
         raise UserError(f"--{name.replace('_', '-')} is {value:g}: {allowed} is allowed")
+
+
+def table(heads: Sequence[str], lines: Sequence[Sequence[str]], numbers: bool = False) -> str:
+    """A table in Markdown; numbers: whether all columns but the first are aligned to the right."""
+    rows = [f"| {' | '.join(cells)} |" for cells in (heads, *lines)]
+    return "\n".join([rows[0], "|---|" + ("---:|" if numbers else "---|") * (len(heads) - 1), *rows[1:]])
 
 
 def commit() -> str:

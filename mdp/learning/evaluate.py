@@ -17,11 +17,11 @@ import numpy as np
 
 from mdp.learning.baselines import BASELINES
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, run, split_names
-from mdp.learning.lists import RatedList, followed, of_side, read_lists
+from mdp.learning.command import table as markdown
+from mdp.learning.lists import RatedList, Side, followed, of_side, read_lists
 from mdp.learning.ndcg import NDCGS, REGRETS, Measure, Scores, as_searched, at, interval
-from mdp.learning.sources import Side
 from mdp.mesh import Floats
-from mdp.ranking.ranker import Network
+from mdp.ranking.ranker import LearnedRanker
 from profiles.errors import UserError
 
 ALWAYS = ("M2", "M6")  # what lines are fitted in
@@ -53,11 +53,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="where pictures go; here by default")
     parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/compare_widths.py")
     parser.add_argument(
-        "--least-removed",
-        type=float,
-        default=0.0,
-        metavar="SHARE",
-        help="of --figure7: the widest plain beam removes it",
+        "--least-removed", type=float, default=0.0, metavar="SHARE", help="of --figure7: the widest plain beam removes it"
     )
     options = parser.parse_args(arguments)
     check_range(options, "least_removed", 0.0, 1.0)
@@ -71,7 +67,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _compare(options: argparse.Namespace) -> None:
     """Tables of all rankers, then what the features of each given one do."""
-    networks = [Network(file) for file in options.ranker]
+    networks = [LearnedRanker(file) for file in options.ranker]
     learnt = COLUMN_SETS[options.columns or "paper"]
     columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for network in networks for name in network.columns)]))
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
@@ -95,26 +91,25 @@ def _compare(options: argparse.Namespace) -> None:
 def table(title: str, rankers: Mapping[str, Scores], lists: Sequence[RatedList], measures: Mapping[str, Measure]) -> str:
     """A table in Markdown, one row per ranker: the means of the measures, and the 95 % interval of the first over models."""
     models = [rated.model for rated in lists]
-    heads = f"| ranker | {' | '.join(measures)} | 95 % interval of {next(iter(measures))} |"
-    lines = [f"{title}: {len(lists)} lists of {len(set(models))} models", "", heads, "|---|" + "---:|" * (len(measures) + 1)]
+    heads, lines = ("ranker", *measures, f"95 % interval of {next(iter(measures))}"), list[Sequence[str]]()
     for name, scores in rankers.items():
         given = [scores(rated) for rated in lists]
         values = [np.array([measure(*pair) for pair in zip(given, lists, strict=True)]) for measure in measures.values()]
         low, high = interval(values[0], models)
-        lines.append(f"| {name} | {' | '.join(f'{value.mean():.4f}' for value in values)} | {low:.4f} to {high:.4f} |")
-    return "\n".join(lines)
+        lines.append((name, *(f"{value.mean():.4f}" for value in values), f"{low:.4f} to {high:.4f}"))
+    return f"{title}: {len(lists)} lists of {len(set(models))} models\n\n{markdown(heads, lines, numbers=True)}"
 
 
-def _scores(network: Network) -> Scores:
+def _scores(network: LearnedRanker) -> Scores:
     return as_searched(lambda rated: network.scores(rated.table(network.columns).astype(np.float64)))
 
 
-def _analyse(network: Network, lists: Sequence[RatedList], options: argparse.Namespace) -> None:
+def _analyse(network: LearnedRanker, lists: Sequence[RatedList], options: argparse.Namespace) -> None:
     from mdp.learning.pictures import draw_features, save
 
     lost = importance(_scores(network), network.columns, lists)
-    rows = [f"| {name} | {value:.4f} |" for name, value in zip(network.columns, lost, strict=True)]
-    sys.stdout.write("\n".join(["| feature | importance |", "|---|---:|", *rows, ""]))
+    rows = [(name, f"{value:.4f}") for name, value in zip(network.columns, lost, strict=True)]
+    sys.stdout.write(markdown(("feature", "importance"), rows, numbers=True) + "\n")
     alike = [file for file in options.ranker if file.stem == network.file.stem]
     number = f"-{alike.index(network.file) + 1}" if len(alike) > 1 else ""
     file = options.pictures / f"figure8-{network.file.stem}{number}.png"

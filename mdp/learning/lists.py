@@ -6,18 +6,24 @@ and `outcome`; `child` and `node_expanded`, where they are there, tell the candi
 The value of a candidate is the least final cost through it, stopping there included. The paper rates the five best candidates of
 a list 5, 4, 3, 2, 1 and the rest 0; its lists are what the beam kept, so candidates that were never cut are not among them.
 Nor are, where regrets are asked for, those that nobody followed: all that is known of them is that stopping there is worse.
+
+A model's source says whether it trains a ranker, stops the training, or judges the result. Models of one repository and folder
+are often variants of one thing, so a source is never on two sides. The side is a hash of the source's name: it depends on no
+other model, so a set that grows moves none.
 """
 
+import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.learning.sources import Side, model_id, place, read_sources, side
 from mdp.mesh import Floats, Ints
 from mdp.ranking.features import PAPER_COLUMNS
 from mdp.ranking.record import VERSION, Arrays
@@ -28,9 +34,38 @@ BEST = 5  # candidates of a list that are rated
 TIE = 1e-9  # outcomes (shares) that differ less are the same
 SMALLEST_RANGE = 1e-8  # added to the range, which is 0 where all of a list have the same
 LEAST_OUTCOME = 0.05  # lists that can end with less count as if they ended with it, else the best of models would weigh most
+COLUMNS_NEEDED = ("id", "source_repo", "source_path")
+TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest judges
+FOLDS = 4  # splits whose test sets are disjoint and together hold every model
 
 Singles = NDArray[np.float32]
 Mask = NDArray[np.bool_]
+
+
+class Side(StrEnum):
+    """What the lists of a source are for."""
+
+    TRAIN = "train"
+    VALIDATION = "validation"
+    TEST = "test"
+
+
+def side(source: str, fold: int = 0) -> Side:
+    """The side of a source in one of the FOLDS splits; it is in the test set of exactly one of them."""
+    share = (place(source) + fold / FOLDS) % 1.0
+    if share < TRAIN_SHARE:
+        return Side.TRAIN
+    return Side.VALIDATION if share < TRAIN_SHARE + VALIDATION_SHARE else Side.TEST
+
+
+def place(name: str) -> float:
+    """A number from 0 to 1 that depends on nothing but the name."""
+    return int.from_bytes(sha256(name.encode()).digest()[:8], "big") / 2**64
+
+
+def model_id(file: Path) -> str:
+    """The model of a record file, which is named MODEL.ORIENTATION.TERMS.npz."""
+    return file.name.split(".")[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,3 +215,19 @@ def scale(features: Singles) -> Singles:
     low, high = features.min(axis=0), features.max(axis=0)
     scaled: Singles = (features - low) / (high - low + np.float32(SMALLEST_RANGE))
     return scaled
+
+
+def read_sources(manifest: Path) -> dict[str, str]:
+    """Model -> its repository and folder, of a table with the columns id, source_repo and source_path.
+
+    Raises UserError for a file that is no such table.
+    """
+    try:
+        with manifest.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UserError(f"manifest {manifest}: cannot be read ({error})") from None
+    missing = [name for name in COLUMNS_NEEDED if not rows or not rows[0].get(name)]
+    if missing:
+        raise UserError(f"manifest {manifest}: has no column {', '.join(missing)}; {', '.join(COLUMNS_NEEDED)} are needed")
+    return {row["id"]: f"{row['source_repo']}/{row['source_path'].rpartition('/')[0]}" for row in rows}

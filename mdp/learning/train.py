@@ -11,18 +11,17 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
-from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists
+from mdp.learning.lists import RatedList, Side, followed, of_side, of_some_models, read_lists
 from mdp.learning.ndcg import NDCGS, Scores, as_searched
-from mdp.learning.sources import Side
 from profiles.errors import UserError
 
 if TYPE_CHECKING:
     from mdp.learning.networks import Network
-    from mdp.learning.training import Epoch, Schedule
 
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
 MOST_NETWORKS = 12  # of an ensemble; with --loss regret its file stays below 200 kB
@@ -60,26 +59,20 @@ def train(arguments: Sequence[str] | None) -> None:
 
 
 def _trained(options: argparse.Namespace, columns: Sequence[str], lists: Sides) -> list["Network"]:
-    """The networks of a ranker; each shows how its training goes."""
+    """The networks of a ranker, each by the schedule of its loss with what was given in its place; each shows how it goes."""
     from mdp.learning.networks import NETWORKS
-    from mdp.learning.training import train
+    from mdp.learning.training import OBJECTIVES, SCHEDULES, train
 
+    given = {name: getattr(options, name) for name in OWN if getattr(options, name) is not None}
+    show = partial(_show, OBJECTIVES[options.loss].measures)
     networks = []
-    for member in range(options.ensemble):
-        network = NETWORKS[options.loss](columns, seed=options.seed + member)
-        train(network, columns, lists, _schedule(options, member), show)
+    for seed in range(options.seed, options.seed + options.ensemble):
+        network = NETWORKS[options.loss](columns, seed=seed)
+        train(network, columns, lists, replace(SCHEDULES[options.loss], **given, seed=seed), show)
         networks.append(network)
         if sys.stderr.isatty():
             sys.stderr.write("\n")
     return networks
-
-
-def _schedule(options: argparse.Namespace, member: int) -> "Schedule":
-    """The schedule of the loss with what was given in its place; member: of an ensemble, each has a seed of its own."""
-    from mdp.learning.training import SCHEDULES
-
-    given = {name: getattr(options, name) for name in OWN if getattr(options, name) is not None}
-    return replace(SCHEDULES[options.loss], **given, seed=options.seed + member)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -104,10 +97,10 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def show(epoch: "Epoch") -> None:
+def _show(measures: Sequence[str], number: int, loss: float, validation: Sequence[float], best: int) -> None:
     """An epoch as a line that the next one replaces on a terminal."""
-    figures = ", ".join(f"{name} {value:.4f}" for name, value in zip(epoch.measures, epoch.validation, strict=True))
-    line = f"epoch {epoch.number}: loss {epoch.loss:.3f}, validation {figures}, best epoch {epoch.best}"
+    figures = ", ".join(f"{name} {value:.4f}" for name, value in zip(measures, validation, strict=True))
+    line = f"epoch {number}: loss {loss:.3f}, validation {figures}, best epoch {best}"
     sys.stderr.write(f"\r\x1b[K{line}" if sys.stderr.isatty() else f"{line}\n")
     sys.stderr.flush()
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mdp.learning.command import table as markdown
 from mdp.mesh import Floats, Ints
 from profiles.errors import UserError
 
@@ -22,15 +23,15 @@ NOTHING_COMMON = "no model in it was searched with every ranker at every width, 
 RESAMPLES = 10_000
 MORE = 0.01  # share of J by which a model must differ from a plain beam of the same width to count as worse or better
 HEADS = (
-    "ranker | B | mean J | of plain B = 1 | 95 % | of the gap from plain 2 to the best plain width | 95 %"
-    " | core time, of the widest plain beam | worse than plain by > 1 % | better by > 1 %"
+    *("ranker", "B", "mean J", "of plain B = 1", "95 %", "of the gap from plain 2 to the best plain width", "95 %"),
+    *("core time, of the widest plain beam", "worse than plain by > 1 %", "better by > 1 %"),
 )
 
 Kind = tuple[str, int]  # ranker and width
 
 
 @dataclass(frozen=True)
-class Search:
+class TimedSearch:
     """One search of the table: its J and its processor time."""
 
     mesh: str
@@ -61,7 +62,7 @@ class Comparison:
         return [width for ranker, width in self.shares if ranker == CLASSIC]
 
 
-def read_searches(table: Path) -> list[Search]:
+def read_searches(table: Path) -> list[TimedSearch]:
     """The searches that did not fail, of models with a risky face; UserError for a file that is no such table."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
@@ -75,17 +76,17 @@ def read_searches(table: Path) -> list[Search]:
         raise UserError(f"table {table}: cannot be read ({error})") from None
 
 
-def _search(row: dict[str, str]) -> Search:
+def _search(row: dict[str, str]) -> TimedSearch:
     if None in row or None in row.values():
         raise ValueError(f"the line of {row['mesh']} has not as many values as there are columns")
     numbers = int(row["width"]), float(row["share"]), float(row["core_s"])
     if not all(map(isfinite, numbers)):
         raise ValueError(f"{row['mesh']}, width {row['width']}: share is {row['share']}, core_s {row['core_s']}")
     ranker = Path(row.get("ranker") or CLASSIC).stem  # files of one name are one ranker, trained for different folds
-    return Search(row["mesh"], row["settings"], row["method"], ranker, *numbers)
+    return TimedSearch(row["mesh"], row["settings"], row["method"], ranker, *numbers)
 
 
-def compare(searches: Sequence[Search], least_removed: float = 0.0) -> list[Comparison]:
+def compare(searches: Sequence[TimedSearch], least_removed: float = 0.0) -> list[Comparison]:
     """A comparison for every method and its settings, in the order they come.
 
     A comparison is left out if no model was searched with every ranker at all of its widths.
@@ -98,7 +99,7 @@ def compare(searches: Sequence[Search], least_removed: float = 0.0) -> list[Comp
     return [comparison for comparison in found if comparison.models]
 
 
-def _comparison(method: tuple[str, str], searches: Sequence[Search], least_removed: float) -> Comparison:
+def _comparison(method: tuple[str, str], searches: Sequence[TimedSearch], least_removed: float) -> Comparison:
     known = {(search.ranker, search.width, search.mesh): search for search in searches}
     if len(known) < len(searches):
         (ranker, width, mesh), _ = Counter((search.ranker, search.width, search.mesh) for search in searches).most_common(1)[0]
@@ -116,11 +117,10 @@ def _comparison(method: tuple[str, str], searches: Sequence[Search], least_remov
 def table(comparison: Comparison) -> str:
     """A table in Markdown, one row a ranker and width; intervals by resampling the models."""
     title = f"{comparison.method}, {comparison.settings or 'default settings'}: {len(comparison.models)} models"
-    lines = [title, "", f"| {HEADS} |", "|---|" + "---:|" * HEADS.count("|")]
     drawn = np.random.default_rng(0).integers(0, len(comparison.models), (RESAMPLES, len(comparison.models)), np.int32)
-    for ranker, width in sorted(comparison.shares, key=lambda kind: (kind[1], kind[0])):
-        lines.append(f"| {ranker} | {width} | {' | '.join(_cells(comparison, (ranker, width), drawn))} |")
-    return "\n".join(lines)
+    kinds = sorted(comparison.shares, key=lambda kind: (kind[1], kind[0]))
+    lines = [(ranker, str(width), *_cells(comparison, (ranker, width), drawn)) for ranker, width in kinds]
+    return f"{title}\n\n{markdown(HEADS, lines, numbers=True)}"
 
 
 def _cells(comparison: Comparison, kind: Kind, drawn: Ints) -> list[str]:

@@ -20,7 +20,7 @@ from mdp.plane import Plane
 from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.limbs import LimbSums
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
-from mdp.zone import Patches, Zone, spans_mm
+from mdp.zone import KeptFaces, Zone, spans_mm
 from profiles.profile import Profile
 from profiles.search import Search
 
@@ -88,7 +88,7 @@ class Bounds:
 
 
 def bounds_of(
-    chosen: Floats, mesh: Mesh, profile: Profile, disc: tuple[Floats, float], keep: Sequence[Zone | Patches] = ()
+    chosen: Floats, mesh: Mesh, profile: Profile, disc: tuple[Floats, float], keep: Sequence[Zone | KeptFaces] = ()
 ) -> Bounds:
     """Bounds for (k, 3) directions; disc: what every plane must clear; keep: the zones that stay whole."""
     (centre, radius), search = disc, profile.search.effective
@@ -130,9 +130,9 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 class ScoredCandidates:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
     not known yet. direction is a row of limits.directions; above_mm2: what is risky above the plane printed straight up;
-    residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; hopeless_mm2: what of the first two no cut
-    can save, 0 unless requested. first, columns: (k,) the first plane along each direction, in steps of limits.step_mm, and
-    the number of all planes along it."""
+    residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; hopeless_mm2: what of the first two no cut can save,
+    hopeless_here_mm2: what of the solid's risky area, both 0 unless requested. first, columns: (k,) the first plane along each
+    direction, in steps of limits.step_mm, and the number of all planes along it."""
 
     remainder: Remainder
     limits: Bounds
@@ -147,6 +147,7 @@ class ScoredCandidates:
     hopeless_mm2: Floats
     first: Ints
     columns: Ints
+    hopeless_here_mm2: float = 0.0
 
     @property
     def end_mm(self) -> Floats:
@@ -208,6 +209,7 @@ def score_candidates(
         hopeless_mm2=swept.hopeless_mm2[scored],
         first=swept.first,
         columns=swept.columns,
+        hopeless_here_mm2=0.0 if hopeless is None else float(remainder.facets.faces.counted_mm2[hopeless].sum()),
     )
 
 

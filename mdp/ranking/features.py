@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mdp.mesh import Floats, Ints
-from mdp.ranking.candidate_table import CandidateTable
+from mdp.ranking.ranking import CandidateTable
 
 TENS, DECIMETRE_MM = 10.0, 100.0
 
@@ -26,44 +26,36 @@ TENS, DECIMETRE_MM = 10.0, 100.0
 Column = Callable[[CandidateTable, Ints], Floats]
 
 
-def _share(value: Floats) -> Floats:
-    clipped: Floats = np.clip(value, 0.0, 1.0)
-    return clipped
-
-
-def _wasted(table: CandidateTable, rows: Ints) -> Floats:
-    scored = table.scored
-    return (scored.lost_mm2 - scored.seam_mm2 - scored.hopeless_mm2)[rows] / table.model.risky_mm2
-
-
-def _above_platform(table: CandidateTable, rows: Ints) -> Floats:
-    above_mm = table.scored.offset_mm[rows] - table.limits.least_offset_mm[table.scored.direction[rows]]
-    return _share(above_mm / table.model.radius_mm)
-
-
-def _fragile(table: CandidateTable, rows: Ints) -> Floats:
-    return _share(np.array([table.fragile_mm(int(row)) for row in rows], dtype=np.float64) / table.model.radius_mm)
+def _radii(table: CandidateTable, distance_mm: Floats) -> Floats:
+    radii: Floats = np.clip(distance_mm / table.model.radius_mm, 0.0, 1.0)
+    return radii
 
 
 FEATURES: dict[str, Column] = {
     "M1": lambda table, rows: table.scored.gain_mm2[rows] / table.model.risky_mm2,
     "M2": lambda table, rows: (table.saved_mm2 + table.scored.gain_mm2[rows]) / table.model.risky_mm2,
     "M3": lambda table, rows: table.volume_mm3[rows] / table.model.volume_mm3,
-    "M4": _above_platform,
-    "M5": _fragile,
+    "M4": lambda table, rows: _radii(
+        table, table.scored.offset_mm[rows] - table.limits.least_offset_mm[table.scored.direction[rows]]
+    ),
+    "M5": lambda table, rows: _radii(table, np.array([table.fragile_mm(int(row)) for row in rows], dtype=np.float64)),
     "M6": lambda table, rows: (table.lost_mm2 + table.scored.lost_mm2[rows]) / table.model.risky_mm2,
-    "wasted": _wasted,
+    "wasted": lambda table, rows: (
+        (table.scored.lost_mm2 - table.scored.seam_mm2 - table.scored.hopeless_mm2)[rows] / table.model.risky_mm2
+    ),
     "hopeless": lambda table, rows: table.scored.hopeless_mm2[rows] / table.model.risky_mm2,
-    "hopeless_left": lambda table, rows: (table.situation.hopeless_mm2 - table.scored.hopeless_mm2[rows]) / table.model.risky_mm2,
-    "risky_left": lambda table, rows: (table.situation.risky_mm2 - table.scored.above_mm2[rows]) / table.model.risky_mm2,
+    "hopeless_left": lambda table, rows: (
+        (table.scored.hopeless_here_mm2 - table.scored.hopeless_mm2[rows]) / table.model.risky_mm2
+    ),
+    "risky_left": lambda table, rows: (table.node.risky_mm2 - table.scored.above_mm2[rows]) / table.model.risky_mm2,
     "seam": lambda table, rows: table.scored.seam_mm2[rows] / table.model.risky_mm2,
     "tilt": lambda table, rows: table.normals(rows)[:, 2],
-    "turn": lambda table, rows: table.normals(rows) @ table.situation.last,
+    "turn": lambda table, rows: table.normals(rows) @ table.node.base.normal,
     "section": lambda table, rows: table.section_mm2[rows] / table.model.circle_mm2,
     "contact": lambda table, rows: table.contact_area_mm2[rows] / table.model.circle_mm2,
     "extent": lambda table, rows: (table.scored.end_mm - table.scored.offset_mm)[rows] / table.model.radius_mm,
-    "volume_left": lambda table, rows: (table.situation.volume_mm3 - table.volume_mm3[rows]) / table.model.volume_mm3,
-    "cuts": lambda table, rows: np.full(len(rows), table.situation.cuts / TENS),
+    "volume_left": lambda table, rows: (float(table.node.solid.volume()) - table.volume_mm3[rows]) / table.model.volume_mm3,
+    "cuts": lambda table, rows: np.full(len(rows), len(table.node.cuts) / TENS),
     "round": lambda table, rows: table.rounds(rows) / TENS,
     "risky": lambda table, rows: np.full(len(rows), table.model.risky_mm2 / table.model.circle_mm2),
     "scale": lambda table, rows: np.full(len(rows), table.model.radius_mm / DECIMETRE_MM),

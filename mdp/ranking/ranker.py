@@ -16,7 +16,6 @@ import numpy as np
 
 from mdp.mesh import Floats
 from mdp.ranking import SUFFIX
-from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import FEATURES, features
 from mdp.ranking.ranking import RankedCandidate
 from profiles.errors import UserError, first_line
@@ -30,7 +29,7 @@ DECIMALS = 4  # of scores; networks give some 7 digits, and those that differ le
 RANKED_TOGETHER = 50  # candidates, the B of the 2020 paper
 
 
-class Network:
+class LearnedRanker:
     """A trained ranker. Its file is read when it ranks for the first time, or by `check`."""
 
     def __init__(self, file: Path) -> None:
@@ -40,12 +39,12 @@ class Network:
         """Raise UserError unless the file holds a ranker."""
         self.scores(np.zeros((2, len(self.columns))))
 
-    def rank(self, offered: Iterable[RankedCandidate], tables: Sequence[CandidateTable]) -> Iterator[RankedCandidate]:
+    def rank(self, offered: Iterable[RankedCandidate]) -> Iterator[RankedCandidate]:
         """The first candidates by their scores, then the others as they come."""
         others = iter(offered)
         first = list(islice(others, RANKED_TOGETHER))
         if len(first) > 1:
-            scores = self.scores(self._features(first, tables))
+            scores = self.scores(self._features(first))
             first = [first[position] for position in np.argsort(-scores, kind="stable")]
         yield from first
         yield from others
@@ -76,14 +75,13 @@ class Network:
             raise UserError(f"ranker {self.file}: takes {given.shape}, {len(columns)} features a candidate are named")
         return columns
 
-    def _features(self, candidates: Sequence[RankedCandidate], tables: Sequence[CandidateTable]) -> Floats:
+    def _features(self, candidates: Sequence[RankedCandidate]) -> Floats:
         """(n, len(columns)) the features of candidates."""
         rows = np.zeros((len(candidates), len(self.columns)))
-        for number, table in enumerate(tables):
-            positions = [position for position, candidate in enumerate(candidates) if candidate.table == number]
-            if positions:
-                chosen = np.array([candidates[position].row for position in positions], dtype=np.int32)
-                rows[positions] = features(table, chosen, self.columns)
+        for table in dict.fromkeys(candidate.table for candidate in candidates):
+            positions = [position for position, candidate in enumerate(candidates) if candidate.table is table]
+            chosen = np.array([candidates[position].row for position in positions], dtype=np.int32)
+            rows[positions] = features(table, chosen, self.columns)
         return rows
 
     @cached_property
@@ -110,7 +108,7 @@ class Network:
 
 
 @cache
-def ranker_named(name: str) -> Network | None:
+def ranker_named(name: str) -> LearnedRanker | None:
     """The ranker of a name: None is the classic ranking, `learned` the network that ships, the name of an .onnx file a network of
     one's own. Raises UserError for a name that is none and for a file that holds no ranker."""
     if name == CLASSIC:
@@ -119,12 +117,12 @@ def ranker_named(name: str) -> Network | None:
         return shipped()
     if not name.endswith(SUFFIX):
         raise UserError(f"--ranker {name}: {CLASSIC}, {LEARNED} or the name of an {SUFFIX} file is allowed")
-    own = Network(Path(name))
+    own = LearnedRanker(Path(name))
     own.check()
     return own
 
 
 @cache
-def shipped() -> Network:
+def shipped() -> LearnedRanker:
     """The network that ships."""
-    return Network(Path(str(files("mdp") / "ranker.onnx")))
+    return LearnedRanker(Path(str(files("mdp") / "ranker.onnx")))

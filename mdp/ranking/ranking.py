@@ -1,35 +1,199 @@
-"""Ranking: the scored candidates of several nodes in the order of the 2020 paper or by a trade-off, checked as they come; and the
-shortlist of several trade-offs that a learned ranker chooses from.
+"""Ranking: the scored candidates of nodes in the order of the 2020 paper or by a trade-off; and the shortlist of several
+trade-offs that a learned ranker chooses from.
+
+Whether a candidate can be cut is checked as it is asked for. Of near-equal planes of one parent only the first counts.
 
 Order of the paper: candidates that leave (almost) nothing risky above their plane come first, then the residual threshold (the
 paper's delta) is raised from 1e-4 by factors of 5; within a round the larger accumulated reduction comes first, and from the
-second round on only candidates that reduce at least as much as the best so far are taken. Only the first of several near-equal
-planes of one parent counts.
+second round on only candidates that reduce at least as much as the best so far are taken.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
-from itertools import islice
+from itertools import accumulate, islice, repeat
+from math import pi
+from operator import mul
 
 import numpy as np
 
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.ranking.candidate_table import FEASIBLE, FIRST_LOOK, LOOK_AHEAD, ROUNDS, UNKNOWN, CandidateTable, nearly_equal
+from mdp.ranking.candidates import Reason, ScoredCandidates, check
+from mdp.ranking.node import Node
 
+FIRST_THRESHOLD, THRESHOLD_FACTOR, ROUNDS = 1e-4, 5.0, 11  # shares of the risky area; the last one is above 1e3
+RESIDUAL_THRESHOLDS = np.array(list(accumulate(repeat(THRESHOLD_FACTOR, ROUNDS - 1), mul, initial=FIRST_THRESHOLD)))
+SAME_COSINE = 0.95
+FIRST_LOOK, LOOK_AHEAD = 8, 128  # rows that are checked together: few as long as the first ones will do, then twice as many
+SORTED_FIRST = 256
+UNKNOWN = -1
+FEASIBLE = int(Reason.FEASIBLE)  # a number, for it is compared a hundred thousand times a search
 LISTED = (2.0, 1.0, 4.0)  # trade-offs of the shortlist; more of them did not end better
 EACH = 3  # candidates of a table on the shortlist by each of them
 EQUAL = 1e-9  # shares of the risky area that differ less are equal but for rounding
 
 
+@dataclass(frozen=True)
+class Model:
+    """What shares of a model are shares of."""
+
+    risky_mm2: float
+    volume_mm3: float
+    radius_mm: float
+
+    @property
+    def circle_mm2(self) -> float:
+        """Area of the bounding sphere's great circle."""
+        return pi * self.radius_mm**2
+
+
+class CandidateTable:
+    """The scored candidates of one node; whether they can be cut is checked direction by direction, when it is asked for."""
+
+    def __init__(
+        self,
+        scored: ScoredCandidates,
+        node: Node,
+        model: Model,
+        least_gain_mm2: float = 0.0,
+        is_weak: Callable[[Plane], bool] = lambda plane: False,
+    ) -> None:
+        """least_gain_mm2: what gains less is for parts of the preferred volume only; is_weak: whether a plane that can be cut
+        leaves too weak a base, asked for only where a row's turn comes."""
+        self.scored, self.limits, self.least_gain_mm2 = scored, scored.limits, least_gain_mm2
+        self.node, self.model = node, model
+        self.saved_mm2, self.residual_mm2, self.lost_mm2 = node.saved_mm2, node.residual_mm2, node.lost_mm2
+        self.check, self._is_weak, self._strong = check, is_weak, set[int]()
+        count = len(scored.gain_mm2)
+        self.reason = np.full(count, UNKNOWN, np.int32)
+        self.volume_mm3: Floats = np.zeros(count)
+        self.section_mm2: Floats = np.zeros(count)
+        self.contact_area_mm2: Floats = np.zeros(count)
+        self._sliver_mm = np.zeros(count)
+        self._rankings: dict[float, tuple[list[int], Iterator[int]]] = {}  # rows as far as they are known, and what goes on
+        self._rounds: list[Ints] = []
+
+    def rows_of_round(self, number: int) -> Ints:
+        """The rows that come below the residual threshold in this round first."""
+        if not self._rounds:
+            rounds = relaxation_rounds(self.scored.lost_mm2 / self.model.risky_mm2)
+            order = np.argsort(rounds, kind="stable")
+            self._rounds = np.split(order, np.searchsorted(rounds[order], np.arange(1, ROUNDS + 1)))
+        return self._rounds[number]
+
+    def rows_by_trade_off(self, trade_off: float) -> Iterator[int]:
+        """Feasible rows by gain less trade_off times what is lost, best first; of near-equal planes only the first."""
+        known, more = self._rankings.setdefault(trade_off, ([], self._rank(trade_off)))
+        position = 0
+        while True:
+            if position == len(known):
+                row = next(more, None)
+                if row is None:
+                    return
+                known.append(row)
+            yield known[position]
+            position += 1
+
+    def _rank(self, trade_off: float) -> Iterator[int]:
+        """The same, sorted and checked as far as rows are asked for."""
+        enough = self.scored.gain_mm2 >= self.least_gain_mm2
+        cost = np.where(enough, trade_off * self.scored.lost_mm2 - self.scored.gain_mm2, np.inf)
+        order: Ints = np.zeros(0, np.int64)
+        at, look, planes = 0, FIRST_LOOK, list[Plane]()
+        while at < len(order) or len(order) < enough.sum():
+            if at == len(order):
+                order = _sort_more(cost, int(enough.sum()), order)
+            reason = self.reason[order[at : at + SORTED_FIRST]]
+            possible = np.flatnonzero((reason == FEASIBLE) | (reason == UNKNOWN))
+            if len(possible) == 0:  # as of most rows, so they are passed over many at a time
+                at += len(reason)
+                continue
+            at += int(possible[0])
+            row = int(order[at])
+            plane = self.plane(row)
+            if not any(nearly_equal(plane, earlier) for earlier in planes):
+                if self.reason[row] == UNKNOWN:
+                    self.check_rows(order[at : at + look])
+                    look = min(2 * look, LOOK_AHEAD)
+                if self.feasible(row):
+                    planes.append(plane)
+                    yield row
+            at += 1
+
+    def check_rows(self, rows: Ints) -> None:
+        """Check these rows and all others of the same directions, where that is not known."""
+        fresh = rows[self.reason[rows] == UNKNOWN]
+        if len(fresh) == 0:
+            return
+        alike = np.nonzero(np.isin(self.scored.direction, self.scored.direction[fresh]))[0]
+        scored, limits = self.scored, self.limits
+        checked = self.check(scored.remainder, limits, limits.step_mm, scored.direction[alike], scored.offset_mm[alike])
+        self.reason[alike], self.volume_mm3[alike] = checked.reason, checked.volume_mm3
+        self.section_mm2[alike], self.contact_area_mm2[alike] = checked.section_mm2, checked.contact_area_mm2
+        self._sliver_mm[alike] = checked.fragile_mm
+
+    def feasible(self, row: int) -> bool:
+        """Whether a checked row can be cut, its base strong enough."""
+        if self.reason[row] == FEASIBLE and row not in self._strong:
+            if self._is_weak(self.plane(row)):
+                self.reason[row] = Reason.WEAK
+            else:
+                self._strong.add(row)
+        return bool(self.reason[row] == FEASIBLE)
+
+    def plane(self, row: int) -> Plane:
+        """The plane of a row."""
+        return Plane(self.limits.directions[self.scored.direction[row]], float(self.scored.offset_mm[row]))
+
+    def normals(self, rows: Ints) -> Floats:
+        """(n, 3) the normals of the rows' planes."""
+        normals: Floats = self.limits.directions[self.scored.direction[rows]]
+        return normals
+
+    def fragile_mm(self, row: int) -> float:
+        """Distance of a checked row's plane to fragile regions."""
+        return min(float(self._sliver_mm[row]), self.scored.remainder.thin_mm(self.plane(row)))
+
+    def rounds(self, rows: Ints) -> Ints:
+        """(n,) the rounds whose residual thresholds let the rows in."""
+        return relaxation_rounds(self.scored.lost_mm2[rows] / self.model.risky_mm2)
+
+
+def _sort_more(cost: Floats, count: int, known: Ints) -> Ints:
+    """The rows that are known to be first by cost, and four times as many of the first `count`."""
+    wanted = min(count, max(SORTED_FIRST, 4 * len(known)))
+    first = np.flatnonzero(cost <= np.partition(cost, wanted - 1)[wanted - 1])
+    ordered = first[np.lexsort((first, cost[first]))]
+    return np.concatenate([known, ordered[~np.isin(ordered, known)]])
+
+
+def relaxation_rounds(residual: Floats) -> Ints:
+    """(n,) rounds whose residual thresholds let in candidates with these shares of the risky area left on their parts."""
+    return np.searchsorted(RESIDUAL_THRESHOLDS, residual, side="right").astype(np.int32)
+
+
+def nearly_equal(plane: Plane, other: Plane) -> bool:
+    """Whether two planes of one parent are too alike for both to count.
+
+    The authors' rule but for its abs() of the cosine: planes that look opposite ways cut off opposite ends. Directions at least
+    e over the platform are at most 180 - 2 e apart, so from 9.1 degrees on (half the angle of SAME_COSINE) both rules are one.
+    """
+    cosine = float(plane.normal @ other.normal)
+    return cosine > SAME_COSINE and abs(plane.offset_mm - other.offset_mm) < 2.0 * cosine
+
+
 @dataclass(frozen=True, eq=False)
 class RankedCandidate:
-    """A feasible candidate: the table and row it comes from, and the round whose residual threshold let it in."""
+    """A feasible candidate: the table and row it comes from."""
 
-    table: int
+    table: CandidateTable
     row: int
-    round: int
+
+    @property
+    def round(self) -> int:
+        """The round whose residual threshold lets it in."""
+        return int(self.table.rounds(np.array([self.row]))[0])
 
 
 def rank_by_trade_off(tables: Sequence[CandidateTable], trade_off: float, bound_mm2: float) -> Iterator[RankedCandidate]:
@@ -43,7 +207,7 @@ def rank_by_trade_off(tables: Sequence[CandidateTable], trade_off: float, bound_
                 yield trade_off * float(table.scored.lost_mm2[row]) - float(table.scored.gain_mm2[row]) - start, index, row
 
     for _, index, row in merge(*(rank(index, table) for index, table in enumerate(tables))):
-        yield RankedCandidate(index, row, 0)
+        yield RankedCandidate(tables[index], row)
 
 
 def shortlist(tables: Sequence[CandidateTable], bound_mm2: float) -> Iterator[RankedCandidate]:
@@ -53,11 +217,11 @@ def shortlist(tables: Sequence[CandidateTable], bound_mm2: float) -> Iterator[Ra
     No single trade-off between what is made safe and what is left risky for ever is best on most models, so the first few of each
     stand side by side, and few directions have to be swept for them.
     """
-    for number, table in enumerate(tables):
+    for table in tables:
         rows: dict[int, RankedCandidate] = {}
         for trade_off in LISTED:
             for candidate in islice(rank_by_trade_off([table], trade_off, bound_mm2), EACH):
-                rows.setdefault(candidate.row, RankedCandidate(number, candidate.row, candidate.round))
+                rows.setdefault(candidate.row, candidate)
         yield from rows.values()
 
 
@@ -69,56 +233,53 @@ def rank_classic(
     least_reduction: accumulated reduction, a share of the model's risky area, that a candidate must exceed. preferred_mm3: parts
     of at least this volume come before all smaller ones.
     """
-    ranking = _ClassicRanking(tables, bound_mm2, least_reduction)
-    yield from ranking.within_volume(preferred_mm3, np.inf)
+    yield from _within_volume(tables, bound_mm2, least_reduction, preferred_mm3, np.inf)
     if preferred_mm3 > 0.0:
-        yield from ranking.within_volume(0.0, preferred_mm3)
+        yield from _within_volume(tables, bound_mm2, least_reduction, 0.0, preferred_mm3)
 
 
-@dataclass(frozen=True, eq=False)
-class _ClassicRanking:
-    """The candidates of some tables that would leave less than bound_mm2 for ever and reduce more than least_reduction."""
+def _within_volume(
+    tables: Sequence[CandidateTable], bound_mm2: float, least_reduction: float, least_mm3: float, most_mm3: float
+) -> Iterator[RankedCandidate]:
+    """Those whose parts have a volume from least_mm3 to below most_mm3."""
+    near: list[list[Plane]] = [[] for _ in tables]
+    best, ahead = float(np.nextafter(least_reduction, np.inf)), FIRST_LOOK  # it must be exceeded, a better one reached
+    for number in range(ROUNDS):
+        indices, rows, reduction = _sort_round(tables, number, bound_mm2, best, any_gain=least_mm3 > 0.0)
+        for position, (index, row) in enumerate(zip(indices.tolist(), rows.tolist(), strict=True)):
+            table = tables[index]
+            if table.reason[row] == UNKNOWN:
+                soon, ahead = slice(position, position + ahead), min(2 * ahead, LOOK_AHEAD)
+                for own in np.unique(indices[soon]):  # of every table in one go, all their directions in parallel
+                    tables[own].check_rows(rows[soon][indices[soon] == own])
+            if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
+                continue
+            plane = table.plane(row)
+            if not any(nearly_equal(plane, earlier) for earlier in near[index]) and table.feasible(row):
+                near[index].append(plane)
+                best = max(best, float(reduction[position]))
+                yield RankedCandidate(table, row)
 
-    tables: Sequence[CandidateTable]
-    bound_mm2: float
-    least_reduction: float
 
-    def within_volume(self, least_mm3: float, most_mm3: float) -> Iterator[RankedCandidate]:
-        """The feasible ones whose parts have a volume from least_mm3 to below most_mm3."""
-        near: list[list[Plane]] = [[] for _ in self.tables]
-        best, ahead = -np.inf, FIRST_LOOK
-        for number in range(ROUNDS):
-            indices, rows, reduction = self._sort_round(number, best, any_gain=least_mm3 > 0.0)
-            for position, (index, row) in enumerate(zip(indices.tolist(), rows.tolist(), strict=True)):
-                table = self.tables[index]
-                if table.reason[row] == UNKNOWN:
-                    soon, ahead = slice(position, position + ahead), min(2 * ahead, LOOK_AHEAD)
-                    for own in np.unique(indices[soon]):  # of every table in one go, all their directions in parallel
-                        self.tables[own].check_rows(rows[soon][indices[soon] == own])
-                if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
-                    continue
-                plane = table.plane(row)
-                if not any(nearly_equal(plane, earlier) for earlier in near[index]) and table.feasible(row):
-                    near[index].append(plane)
-                    best = max(best, float(reduction[position]))
-                    yield RankedCandidate(index, row, number)
+def _sort_round(
+    tables: Sequence[CandidateTable], number: int, bound_mm2: float, best: float, *, any_gain: bool
+) -> tuple[Ints, Ints, Floats]:
+    """What a round lets in that leaves less than bound_mm2 for ever and reduces at least as much as the best so far: (n,) tables,
+    rows and reductions, by reduction, larger parts first among equals.
 
-    def _sort_round(self, number: int, best: float, any_gain: bool) -> tuple[Ints, Ints, Floats]:
-        """What a round lets in that reduces at least as much as the best so far, by reduction, larger parts first among equals:
-        (n,) tables, rows and reductions. Few of all, so they are chosen before anything is sorted. any_gain: also what gains
-        enough for large parts only."""
-        indices: list[tuple[Ints, Ints, Ints]] = []
-        values: list[Floats] = []
-        for index, table in enumerate(self.tables):
-            scored, rows = table.scored, table.rows_of_round(number)
-            reduction = np.round((scored.gain_mm2[rows] + table.saved_mm2) / table.model.risky_mm2 / EQUAL) * EQUAL
-            admitted = (reduction >= best) & (reduction > self.least_reduction)
-            admitted &= scored.residual_mm2[rows] + table.residual_mm2 < self.bound_mm2
-            admitted &= any_gain | (scored.gain_mm2[rows] >= table.least_gain_mm2)
-            rows = rows[admitted]
-            indices.append((np.full(len(rows), index, np.int32), rows.astype(np.int32), scored.direction[rows]))
-            values.append(np.stack([scored.offset_mm[rows], reduction[admitted]]))
-        number_of, row, direction = (np.concatenate(column, dtype=np.int32) for column in zip(*indices, strict=True))
-        offset, reduction = np.concatenate(values, axis=1)
-        order = np.lexsort((direction, number_of, offset, -reduction))
-        return number_of[order], row[order], reduction[order]
+    Few of all, so they are chosen before anything is sorted. any_gain: also what gains enough for large parts only.
+    """
+    indices: list[tuple[Ints, Ints, Ints]] = []
+    values: list[Floats] = []
+    for index, table in enumerate(tables):
+        scored, rows = table.scored, table.rows_of_round(number)
+        reduction = np.round((scored.gain_mm2[rows] + table.saved_mm2) / table.model.risky_mm2 / EQUAL) * EQUAL
+        admitted = (reduction >= best) & (scored.residual_mm2[rows] + table.residual_mm2 < bound_mm2)
+        admitted &= any_gain | (scored.gain_mm2[rows] >= table.least_gain_mm2)
+        rows = rows[admitted]
+        indices.append((np.full(len(rows), index, np.int32), rows.astype(np.int32), scored.direction[rows]))
+        values.append(np.stack([scored.offset_mm[rows], reduction[admitted]]))
+    number_of, row, direction = (np.concatenate(column, dtype=np.int32) for column in zip(*indices, strict=True))
+    offset, reduction = np.concatenate(values, axis=1)
+    order = np.lexsort((direction, number_of, offset, -reduction))
+    return number_of[order], row[order], reduction[order]

@@ -8,17 +8,16 @@ A node that the beam left behind was never followed: its outcome is its own cost
 import io
 import zipfile
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Ints
-from mdp.plane import Plane
-from mdp.ranking.candidate_table import CandidateTable, Model
+from mdp.plane import PLATFORM, Plane
 from mdp.ranking.features import COLUMNS, features
-from mdp.ranking.ranking import RankedCandidate
+from mdp.ranking.ranking import Model, RankedCandidate
 
 VERSION = 2  # of the arrays; 1 had the six metrics of the paper only
 NO_NODE = -1
@@ -42,29 +41,13 @@ class Offer:
     chosen: bool = False
 
 
-def offer(parent: Hashable, table: CandidateTable, candidate: RankedCandidate) -> Offer:
-    """A candidate of a table as it is put on record."""
-    row = candidate.row
-    return Offer(parent, table.plane(row), features(table, np.array([row]))[0], candidate.round)
+def offer(candidate: RankedCandidate) -> Offer:
+    """A candidate as it is put on record."""
+    table, row = candidate.table, candidate.row
+    return Offer(table.node.signature, table.plane(row), features(table, np.array([row]))[0], candidate.round)
 
 
-@dataclass(frozen=True)
-class Child:
-    """What an offer led to. row: the offer's number; signature: equal for equal solids, so that a twin is known again;
-    cost_mm2: what it costs when the search stops there."""
-
-    row: int
-    signature: Hashable
-    cost_mm2: float
-
-
-@dataclass(eq=False)
-class _Node:
-    cost: float
-    stage: int
-    parent: int
-    features: Floats = field(default_factory=lambda: np.full(len(COLUMNS), np.nan))
-    expanded: bool = False
+Child = tuple[int, Hashable, float]  # the number of the offer that led to it, its signature, and its cost where the search stops
 
 
 class Trace:
@@ -74,9 +57,12 @@ class Trace:
         """root: signature of the uncut model, whose risky area is the measure of all shares; cost_mm2: what it costs uncut,
         absent: that area."""
         self.name, self.model = name, model
-        self._number: dict[Hashable, int] = {root: 0}
+        self._number: dict[Hashable, int] = {root: 0}  # of the node with a solid of this signature; twins share one
         whole_mm2 = model.risky_mm2 if cost_mm2 is None else cost_mm2
-        self._nodes = [_Node(whole_mm2 / model.risky_mm2 if model.risky_mm2 > 0 else 0.0, 0, NO_NODE)]
+        self._costs = [whole_mm2 / model.risky_mm2 if model.risky_mm2 > 0 else 0.0]  # of every node, the model first
+        model_itself = Offer(root, PLATFORM, np.full(len(COLUMNS), np.nan), 0)
+        self._made_by = [model_itself]  # the offer that led to every node
+        self._expanded = set[int]()
         self._candidates: list[Offer] = []
         self._stage = 0
         self._known: dict[tuple[int, bytes, float], Offer] = {}
@@ -85,8 +71,7 @@ class Trace:
         """The next stage begins: the nodes with these signatures are the ones that are cut."""
         self._stage += 1
         self._known.clear()
-        for signature in beam:
-            self._nodes[self._number[signature]].expanded = True
+        self._expanded.update(self._number[signature] for signature in beam)
 
     def add(self, offers: Sequence[Offer], children: Sequence[Child]) -> None:
         """Candidates that competed in this stage, and the cuts that were made of them, twins of known solids included.
@@ -94,17 +79,20 @@ class Trace:
         What is added several times in a stage is one row.
         """
         candidates = [self._candidate(offer) for offer in offers]
-        for child in children:
-            candidate = candidates[child.row]
+        for row, signature, cost_mm2 in children:
+            candidate = candidates[row]
             if candidate.child == NO_NODE:
-                candidate.chosen = child.signature not in self._number
-                candidate.child = self._node(child, candidate)
+                candidate.child = self._number.setdefault(signature, len(self._costs))
+                candidate.chosen = candidate.child == len(self._costs)
+                if candidate.chosen:
+                    self._costs.append(cost_mm2 / self.model.risky_mm2)
+                    self._made_by.append(candidate)
             else:  # of a twin of its parent: the same solid, whatever rounding made of its signature
-                self._number.setdefault(child.signature, candidate.child)
+                self._number.setdefault(signature, candidate.child)
 
     def outcomes(self) -> Floats:
         """(nodes,) outcome of every node as share of the model's risky area."""
-        best = np.array([node.cost for node in self._nodes])
+        best = np.array(self._costs)
         links = [(candidate.parent_number, candidate.child) for candidate in self._candidates if candidate.child != NO_NODE]
         changed = True
         while changed:  # a twin can link a node to one made earlier, so one pass from the last node to the first may not do
@@ -123,11 +111,11 @@ class Trace:
         And version, columns, model, risky_mm2, volume_mm3, radius_mm.
         """
         outcomes = self.outcomes()
-        rows, nodes = self._candidates, self._nodes
+        rows, made_by = self._candidates, self._made_by
         child = _integers(row.child for row in rows)
         return {
             "features": _table([row.features for row in rows], len(COLUMNS)),
-            "parent_features": _table([nodes[row.parent_number].features for row in rows], len(COLUMNS)),
+            "parent_features": _table([made_by[row.parent_number].features for row in rows], len(COLUMNS)),
             "stage": _integers(row.stage for row in rows),
             "round": _integers(row.round for row in rows),
             "parent": _integers(row.parent_number for row in rows),
@@ -136,11 +124,11 @@ class Trace:
             "chosen": np.array([row.chosen for row in rows], dtype=np.bool_),
             "child": child,
             "outcome": np.where(child == NO_NODE, np.nan, outcomes[child]),
-            "node_cost": np.array([node.cost for node in nodes]),
+            "node_cost": np.array(self._costs),
             "node_outcome": outcomes,
-            "node_stage": _integers(node.stage for node in nodes),
-            "node_parent": _integers(node.parent for node in nodes),
-            "node_expanded": np.array([node.expanded for node in nodes]),
+            "node_stage": _integers(made.stage for made in made_by),
+            "node_parent": _integers(made.parent_number for made in made_by),
+            "node_expanded": np.array([number in self._expanded for number in range(len(made_by))]),
             "version": np.array(VERSION),
             "columns": np.array(COLUMNS),
             "model": np.array(self.name),
@@ -159,14 +147,6 @@ class Trace:
         if known is offer:
             self._candidates.append(offer)
         return known
-
-    def _node(self, child: Child, candidate: Offer) -> int:
-        """The number of a child, a new one unless it is a twin."""
-        number = self._number.setdefault(child.signature, len(self._nodes))
-        if number == len(self._nodes):
-            cost = child.cost_mm2 / self.model.risky_mm2
-            self._nodes.append(_Node(cost, self._stage, candidate.parent_number, candidate.features))
-        return number
 
 
 def npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:

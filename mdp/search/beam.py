@@ -14,7 +14,6 @@ search_as_published is the authors' own loop of 2020, for comparisons and for re
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
 from heapq import merge
 from itertools import chain, islice
 from math import isqrt
@@ -26,15 +25,14 @@ from mdp.cost.cost import CutCost
 from mdp.kernels.threads import ahead
 from mdp.overhang import threshold
 from mdp.plane import Plane
-from mdp.ranking.candidate_table import CandidateTable, nearly_equal
-from mdp.ranking.candidates import gain_mm2, lost_mm2, residual_mm2
-from mdp.ranking.ranker import Network
-from mdp.ranking.ranking import LISTED, RankedCandidate, rank_by_trade_off, rank_classic, shortlist
-from mdp.ranking.record import Child, Trace, offer
-from mdp.search.front import Front
-from mdp.search.node import Node
+from mdp.ranking.candidates import Bounds, gain_mm2, lost_mm2, residual_mm2
+from mdp.ranking.node import Node
+from mdp.ranking.ranker import LearnedRanker
+from mdp.ranking.ranking import LISTED, CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, shortlist
+from mdp.ranking.record import Trace, offer
+from mdp.search.front import ParetoFront
 from mdp.search.problem import Problem
-from mdp.sweep.limbs import LimbSums, find_limbs
+from mdp.sweep.limbs import LimbGrid, LimbSums, find_limbs
 
 # How many times the area made safe an area that is left for ever counts; None: the ranker's own. Many models, one greedy search
 # each: 4 is best on average, no value is best on most models.
@@ -52,33 +50,24 @@ Pick = tuple[RankedCandidate, Node]  # a candidate that a slot of the beam took,
 Offered = tuple[float, Node, Plane, CutCost | None]  # a possible cut: its key, lower is better, and its cost where that is known
 
 
-@dataclass(frozen=True, eq=False)
-class Branch:
-    """A node that is followed, and the candidates for its next cut, worked out while other slots are still picking."""
-
-    node: Node
-    coming: Future[CandidateTable]
-
-    @property
-    def table(self) -> CandidateTable:
-        """The candidates, waited for."""
-        return self.coming.result()
+# The candidates for the next cut of a node that is followed, worked out while other slots are still picking.
+FutureTable = Future[CandidateTable]
 
 
 class Beam:
     """A beam of search.beam_width slots; bests holds the best node that each slot ever had."""
 
-    def __init__(self, problem: Problem, ranker: Network | None, trace: Trace | None) -> None:
+    def __init__(self, problem: Problem, ranker: LearnedRanker | None, trace: Trace | None) -> None:
         self.problem, self.ranker, self.trace = problem, ranker, trace
         width = problem.settings.beam_width
         self.nodes: list[Node | None] = [problem.start] + [None] * (width - 1)
         self.bests = [problem.start] * width
-        self.front = Front(problem.start)
+        self.front = ParetoFront(problem.start)
         self.first = self._branch(problem.start, 0)
-        self._branches: list[Branch | None] = [self.first]
+        self._branches: list[FutureTable | None] = [self.first]
         self._seen = {problem.start.signature: 0}  # solids and the lowest slot that had them
-        self._children: dict[tuple[int, int], Node | None] = {}
-        self._taken: dict[int, list[Plane]] = {}
+        self._children: dict[tuple[CandidateTable, int], Node | None] = {}
+        self._taken: dict[CandidateTable, list[Plane]] = {}
 
     @property
     def best(self) -> Node:
@@ -105,18 +94,18 @@ class Beam:
                 self.front.offer(node)
                 self.bests[slot] = min(self.bests[slot], node, key=lambda node: node.cost_mm2)
         for branch in branches:
-            if branch is not None and branch.node is not self.problem.root:
-                branch.node.let_go()
+            if branch is not None and branch.result().node is not self.problem.root:
+                branch.result().node.release()
 
     def close(self) -> None:
         """Leave off what was begun for a next cut."""
         for branch in self._branches:
             if branch is not None:
-                branch.coming.cancel()
+                branch.cancel()
 
-    def _branch(self, node: Node, slot: int) -> Branch:
+    def _branch(self, node: Node, slot: int) -> FutureTable:
         large = TRADE_OFFS[slot % len(TRADE_OFFS)] is None and self.ranker is None
-        return Branch(node, ahead(self.problem.table, node, large, self.ranker is not None or self.trace is not None))
+        return ahead(self.problem.table, node, large, self.ranker is not None or self.trace is not None)
 
     def finalists(self) -> list[Node]:
         """The nodes to polish: of the second slot and of every slot with a square number the best one that it or a lower one
@@ -130,71 +119,66 @@ class Beam:
                 finalists += [min(others, key=lambda node: node.cost_mm2)] if others else []
         return finalists
 
-    def _pick(self, branches: Sequence[Branch], slot: int) -> Pick | None:
+    def _pick(self, branches: Sequence[FutureTable], slot: int) -> Pick | None:
         """What a slot takes of the children of some branches: no solid twice, no two near-equal cuts of one node."""
         for candidate in self._rank(branches, slot):
-            branch = branches[candidate.table]
-            plane, taken = branch.table.plane(candidate.row), self._taken.setdefault(candidate.table, [])
+            plane, taken = candidate.table.plane(candidate.row), self._taken.setdefault(candidate.table, [])
             if any(nearly_equal(plane, earlier) for earlier in taken):
                 continue
-            child = self._child(branch, candidate)
+            child = self._child(candidate)
             if child is not None and self._seen.get(child.signature, slot + 1) > slot:
                 self._seen[child.signature] = slot
                 taken.append(plane)
                 return candidate, child
         return None
 
-    def _rank(self, branches: Sequence[Branch], slot: int) -> Iterator[RankedCandidate]:
+    def _rank(self, branches: Sequence[FutureTable], slot: int) -> Iterator[RankedCandidate]:
         if not branches:
             return iter(())
-        tables = [branch.table for branch in branches]
+        tables = [branch.result() for branch in branches]
         bound_mm2 = min(node.cost_mm2 for node in self.bests[: slot + 1])
         trade_off = TRADE_OFFS[slot % len(TRADE_OFFS)]
         if trade_off is not None:
             return rank_by_trade_off(tables, trade_off, bound_mm2)
         if self.ranker is not None:  # what follows the shortlist is for the case that nothing on it can be cut
-            return chain(self.ranker.rank(shortlist(tables, bound_mm2), tables), rank_by_trade_off(tables, LISTED[0], bound_mm2))
+            return chain(self.ranker.rank(shortlist(tables, bound_mm2)), rank_by_trade_off(tables, LISTED[0], bound_mm2))
         return rank_classic(tables, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
 
-    def _child(self, branch: Branch, candidate: RankedCandidate) -> Node | None:
-        key, row = (candidate.table, candidate.row), candidate.row
+    def _child(self, candidate: RankedCandidate) -> Node | None:
+        key = candidate.table, candidate.row
         if key not in self._children:
-            self._children[key] = self.problem.cut(branch.node, branch.table.plane(row), branch.table.scored.cost(row))
+            self._children[key] = self.problem.cut_row(*key)
         return self._children[key]
 
-    def _record(self, trace: Trace, branches: Sequence[Branch], picks: Sequence[Pick | None]) -> None:
+    def _record(self, trace: Trace, branches: Sequence[FutureTable], picks: Sequence[Pick | None]) -> None:
         """Put the stage on record: the first candidates of the classic ranking, and what the slots took."""
-        tables = [branch.table for branch in branches]
+        tables = [branch.result() for branch in branches]
         bound_mm2, preferred_mm3 = self.best.cost_mm2, self.problem.preferred_mm3
         classic = rank_classic(tables, bound_mm2, preferred_mm3=preferred_mm3) if tables else iter(())
-        offered = list(islice(classic, max(RECORDED, 2 * len(self.nodes))))
-        number_of = {(candidate.table, candidate.row): number for number, candidate in enumerate(offered)}
-        children = []
-        for candidate, node in filter(None, picks):
-            table, row = candidate.table, candidate.row
-            if (table, row) not in number_of:
-                number_of[table, row] = len(offered)
-                offered.append(RankedCandidate(table, row, int(tables[table].rounds(np.array([row]))[0])))
-            children.append(Child(number_of[table, row], node.signature, node.cost_mm2))
-        signatures = [branch.node.signature for branch in branches]
-        trace.add([offer(signatures[ranked.table], tables[ranked.table], ranked) for ranked in offered], children)
+        offered = {(ranked.table, ranked.row): ranked for ranked in islice(classic, max(RECORDED, 2 * len(self.nodes)))}
+        picked = [pick for pick in picks if pick is not None]
+        for candidate, _ in picked:
+            offered.setdefault((candidate.table, candidate.row), candidate)
+        number_of = {key: number for number, key in enumerate(offered)}
+        children = [(number_of[each.table, each.row], node.signature, node.cost_mm2) for each, node in picked]
+        trace.add(list(map(offer, offered.values())), children)
 
 
-def search_limbs(problem: Problem, first: Branch) -> list[Node]:
+def search_limbs(problem: Problem, first: FutureTable) -> list[Node]:
     """The best node after each stage of a search that may cut off single limbs; empty where no limb is worth a cut.
 
     first: the node that the search begins with.
     """
-    limbs = [] if problem.full(first.node) or problem.late() else _find_limbs(problem)
+    limbs = [] if problem.full(problem.start) or problem.late() else _find_limbs(problem)
     if not limbs:
         return []
-    table = first.table
+    table = first.result()
     rows = [row for trade_off in LIMB_TRADE_OFFS for row in islice(table.rows_by_trade_off(trade_off), MOST_PLANES)]
     directions = problem.limits.directions[np.unique(table.scored.direction[rows])]
     limits, seen, found = problem.bounds_along(directions), set[tuple[float, ...]](), list[Node]()
     nodes, best = [problem.start], problem.start
     while nodes and not problem.full(nodes[0]) and not problem.late():
-        offers = [(node, problem.limb_sums(node, limbs), problem.table(node, limits=limits)) for node in nodes]
+        offers = [(problem.limb_sums(node, limbs), problem.table(node, limits=limits)) for node in nodes]
         nodes = []
         for trade_off in LIMB_TRADE_OFFS:
             cuts = (_rank_cuts(problem, limbs, offer, trade_off, best.cost_mm2) for offer in offers)
@@ -209,14 +193,14 @@ def search_limbs(problem: Problem, first: Branch) -> list[Node]:
 
 
 def _rank_cuts(
-    problem: Problem, limbs: Sequence[Plane], offer: tuple[Node, LimbSums, CandidateTable], trade_off: float, bound_mm2: float
+    problem: Problem, limbs: Sequence[Plane], offer: tuple[LimbSums, CandidateTable], trade_off: float, bound_mm2: float
 ) -> Iterator[Offered]:
     """What may be cut off a node, limbs or what lies above planes of its table: best first, by trade_off times the loss less the
     gain, over all cuts so far. Cuts that would leave at least bound_mm2 for ever are left out."""
-    node, sums, table = offer
-    residual = residual_mm2(sums, problem.terms)
+    sums, table = offer
+    node, residual = table.node, residual_mm2(sums, problem.terms)
     gain = np.where(sums.exists & ~sums.alone, gain_mm2(sums, residual), -np.inf)
-    before = trade_off * node.lost_mm2 - (problem.root.cost_mm2 - node.cost_mm2)
+    before = trade_off * node.lost_mm2 - node.saved_mm2
     keys = before + trade_off * lost_mm2(sums, residual) - gain
     good = (gain >= problem.least_gain_mm2) & (node.residual_mm2 + residual < bound_mm2)
     order = [row for row in np.argsort(keys, kind="stable") if good[row]][:MOST_TRIED]
@@ -242,7 +226,7 @@ def _cut(problem: Problem, offered: Offered, seen: set[tuple[float, ...]]) -> No
 def _find_limbs(problem: Problem) -> list[Plane]:
     """The limbs of the uncut model that save most and can be cut off; of near-equal planes of one limb only the best."""
     node = problem.start
-    grid = problem.limb_grid(problem.bounds_along(problem.limits.directions[::EVERY]), WORTH * problem.root.cost_mm2)
+    grid = _limb_grid(problem, problem.bounds_along(problem.limits.directions[::EVERY]))
     candidates = find_limbs(node.remainder, grid, threshold(problem.terms.angle_deg))
     vertices = node.remainder.facets.mesh.vertices
     planes, by_limb, checked = list[Plane](), dict[tuple[int, ...], list[Plane]](), 0
@@ -261,11 +245,24 @@ def _find_limbs(problem: Problem) -> list[Plane]:
     return planes
 
 
+def _limb_grid(problem: Problem, limits: Bounds) -> LimbGrid:
+    """Where limbs are looked for: along the directions of some bounds, with the least gain that a limb must bring."""
+    return LimbGrid(
+        directions=limits.directions,
+        step_mm=limits.step_mm,
+        least_height_mm=limits.least_height_mm,
+        keep_mm=limits.keep_mm,
+        seam_mm=problem.terms.seam_mm,
+        cut_mm2=problem.terms.cut_mm2,
+        least_gain_mm2=max(problem.least_gain_mm2, WORTH * problem.root.cost_mm2),
+        least_volume_mm3=limits.least_volume_mm3,
+        least_interface_mm2=limits.contact_area_mm2,
+        crumb=limits.crumb_mm / limits.step_mm,
+    )
+
+
 def search_as_published(
-    problem: Problem,
-    ranker: Network | None,
-    trace: Trace | None,
-    on_stage: Callable[[int, int, Node], None],
+    problem: Problem, ranker: LearnedRanker | None, trace: Trace | None, on_stage: Callable[[int, int, Node], None]
 ) -> tuple[Node, int]:
     """The best node of the authors' loop, and after how many stages.
 
@@ -277,9 +274,10 @@ def search_as_published(
     while problem.continues(stage):
         stage += 1
         tables = [problem.table(node, described=trace is not None or ranker is not None) for node in beam]
-        chosen, children = _fill_as_published(problem, ranker, beam, tables)
-        if trace is not None:
-            _record_as_published(trace, beam, tables, chosen, children)
+        chosen, children = _fill_as_published(problem, ranker, tables)
+        if trace is not None:  # nodes of the last stage are not expanded, the loop ended
+            trace.begin_stage([node.signature for node in beam])
+            trace.add(list(map(offer, chosen)), [(row, child.signature, child.cost_mm2) for row, child in enumerate(children)])
         highest = min(children, key=lambda node: node.cost_mm2, default=best)
         if highest.cost_mm2 >= best.cost_mm2:
             break
@@ -289,7 +287,7 @@ def search_as_published(
 
 
 def _fill_as_published(
-    problem: Problem, ranker: Network | None, beam: Sequence[Node], tables: Sequence[CandidateTable]
+    problem: Problem, ranker: LearnedRanker | None, tables: Sequence[CandidateTable]
 ) -> tuple[list[RankedCandidate], list[Node]]:
     """The candidates that fill the next beam, best first, and what they lead to; what cannot be cut is passed over."""
     useless = max(table.saved_mm2 for table in tables) / problem.model.risky_mm2
@@ -299,30 +297,16 @@ def _fill_as_published(
     children: list[Node] = []
 
     def follow(candidate: RankedCandidate) -> None:
-        table, row = tables[candidate.table], candidate.row
-        child = problem.cut(beam[candidate.table], table.plane(row), table.scored.cost(row))
+        child = problem.cut_row(candidate.table, candidate.row)
         if child is not None:
             chosen.append(candidate)
             children.append(child)
 
     offered = chain(plain, classic)
-    for candidate in offered if ranker is None else ranker.rank(offered, tables):
+    for candidate in offered if ranker is None else ranker.rank(offered):
         follow(candidate)
         if len(children) == problem.settings.beam_width:
             break
     if ranker is not None and plain and plain[0] not in chosen:
         follow(plain[0])
     return chosen, children
-
-
-def _record_as_published(
-    trace: Trace,
-    beam: Sequence[Node],
-    tables: Sequence[CandidateTable],
-    chosen: Sequence[RankedCandidate],
-    children: Sequence[Node],
-) -> None:
-    """Put a stage on record: the candidates that filled the beam. Nodes of the last stage are not expanded, the loop ended."""
-    trace.begin_stage([node.signature for node in beam])
-    offers = [offer(beam[candidate.table].signature, tables[candidate.table], candidate) for candidate in chosen]
-    trace.add(offers, [Child(row, child.signature, child.cost_mm2) for row, child in enumerate(children)])

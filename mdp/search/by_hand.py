@@ -5,8 +5,9 @@ the machine's reach, lets the head meet the table, leaves a sliver or a base tha
 that stays whole. That a cut gains little, makes a small part or a long seam is the person's to judge.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from math import ceil, cos, floor, radians, sin
 
 import numpy as np
@@ -17,10 +18,10 @@ from mdp.directions.frame import frame_across
 from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text
 from mdp.overhang import BASE_TOLERANCE_MM, threshold
 from mdp.plane import Plane
-from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
 from mdp.pose import poses
 from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, gain_mm2, residual_mm2
-from mdp.search.node import Node
+from mdp.ranking.node import Node
+from mdp.search.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
 from mdp.search.problem import FINEST, Problem
 from mdp.sweep.limbs import limb_mesh
 from mdp.sweep.sweep import gains
@@ -73,25 +74,36 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
         offset_mm = planned.offset_mm  # a grid of offsets through a plane next to the origin would have too many planes
         if offset_mm is not None and 0.0 < abs(offset_mm) < least_mm:
             raise PlanError(f"{label}: offset_mm is {offset_mm:g}: 0 or at least {least_mm:g} is allowed")
-        child = cut_or_refuse(problem, node, planned.plane or _complete(problem, node, planned, label))
-        if isinstance(child, Refusal):
+        child = try_planes(problem, node, [planned.plane or _complete(problem, node, planned, label)])
+        if isinstance(child, Rejection):
             raise PlanError(f"{label} cannot be cut off: {child.text}")
         node = child
     return node
 
 
-@dataclass(frozen=True)
-class Refusal:
-    """Why a person's plane cannot cut; reason: what was found against it, FEASIBLE: there is nothing to cut."""
+@dataclass(frozen=True, eq=False)
+class Rejection:
+    """Why a person's plane cannot cut a node; reason: what was found against it, FEASIBLE: there is nothing to cut."""
 
+    node: Node
     text: str
     reason: Reason = Reason.FEASIBLE
 
 
-def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
-    """The node after a person's cut, or the reason why it cannot be made."""
+def try_planes(problem: Problem, node: Node, planes: Sequence[Plane]) -> Node | Rejection:
+    """The node after a person's cuts in turn, or why the first of them that cannot be made cannot."""
+    for plane in planes:
+        child = _cut(problem, node, plane)
+        if isinstance(child, Rejection):
+            return child
+        node = child
+    return node
+
+
+def _cut(problem: Problem, node: Node, plane: Plane) -> Node | Rejection:
+    """The node after a person's cut, or why it cannot be made."""
     named = name_limbs(node, plane)
-    if isinstance(named, Refusal):
+    if isinstance(named, Rejection):
         return named
     why = _unfit(problem, node, named)
     if why is not None:
@@ -100,23 +112,23 @@ def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     if child is not None:
         return child
     if named.limbs_mm is None:
-        return Refusal(OUT_OF_REACH, Reason.REACH)
-    return _in_the_way(problem, node, named) or Refusal(REASONS[Reason.FLOATING], Reason.FLOATING)
+        return Rejection(node, OUT_OF_REACH, Reason.REACH)
+    return _in_the_way(problem, node, named) or Rejection(node, REASONS[Reason.FLOATING], Reason.FLOATING)
 
 
-def name_limbs(node: Node, plane: Plane) -> Plane | Refusal:
+def name_limbs(node: Node, plane: Plane) -> Plane | Rejection:
     """A plane whose limbs are named by vertices. A point stands for the nearest piece above the plane; unless all points are
     vertices, each piece is named by its farthest vertex. Where the limbs are all that lies above, the plane has none."""
     if plane.limbs_mm is None:
         return plane
     limbs, standing = divide(above(node.solid, plane), plane.limbs_mm)
     if limbs.is_empty():
-        return Refusal("nothing lies above its plane")
+        return Rejection(node, "nothing lies above its plane")
     surface = mesh_of(limbs)
     away_mm = [surface.distance_mm(point) for point in plane.limbs_mm]
     if max(away_mm) > FARTHEST_MM:
         place = ", ".join(f"{x:.4g}" for x in plane.limbs_mm[int(np.argmax(away_mm))])
-        return Refusal(f"no piece above its plane lies at {place}: the nearest one is {max(away_mm):.3g} mm away")
+        return Rejection(node, f"no piece above its plane lies at {place}: the nearest one is {max(away_mm):.3g} mm away")
     if standing.is_empty():
         return replace(plane, limbs_mm=None)
     high = surface.vertices[plane.heights_mm(surface.vertices) > BASE_TOLERANCE_MM]
@@ -130,12 +142,8 @@ def name_limbs(node: Node, plane: Plane) -> Plane | Refusal:
 def cut_near(problem: Problem, node: Node, plane: Plane) -> Node | None:
     """The node after a cut by the nearest plane to one that can be cut: the plane itself, one beside it, or one that leans by a
     few degrees; None where there is none."""
-    child = cut_or_refuse(problem, node, plane)
-    for near in _beside(problem, node, plane) if isinstance(child, Refusal) else ():
-        child = cut_or_refuse(problem, node, near)
-        if isinstance(child, Node):
-            break
-    return child if isinstance(child, Node) else None
+    children = (try_planes(problem, node, [near]) for near in chain([plane], _beside(problem, node, plane)))
+    return next((child for child in children if isinstance(child, Node)), None)
 
 
 def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
@@ -193,7 +201,7 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
 def _if_free(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
     """A plane, its limbs named, where nothing is found against it."""
     named = name_limbs(node, plane)
-    if isinstance(named, Plane) and refusal(problem, node, named) is None:
+    if isinstance(named, Plane) and rejection(problem, node, named) is None:
         yield named
 
 
@@ -205,30 +213,32 @@ def _leaning(normal: Floats, lean_deg: float) -> Floats:
     return cos(radians(lean_deg)) * normal + sin(radians(lean_deg)) * np.stack([aside, -aside, across, -across])
 
 
-def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
+def rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
     """Why a person's plane cannot cut a node, None: it can. Nothing is cut."""
     return _unfit(problem, node, plane) or _in_the_way(problem, node, plane)
 
 
-def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
+def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
     """A refusal where the head would meet what stands beside the limbs of a plane."""
     if plane.limbs_mm is None or problem.is_clear(node, plane):
         return None
-    return Refusal(REASONS[Reason.STANDING], Reason.STANDING)
+    return Rejection(node, REASONS[Reason.STANDING], Reason.STANDING)
 
 
-def _unfit(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
+def _unfit(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
     """Why a plane cannot cut a node, what stands beside limbs left aside: what the sweep finds, or no pose serves the part."""
-    why = _refusal(problem, node, plane)
+    why = _rejection(problem, node, plane)
     if why is not None or not problem.settings.clearance:
         return why
-    points, machine = problem.corners_cut(node, plane) + problem.place_mm, problem.machine
+    points, machine = node.corners_cut(plane) + problem.place_mm, problem.machine
     if len(points) == 0:
-        return Refusal("nothing lies above its plane", Reason.REACH)
+        return Rejection(node, "nothing lies above its plane", Reason.REACH)
     obstacles = [find_obstacle(machine, pose, points) for pose in poses(machine, plane.normal)]
     if any(obstacle is None for obstacle in obstacles):
         return None
-    return Refusal("; the other way round ".join(obstacle for obstacle in obstacles if obstacle) or OUT_OF_REACH, Reason.REACH)
+    return Rejection(
+        node, "; the other way round ".join(obstacle for obstacle in obstacles if obstacle) or OUT_OF_REACH, Reason.REACH
+    )
 
 
 def _limits(problem: Problem, directions: Floats) -> Bounds:
@@ -236,17 +246,13 @@ def _limits(problem: Problem, directions: Floats) -> Bounds:
     return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
 
 
-def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
+def _rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
     """Why a person's plane may not cut a node, in a sentence with its numbers; None: the sweep finds nothing against it."""
     missed = _miss(problem, node, plane)
     if missed is not None:
-        return Refusal(missed)
-    limits, settings, fragile_mm = _limits(problem, plane.normal[None]), problem.settings, np.inf
-    if plane.limbs_mm is None:
-        checked = problem.check_plane(node, plane, limits)
-        reason, fragile_mm = Reason(int(checked.reason[0])), float(checked.fragile_mm[0])
-    else:
-        reason = problem.check_limbs(node, plane, limits)
+        return Rejection(node, missed)
+    limits, settings = _limits(problem, plane.normal[None]), problem.settings
+    reason, sliver_mm = problem.check(node, plane, limits)
     if reason == Reason.FEASIBLE:
         return None
     text = REASONS[reason]
@@ -262,15 +268,14 @@ def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
         case Reason.INTERFACE:
             text = "a piece of it would hang in the air: it stands on nothing that is printed before"
         case Reason.FRAGILE:
-            fragile_mm = fragile_mm if plane.limbs_mm is None else problem.sliver_mm(node, plane)
-            sliver = f"its plane would leave a sliver {fragile_mm:.2g} mm thin"
+            sliver = f"its plane would leave a sliver {sliver_mm:.2g} mm thin"
             text = f"{sliver}: {limits.fragile_mm:g} is the least (search.fragile_mm)"
         case Reason.KEEP:
             text = f"its plane would pass through zone {problem.zones.crossed(plane)} of [[keep]], which stays whole"
         case Reason.WEAK:
             stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
             text += f": {settings.nozzle_load_n:g} N at its top are {stress}"
-    return Refusal(text, reason)
+    return Rejection(node, text, reason)
 
 
 def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
@@ -309,7 +314,7 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
         if reason[row] == Reason.FEASIBLE:
             offset = float(offset_mm[row]) if planned.offset_mm is None else planned.offset_mm
             plane = Plane(directions[direction[row]], offset)
-            if _refusal(problem, node, plane) is None and problem.cut(node, plane) is not None:
+            if _rejection(problem, node, plane) is None and problem.cut(node, plane) is not None:
                 return plane
     counts = [(int((reason == why).sum()), text) for why, text in REASONS.items()]
     shares = "; ".join(f"{count} because {text}" for count, text in counts if count)

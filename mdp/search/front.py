@@ -8,7 +8,7 @@ import numpy as np
 from mdp.cost.model_need import excess_mm2
 from mdp.decomposition import FrontRow, Part
 from mdp.kernels.processes import parallel_map
-from mdp.search.node import Node
+from mdp.ranking.node import Node
 from mdp.sweep.limbs import limb_faces
 from profiles.errors import counted
 from profiles.profile import Profile
@@ -16,22 +16,14 @@ from profiles.profile import Profile
 # Costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams.
 EQUAL = 0.01
 
-
-@dataclass(frozen=True)
-class Price:
-    """What parts take to print: seconds, and mm of filament."""
-
-    time_s: float
-    filament_mm: float
-
-
 ASKED, BY_PLAN = "asked for", "by the plan"
 LEAST_PARTS = "the fewest parts, cost alike to the least"
 PRINTABLE = "the least cost of what can be printed well"
+Price = tuple[float, float]  # what parts take to print: seconds, and mm of filament
 Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 
 
-class Front:
+class ParetoFront:
     """The best node met for every number of cuts: of those whose cost is alike to the least the one with the shortest seams;
     where seams cost nothing the cheapest one."""
 
@@ -70,12 +62,12 @@ class Front:
 
 def front_row(node: Node) -> FrontRow:
     """A node with what it costs, the cuts apart. Every area counts once in the area that needs support."""
-    scars_mm2, over_mm2 = sum(cut.cost.seam_mm2 for cut in node.cuts), 0.0
+    scars_mm2, over_mm2 = sum(cut.cut_cost.seam_mm2 for cut in node.cuts), 0.0
     seam_mm = sum((seam.length_mm for seam in node.seams), 0.0)
     if node.terms.need is not None:
         plain_mm2 = float(node.remainder.mesh.areas_mm2[node.remainder.risky].sum())
         over_mm2 = _excess_mm2(node) + (node.remainder.risky_mm2 - plain_mm2)
-    stairs_mm2 = node.stairs_mm2 + sum(cut.cost.stairs_mm2 for cut in node.cuts)
+    stairs_mm2 = node.stairs_mm2 + sum(cut.cut_cost.stairs_mm2 for cut in node.cuts)
     return FrontRow(
         tuple(node.planes), node.cost_mm2 - scars_mm2 - over_mm2 - stairs_mm2, seam_mm, node.cost_mm2, stairs_mm2=stairs_mm2
     )
@@ -91,21 +83,17 @@ def _excess_mm2(node: Node) -> float:
     return total_mm2
 
 
-def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:
-    """A row with what its parts take to print, as it is where that is not known."""
-    return _with_price(row, price(parts))
-
-
 def price_rows(rows: Sequence[FrontRow], parts: Mapping[int, Sequence[Part]], price: Pricing) -> list[FrontRow]:
     """Rows with what their parts take to print. parts: of the places of rows that get a price."""
     places = list(parts)
     prices = parallel_map(lambda k: price(parts[places[k]]), len(places))
     known = dict(zip(places, prices, strict=True))
-    return [_with_price(row, known.get(place)) for place, row in enumerate(rows)]
+    return [with_price(row, known.get(place)) for place, row in enumerate(rows)]
 
 
-def _with_price(row: FrontRow, price: Price | None) -> FrontRow:
-    return row if price is None else replace(row, time_s=price.time_s, filament_mm=price.filament_mm)
+def with_price(row: FrontRow, price: Price | None) -> FrontRow:
+    """A row with what its parts take to print, as it is where that is not known."""
+    return row if price is None else replace(row, time_s=price[0], filament_mm=price[1])
 
 
 def pays(rows: Sequence[FrontRow | Node]) -> list[bool]:
@@ -114,14 +102,14 @@ def pays(rows: Sequence[FrontRow | Node]) -> list[bool]:
 
 
 @dataclass(frozen=True)
-class Worth:
+class Weights:
     """What a second of printing and a mm of filament count beside surface that is blemished, mm2."""
 
     second_mm2: float = 0.0
     filament_mm2: float = 0.0
 
     @classmethod
-    def of(cls, profile: Profile) -> "Worth":
+    def of(cls, profile: Profile) -> "Weights":
         """What they count by a profile; without support nothing, for then they are no reason to leave a model whole."""
         search = profile.search.effective
         return cls() if profile.process.support != "auto" else cls(search.second_mm2, 1e-3 * search.metre_mm2)
@@ -150,31 +138,31 @@ class Choice:
     note: tuple[str, ...] = ()
 
 
-def charge_mm2(rows: Sequence[FrontRow], worth: Worth, least_saving: float) -> float:
+def charge_mm2(rows: Sequence[FrontRow], weights: Weights, least_saving: float) -> float:
     """The charge for each part beyond those of the first row: a share of what that costs with its time; nothing where time counts
     nothing, as without support, or where no row has a time."""
     timed = [row for row in rows if row.time_s is not None]
-    return least_saving * (timed[0].cost_mm2 + (worth.of_row(timed[0]) or 0.0)) if worth and timed else 0.0
+    return least_saving * (timed[0].cost_mm2 + (weights.of_row(timed[0]) or 0.0)) if weights and timed else 0.0
 
 
-def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0) -> Choice:
+def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0) -> Choice:
     """The row whose cost, with its time and filament and a charge for every further part, is least. rows: by their number of
     parts.
 
-    worth: what time and filament count. least_saving: the charge, as a share of what the first row costs with its time. Where any
-    row has a time, those without cannot be printed, and those that are not sound are not taken. Where none has, and where time
-    counts nothing, as without support, there is no charge: the row of the fewest parts is taken whose cost is alike to the least.
+    weights: what time and filament count. least_saving: the charge, as a share of what the first row costs with its time. Where
+    any row has a time, those without cannot be printed, and those that are not sound are not taken. Where none has, and where
+    time counts nothing, as without support, there is no charge: the row of the fewest parts is taken whose cost is alike to the
+    least.
     """
     paying = [place for place, good in enumerate(pays(rows)) if good and (place == 0 or rows[place].sound)]
     timed = [place for place in paying if rows[place].time_s is not None]
     places, first = timed or paying, (timed or paying)[0]
-    totals = {place: rows[place].cost_mm2 + (worth.of_row(rows[place]) or 0.0) for place in places}
-    charge = charge_mm2([rows[place] for place in places], worth, least_saving)
-    if worth and timed:
+    totals = {place: rows[place].cost_mm2 + (weights.of_row(rows[place]) or 0.0) for place in places}
+    charge = charge_mm2([rows[place] for place in places], weights, least_saving)
+    limit_mm2 = min(rows[place].cost_mm2 for place in places) + EQUAL * rows[first].cost_mm2
+    scars = taken = next(place for place in places if rows[place].cost_mm2 <= limit_mm2)
+    if weights and timed:
         taken = min(places, key=lambda place: totals[place] + charge * (rows[place].parts - rows[first].parts))
-    else:
-        taken = places[_first_alike([rows[place].cost_mm2 for place in places])]
-    scars = places[_first_alike([rows[place].cost_mm2 for place in places])]
     least_mm2 = min(row.cost_mm2 for row in rows)
     if rows[taken].cost_mm2 <= least_mm2:
         reason = "the least cost"
@@ -185,12 +173,6 @@ def choose(rows: Sequence[FrontRow], worth: Worth, least_saving: float = 0.0) ->
     else:
         reason = f"more parts would save less than {100.0 * least_saving:g} % each"
     return Choice(taken, reason, _given_up(rows[scars], rows[taken]) if taken != scars else ())
-
-
-def _first_alike(costs_mm2: Sequence[float]) -> int:
-    """The first cost that is alike to the least; the very first is that of the fewest parts."""
-    limit_mm2 = min(costs_mm2) + EQUAL * costs_mm2[0]
-    return next(place for place, cost_mm2 in enumerate(costs_mm2) if cost_mm2 <= limit_mm2)
 
 
 def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:

@@ -57,43 +57,40 @@ class _Surface:
         return centre
 
 
-def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float, reach_deg: float = REACH_DEG) -> Plane | None:
+def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float) -> Plane | None:
     """The plane of the shortest rim among the necks near a plane; None: there is none, or the plane misses the mesh.
 
     seen: (m,) above 0 for the faces on which a rim counts. The middle of the neck's rim is at most reach_mm from the plane and
-    its normal at most reach_deg from the plane's.
+    its normal at most REACH_DEG from the plane's.
     """
     heights = plane.heights_mm(mesh.vertices)
     if heights.max() <= 0.0 or heights.min() >= 0.0:
         return None
-    surface = _near(mesh, seen, heights, reach_mm, reach_deg)
+    surface = _near(mesh, seen, heights, reach_mm)
     if surface.rim_mm(plane) <= 0.0:
         return None
     centre = surface.centre_mm(plane)
-    shorter = sorted(_first_look(mesh, seen, plane.normal, centre, (reach_mm, reach_deg)), key=lambda pair: pair[0])
+    shorter = sorted(_first_look(mesh, seen, plane.normal, centre, reach_mm), key=lambda pair: pair[0])
     begins = _apart(surface, [begin for _, begin in shorter], APART * reach_mm)
-    necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS, reach_deg / RINGS) for begin in begins]
-    allowed = [neck for neck in necks if _is_neck(surface, neck, plane, centre, (reach_mm, reach_deg))]
+    necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS) for begin in begins]
+    allowed = [neck for neck in necks if _is_neck(surface, neck, plane, reach_mm)]
     return min(allowed, key=surface.rim_mm, default=None)
 
 
-def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float, reach_deg: float) -> _Surface:
+def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surface:
     """The part of a mesh that a plane of the search can meet: all of it but what lies far above and below."""
     wide_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
-    far_mm = 2.0 * reach_mm + wide_mm * sin(radians(min(reach_deg, 90.0)))
+    far_mm = 2.0 * reach_mm + wide_mm * sin(radians(REACH_DEG))
     around = heights[mesh.faces]
     kept = (around.min(axis=1) <= far_mm) & (around.max(axis=1) >= -far_mm)
     weights = (seen[kept] > 0.0).astype(np.float64)
     return _Surface(mesh.vertices, mesh.faces[kept], np.ascontiguousarray(mesh.normals[kept]), mesh.areas_mm2[kept], weights)
 
 
-def _first_look(
-    mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach: tuple[float, float]
-) -> Iterator[tuple[float, Plane]]:
+def _first_look(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_mm: float) -> Iterator[tuple[float, Plane]]:
     """Planes whose rim is shorter than those of their neighbours along their normal, with their rims: a sweep along each
     direction."""
-    reach_mm, reach_deg = reach
-    step_mm, directions = 2.0 * reach_mm / OFFSETS, np.array(list(_directions(normal, reach_deg)))
+    step_mm, directions = 2.0 * reach_mm / OFFSETS, np.array(list(_directions(normal)))
     remainder = Remainder(mesh, np.zeros(len(mesh.faces), dtype=np.bool_), np.where(seen > 0.0, 1.0, 0.0))
     swept = gains(remainder, directions, step_mm, NOTHING_RISKY)
     all_offsets_mm = swept.offsets_mm(step_mm)
@@ -118,22 +115,22 @@ def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plan
     return [plane for _, plane in taken]
 
 
-def _directions(normal: Floats, reach_deg: float) -> Iterator[Floats]:
+def _directions(normal: Floats) -> Iterator[Floats]:
     """A direction and rings of others around it, up to the reach."""
     aside, across = frame_across(normal)
     yield normal
     for ring in range(1, RINGS + 1):
         for k in range(6 * ring):
-            turn, tilt = pi * k / (3 * ring), radians(reach_deg * ring / RINGS)
+            turn, tilt = pi * k / (3 * ring), radians(REACH_DEG * ring / RINGS)
             yield cos(tilt) * normal + sin(tilt) * (cos(turn) * aside + sin(turn) * across)
 
 
-def _refined(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Plane:
+def _refined(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
     """The plane of the shortest rim that is reached downhill: moved, or tilted about the middle of its rim, ever less.
 
     What goes on downhill for long is on its way to an end of the model: it is left where it is, and is no neck.
     """
-    least = surface.rim_mm(plane)
+    least, step_deg = surface.rim_mm(plane), REACH_DEG / RINGS
     for _ in range(MOST_STEPS):
         planes = _around(surface, plane, step_mm, step_deg)
         tried = [(rim, near) for near in planes if (rim := surface.rim_mm(near)) > 0.0]
@@ -160,12 +157,11 @@ def _around(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) ->
         yield Plane(normal, float(normal @ centre))
 
 
-def _is_neck(surface: _Surface, neck: Plane, plane: Plane, centre: Floats, reach: tuple[float, float]) -> bool:
+def _is_neck(surface: _Surface, neck: Plane, plane: Plane, reach_mm: float) -> bool:
     """Whether a plane lies within reach and its rim grows on both sides, before it gets shorter again."""
-    reach_mm, reach_deg = reach
     tilt_deg = np.degrees(atan2(float(np.linalg.norm(np.cross(neck.normal, plane.normal))), float(neck.normal @ plane.normal)))
     away_mm = abs(float(plane.heights_mm(surface.centre_mm(neck)[None])[0]))
-    if tilt_deg > reach_deg - LEAST_DEG or away_mm > reach_mm:
+    if tilt_deg > REACH_DEG - LEAST_DEG or away_mm > reach_mm:
         return False
     least, step_mm = surface.rim_mm(neck), 2.0 * reach_mm / OFFSETS
     return all(_rises(surface, neck, side * step_mm, least) for side in (-1.0, 1.0))

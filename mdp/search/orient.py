@@ -18,20 +18,15 @@ import numpy as np
 from mdp.cost.cost import weight_of_stairs
 from mdp.cost.footing import SMALL_BASE, Footing, Plate
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.directions.orientation import (
-    Orientation,
-    facet_orientations,
-    standing_still,
-    straight_orientations,
-)
+from mdp.directions.orientation import Orientation, facet_orientations, standing_still, straight_orientations
 from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Mesh
 from mdp.overhang import UP
-from mdp.search.front import EQUAL, Price, Pricing, Worth, charge_mm2, front_row, price_row
+from mdp.search.front import EQUAL, Price, Pricing, Weights, charge_mm2, front_row, with_price
 from mdp.search.parts import one_piece
 from mdp.search.problem import Problem, with_search
-from mdp.search.search import as_it_is, coarse_copy, decompose
+from mdp.search.search import coarse_copy, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 
@@ -77,7 +72,7 @@ def orient_and_decompose(mesh: Mesh, profile: Profile, pricing: PricingBy, searc
     search: the whole search of a mesh; pricing: what parts take to print by a profile.
     """
     copy = coarse_copy(mesh, profile, NO_ZONES)
-    coarse, quick = (mesh, profile) if copy is None else (copy, as_it_is(profile))
+    coarse, quick = (mesh, profile) if copy is None else (copy, with_search(profile, simplify_faces=0))
     upright, *others = forecast_orientations(coarse, quick, pricing)
     others = sorted((other for other in others if other.bare_mm2 < inf), key=lambda other: other.forecast_mm2)
 
@@ -104,9 +99,9 @@ def _oriented(
     forecast: "OrientationForecast", decomposition: Decomposition, upright: "OrientationForecast", profile: Profile
 ) -> Oriented:
     """A model in an orientation and cut, with all that this costs."""
-    worth, row, further = Worth.of(profile), decomposition.chosen, len(decomposition.parts) - 1
-    charge = charge_mm2(decomposition.front, worth, profile.search.least_saving) if further else 0.0
-    total = total_mm2(row, worth) + forecast.footing_mm2 + further * charge
+    weights, row, further = Weights.of(profile), decomposition.chosen, len(decomposition.parts) - 1
+    charge = charge_mm2(decomposition.front, weights, profile.search.least_saving) if further else 0.0
+    total = total_mm2(row, weights) + forecast.footing_mm2 + further * charge
     orientation, upright_held = None if forecast is upright else forecast.orientation, upright.footing.held(of_file=True)
     held = upright_held if orientation is None else forecast.footing.held()
     return Oriented(orientation, decomposition, total, None, upright.orientation, held, upright_held)
@@ -131,7 +126,7 @@ class OrientationForecast:
 def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> list[OrientationForecast]:
     """A model as it stands, then in the first other orientations; infinite where it cannot be printed so, and where there is no
     other orientation to compare it with."""
-    worth, stair_mm2, scar_mm2 = Worth.of(profile), weight_of_stairs(profile), _scar_mm2(Worth.of(profile))
+    weights, stair_mm2, scar_mm2 = Weights.of(profile), weight_of_stairs(profile), _scar_mm2(Weights.of(profile))
     footed = _with_footing(mesh, profile, most=FORECAST)
     upright = footed[0][0]
     meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
@@ -139,7 +134,7 @@ def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> l
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
     for (orientation, footing), turned, bare in zip(footed, meshes, prices, strict=True):
         footing_mm2 = surface_mm2 * (footing_share(footing) + (0.0 if orientation is upright else TURNED))
-        bare_mm2 = footing_mm2 + (inf if bare is None else worth.of_print(bare.time_s, bare.filament_mm))
+        bare_mm2 = footing_mm2 + (inf if bare is None else weights.of_print(*bare))
         scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
         shares = ((1.0, 1.0), (LEFT, STAIRS_LEFT), (LEAST_LEFT, LEAST_STAIRS_LEFT))
         whole_mm2, forecast_mm2, hopeful_mm2 = (
@@ -156,9 +151,9 @@ def footing_share(footing: Footing) -> float:
     return NARROW * footing.narrow + UNSTEADY * footing.unsteady + TORN_OFF * footing.torn_off
 
 
-def _scar_mm2(worth: Worth) -> float:
+def _scar_mm2(weights: Weights) -> float:
     """What a mm2 that needs support counts, with the time that this takes."""
-    return 1.0 + worth.second_mm2 * SUPPORT_S_MM2
+    return 1.0 + weights.second_mm2 * SUPPORT_S_MM2
 
 
 def _most_promising(
@@ -166,7 +161,7 @@ def _most_promising(
 ) -> OrientationForecast | None:
     """The cheapest one after a narrow search; None where none comes near the cost of the model as it stands."""
     quick, chosen = with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
-    more_mm2, least_mm2 = _scar_mm2(Worth.of(profile)) - 1.0, inf
+    more_mm2, least_mm2 = _scar_mm2(Weights.of(profile)) - 1.0, inf
     able = [forecast for forecast in forecasts if forecast.bare_mm2 < PROMISING * standing_mm2]
     for forecast in able[:SEARCHED]:
         rows = decompose(forecast.mesh, "", quick).front
@@ -184,8 +179,8 @@ def _whole(
     if forecast is None or forecast.whole_mm2 > HOPELESS * standing_mm2:
         return None
     problem = Problem(forecast.mesh, with_search(profile, hidden_seam_share=1.0, clearance=False))  # of no use without cuts
-    row = price_row(front_row(problem.root), (one_piece(forecast.mesh, profile.machine),), pricing(profile))
-    total = total_mm2(row, Worth.of(profile)) + forecast.footing_mm2
+    row = with_price(front_row(problem.root), pricing(profile)((one_piece(forecast.mesh, profile.machine),)))
+    total = total_mm2(row, Weights.of(profile)) + forecast.footing_mm2
     return forecast if row.time_s is not None and total < standing_mm2 else None
 
 
@@ -280,11 +275,11 @@ def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:
     return same_area and abs(first.height_mm - second.height_mm) <= EQUAL * second.height_mm
 
 
-def total_mm2(row: FrontRow | None, worth: Worth) -> float:
+def total_mm2(row: FrontRow | None, weights: Weights) -> float:
     """What a row costs with its time and filament; infinite where they count and the row has none, for it cannot be printed."""
     if row is None:
         return 0.0
-    price_mm2 = worth.of_row(row)
+    price_mm2 = weights.of_row(row)
     return inf if price_mm2 is None else row.cost_mm2 + price_mm2
 
 
@@ -293,7 +288,7 @@ def _guess_mm2(orientation: Orientation, profile: Profile) -> float:
     layers = ceil(orientation.height_mm / profile.process.layer_height_mm)
     seconds = SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * layers
     stairs_mm2 = weight_of_stairs(profile) * orientation.stairs_mm2
-    return orientation.risky_mm2 + stairs_mm2 + Worth.of(profile).second_mm2 * seconds
+    return orientation.risky_mm2 + stairs_mm2 + Weights.of(profile).second_mm2 * seconds
 
 
 def _price_bare(mesh: Mesh, profile: Profile, pricing: PricingBy) -> Price | None:

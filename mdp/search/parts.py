@@ -1,7 +1,7 @@
 """Parts of a node: its solids in print order, each at a pose, so that the table turns little, and the decomposition they are."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from mdp.clearance import allowed_poses
 from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
@@ -9,7 +9,8 @@ from mdp.mesh import Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
 from mdp.plane import PLATFORM
 from mdp.pose import Pose, least_rotation, level, poses, rotation
-from mdp.search.node import Node
+from mdp.ranking.node import Node
+from mdp.ranking.ranker import CLASSIC
 from mdp.search.problem import Problem
 from mdp.support_need.patches import CARRIES_ITSELF
 from mdp.sweep.rims import NO_RIM
@@ -31,7 +32,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     """Parts in print order: what remains first, then the cuts, last one first."""
     machine, clearance = problem.machine, problem.settings.clearance
     bases = [PLATFORM, *reversed(node.planes)]
-    pieces = [node.piece, *(node.places.surface.piece(cut.solid) for cut in reversed(node.cuts))]
+    pieces = [node.piece, *(node.places.surface.piece(cut.part) for cut in reversed(node.cuts))]
     before = node.path[::-1]  # for each part but the first the node that it was cut off
 
     def allowed(position: int, near_turn_deg: float | None = None) -> list[Pose]:
@@ -79,34 +80,24 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     return tuple(parts)
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How a search, or a plan in its place, went. rounds: stages of a beam; evaluated: candidates that were looked at."""
-
-    name: str
-    ranker: str
-    rounds: int
-    evaluated: int
-    search_s: float
-    notes: tuple[str, ...]
-
-
-def decomposition_of(problem: Problem, parts: tuple[Part, ...], front: Sequence[FrontRow], outcome: Outcome) -> Decomposition:
-    """The decomposition into some parts; front: its rows, that of the parts marked."""
+def decomposition_of(
+    problem: Problem, name: str, parts: tuple[Part, ...], front: Sequence[FrontRow], notes: Sequence[str] = ()
+) -> Decomposition:
+    """The decomposition of a model into some parts; front: its rows, that of the parts marked; notes: beside those on parts."""
     mesh, root = problem.mesh, problem.root.remainder
     folded = folded_mm3(mesh, parts)
     return Decomposition(
-        name=outcome.name,
+        name=name,
         mesh=mesh,
         parts=parts,
         beam_width=problem.settings.beam_width,
-        ranker=outcome.ranker,
+        ranker=CLASSIC,
         risky_area_mm2=float(root.mesh.areas_mm2[root.risky].sum()),
         residual_area_mm2=sum(part.risky_area_mm2 for part in parts),
-        candidates_evaluated=outcome.evaluated,
-        rounds=outcome.rounds,
-        search_s=outcome.search_s,
-        notes=(*_notes_of_parts(folded, parts), *outcome.notes),
+        candidates_evaluated=problem.evaluated,
+        rounds=0,
+        search_s=0.0,
+        notes=(*_notes_of_parts(folded, parts), *notes),
         folded_mm3=folded,
         front=tuple(front),
         uncut=(one_piece(mesh, problem.machine, problem.zones),),

@@ -20,10 +20,10 @@ from mdp.directions.orientation import diameter_mm
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
+from mdp.ranking.node import Node
 from mdp.ranking.ranking import rank_by_trade_off
 from mdp.search.front import EQUAL
 from mdp.search.neck import find_neck
-from mdp.search.node import Node
 from mdp.search.problem import Problem
 from mdp.sweep.limbs import limb_mesh
 
@@ -39,10 +39,10 @@ TRADE_OFF = 4.0  # of further cuts, as the beam's second slot
 
 def polish(problem: Problem, node: Node) -> Node:
     """The node with its cuts polished and, where there is room, further ones."""
-    best = settle(problem, _drop_cuts(problem, node))
+    best = refine_planes(problem, _drop_cuts(problem, node))
     longer = _add_cuts(problem, best)
     if longer is not best:
-        longer = settle(problem, _drop_cuts(problem, longer))
+        longer = refine_planes(problem, _drop_cuts(problem, longer))
     return min((node, best, longer), key=lambda last: (last.cost_mm2, len(last.cuts)))
 
 
@@ -122,7 +122,7 @@ def _drop_cuts(problem: Problem, best: Node) -> Node:
     position = len(problem.start.cuts)
     while position < len(best.planes) and not problem.late():
         before, planes = best.path[position], best.planes[position:]
-        surface, shorter = _surface(before), None
+        surface, shorter = Surface.of(before.remainder, before.terms), None
         if surface.left_mm2(planes[1:]) <= surface.left_mm2(planes) + SAME_MM2:
             shorter = problem.replay(before, planes[1:])
         if shorter is not None and shorter.cost_mm2 <= best.cost_mm2 + SAME_MM2:
@@ -132,14 +132,14 @@ def _drop_cuts(problem: Problem, best: Node) -> Node:
     return best
 
 
-def settle(problem: Problem, best: Node) -> Node:
+def refine_planes(problem: Problem, best: Node) -> Node:
     """The node with every plane moved to where the cost is less, the one cut first moved first; nothing else is changed."""
     enough_mm2 = ENOUGH * problem.model.risky_mm2
     for position in range(len(problem.start.cuts), len(best.planes)):
         if problem.late():
             break
         before = best.path[position]
-        surface = _surface(before)
+        surface = Surface.of(before.remainder, before.terms)
         ever_better = list(_climb(problem, surface, best, position))
         for planes in ever_better[: -TRIES - 1 : -1]:
             if problem.late() or before.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
@@ -156,16 +156,11 @@ def _add_cuts(problem: Problem, node: Node) -> Node:
     while not problem.full(node) and not problem.late():
         table = problem.table(node)
         ranked = rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
-        cuts = (problem.cut(node, table.plane(found.row), table.scored.cost(found.row)) for found in ranked)
-        child = next((child for child in cuts if child is not None), None)
+        child = next((child for found in ranked if (child := problem.cut_row(table, found.row)) is not None), None)
         if child is None or child.cost_mm2 >= node.cost_mm2:
             break
         node = child
     return node
-
-
-def _surface(node: Node) -> Surface:
-    return Surface.of(node.remainder, node.terms)
 
 
 def _climb(problem: Problem, surface: Surface, last: Node, position: int) -> Iterator[list[Plane]]:
@@ -212,7 +207,7 @@ def _pivots(corners: Floats) -> Floats:
 
 def _cut_face(node: Node) -> Floats:
     """(n, 3) corners of a node's last cut face, of a limb's those of its section."""
-    base, points = node.cuts[-1].base, node.remainder.mesh.vertices
+    base, points = node.base, node.remainder.mesh.vertices
     if base.limbs_mm is not None and node.parent is not None:
         return passing_places(limb_mesh(node.parent.remainder, base), base)
     heights = base.heights_mm(points)

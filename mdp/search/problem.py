@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
-from math import radians, sin, sqrt
+from math import inf, radians, sin, sqrt
 from time import perf_counter
 
 import numpy as np
@@ -10,18 +10,15 @@ import numpy as np
 from mdp.clearance import allowed_poses, passes_clear
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
 from mdp.cost.model_need import ModelNeed, ModelSurface
-from mdp.cut import Solid, below, corners_above, cut, mesh_of, solid_of
+from mdp.cut import Solid, below, cut, mesh_of, solid_of
 from mdp.directions.flats import Flats
-from mdp.directions.frame import frame_across
 from mdp.directions.orientation import diameter_mm
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, standing, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, standing, threshold
 from mdp.plane import Plane
 from mdp.pose import Pose
-from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import (
     Bounds,
-    Feasibility,
     Reason,
     ScoredCandidates,
     bounds_of,
@@ -34,14 +31,13 @@ from mdp.ranking.candidates import (
     score_candidates,
     seam_mm2,
 )
-from mdp.search.front import Worth
-from mdp.search.node import Cut, Node
+from mdp.ranking.node import Node
+from mdp.ranking.ranking import CandidateTable, Model
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
 from mdp.sweep.cylinders import spoiled_by_cuts
 from mdp.sweep.hopeless import Savers, hopeless_faces
-from mdp.sweep.limbs import LimbGrid, LimbSums, limb_faces, limb_mesh, limb_vertices, sum_limbs
-from mdp.sweep.slivers import sliver_mm
+from mdp.sweep.limbs import LimbSums, limb_faces, limb_vertices, sum_limbs
 from mdp.sweep.sweep import Gains, gains
 from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
@@ -83,11 +79,10 @@ class Problem:
         places = SeamPlaces.of(
             surface, solid, settings.hidden_seam_share, self.zones, cylinders=cylinders, feature_weight=settings.feature_weight
         )
-        self.root = self.start = Node(solid, (), self.terms, places)
+        self.root = self.start = Node(solid, self.terms, places)
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.platform_disc = platform_disc(mesh, settings)
-        self.worth = Worth.of(profile)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         # Gains are shares of the risky area without the faces on the platform, which no cut can save, but as published with them.
         published, risky = settings.method == "published", self.root.remainder.risky
@@ -97,7 +92,6 @@ class Problem:
         self.bearable_mpa = profile.material.cold_weld_mpa / settings.strength_safety
         self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
         self._evaluated: list[int] = []  # appended to by several threads
-        self._stopped = False
         self._root_scored: ScoredCandidates | None = None
         self.begin()
 
@@ -127,11 +121,12 @@ class Problem:
 
     def begin(self) -> None:
         """Have the time limit count from now on."""
-        self._began = perf_counter()
+        limit_s = self.settings.time_limit_s
+        self._ends_s = inf if limit_s is None else perf_counter() + limit_s
 
     def stop(self) -> None:
         """Have everything that asks whether it is late leave off."""
-        self._stopped = True
+        self._ends_s = -inf
 
     @property
     def evaluated(self) -> int:
@@ -140,8 +135,7 @@ class Problem:
 
     def late(self) -> bool:
         """Whether the time limit is reached."""
-        limit = self.settings.time_limit_s
-        return self._stopped or (limit is not None and perf_counter() - self._began >= limit)
+        return perf_counter() >= self._ends_s
 
     def continues(self, stage: int) -> bool:
         """Whether there is a stage after a number of them."""
@@ -157,29 +151,16 @@ class Problem:
         with what no cut can save, for features; limits: of some directions in place of all."""
         limits = self.limits if limits is None else limits
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
-        hopeless = self._hopeless(node) if described else None
-        remainder = node.remainder
-        scored = score_candidates(remainder, limits, self.terms, least_mm2, hopeless)
+        hopeless = None
+        if described:
+            least_mm = np.where(np.isfinite(self.limits.least_height_mm), self.limits.least_offset_mm, np.inf)
+            savers = Savers(self.limits.directions, least_mm, threshold(self.terms.angle_deg))
+            hopeless = hopeless_faces(node.remainder.facets, savers)
+        scored = score_candidates(node.remainder, limits, self.terms, least_mm2, hopeless)
         self._evaluated.append(scored.evaluated)
         if node is self.root and limits is self.limits:
             self._root_scored = scored
-        situation = Situation(
-            model=self.model,
-            saved_mm2=self.root.cost_mm2 - node.cost_mm2,
-            residual_mm2=node.residual_mm2,
-            lost_mm2=node.lost_mm2,
-            risky_mm2=node.risky_mm2,
-            hopeless_mm2=0.0 if hopeless is None else float(remainder.facets.faces.counted_mm2[hopeless].sum()),
-            volume_mm3=float(node.solid.volume()),
-            cuts=len(node.cuts),
-            last=node.planes[-1].normal if node.cuts else UP,
-        )
-        return CandidateTable(scored, situation, self.least_gain_mm2, partial(self.is_weak, node))
-
-    def _hopeless(self, node: Node) -> Mask:
-        """(m,) the faces of what remains that no cut can save, in the order of its facets."""
-        least_mm = np.where(np.isfinite(self.limits.least_height_mm), self.limits.least_offset_mm, np.inf)
-        return hopeless_faces(node.remainder.facets, Savers(self.limits.directions, least_mm, threshold(self.terms.angle_deg)))
+        return CandidateTable(scored, node, self.model, self.least_gain_mm2, partial(self.is_weak, node))
 
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
@@ -190,71 +171,41 @@ class Problem:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""
         if plane.limbs_mm is None and 0.0 < abs(plane.offset_mm) < FINEST * self.settings.offset_step_mm:
             return False
-        limits = self.bounds_along(plane.normal[None])
-        if plane.limbs_mm is not None:
-            return self.check_limbs(node, plane, limits) == Reason.FEASIBLE
-        return bool(self.check_plane(node, plane, limits).reason[0] == Reason.FEASIBLE)
+        return self.check(node, plane, self.bounds_along(plane.normal[None]))[0] == Reason.FEASIBLE
 
     def bounds_along(self, directions: Floats) -> Bounds:
         """The bounds of (k, 3) directions."""
         return bounds_of(directions, self.mesh, self.profile, self.platform_disc, self.zones.keep)
 
-    def limb_grid(self, limits: Bounds, least_gain_mm2: float) -> LimbGrid:
-        """Where the search looks for limbs: along the directions of some bounds, with the least gain that a limb must bring."""
-        return LimbGrid(
-            directions=limits.directions,
-            step_mm=limits.step_mm,
-            least_height_mm=limits.least_height_mm,
-            keep_mm=limits.keep_mm,
-            seam_mm=self.terms.seam_mm,
-            cut_mm2=self.terms.cut_mm2,
-            least_gain_mm2=max(self.least_gain_mm2, least_gain_mm2),
-            least_volume_mm3=limits.least_volume_mm3,
-            least_interface_mm2=limits.contact_area_mm2,
-            crumb=limits.crumb_mm / limits.step_mm,
-        )
-
     def limb_sums(self, node: Node, planes: Sequence[Plane]) -> LimbSums:
         """What cutting off the limbs of planes would do to a node. Nothing is cut."""
         return sum_limbs(node.remainder, planes, threshold(self.terms.angle_deg), sqrt(self.settings.least_interface_mm2))
 
-    def check_limbs(self, node: Node, plane: Plane, limits: Bounds) -> Reason:
-        """Why the limbs of a plane cannot be cut off a node; limits: those of its direction. Whether the rest would float, and
-        whether the head passes clear, is not checked here."""
+    def check(self, node: Node, plane: Plane, limits: Bounds) -> tuple[Reason, float]:
+        """Whether a plane that lies on no grid can cut a node, and how thin the thinnest sliver is that it would leave; limits:
+        those of its direction. Of limbs it is not checked whether the rest would float, and whether the head passes clear."""
+        if plane.limbs_mm is None:
+            step_mm = self.step_mm(plane.offset_mm)
+            checked = check(node.remainder, limits, step_mm, np.zeros(1, np.int32), np.array([plane.offset_mm]))
+            reason, sliver_mm = Reason(int(checked.reason[0])), float(checked.fragile_mm[0])
+        else:
+            reason, sliver_mm = self._check_limbs(node, plane, limits)
+        return (Reason.WEAK if reason == Reason.FEASIBLE and self.is_weak(node, plane) else reason), sliver_mm
+
+    def _check_limbs(self, node: Node, plane: Plane, limits: Bounds) -> tuple[Reason, float]:
         sums, offset_mm, keep_mm = self.limb_sums(node, [plane]), plane.offset_mm, limits.keep_mm[0]
-        if not sums.exists[0] or sums.contact_mm2[0] < limits.contact_area_mm2:
-            return Reason.INTERFACE
-        if not np.isfinite(limits.least_height_mm[0]):
-            return Reason.REACH
-        if sums.lowest_mm[0] < limits.least_height_mm[0]:
-            return Reason.CLEARANCE
-        if sums.volume_mm3[0] < limits.least_volume_mm3:
-            return Reason.VOLUME
-        if ((keep_mm[:, 0] < offset_mm) & (offset_mm < keep_mm[:, 1])).any():
-            return Reason.KEEP
-        if self.sliver_mm(node, plane) < limits.fragile_mm:
-            return Reason.FRAGILE
-        if self.is_weak(node, plane):
-            return Reason.WEAK
-        return Reason.FEASIBLE
-
-    def sliver_mm(self, node: Node, plane: Plane) -> float:
-        """Thickness of the thinnest sliver that cutting off the limbs of a plane would leave."""
-        limb = limb_vertices(node.remainder, plane)
-        return sliver_mm(node.remainder.facets, limb, plane, frame_across(plane.normal))
-
-    def corners_cut(self, node: Node, plane: Plane) -> Floats:
-        """(n, 3) the corners of what a plane would cut off a node: vertices, and where edges pass through the plane. Nothing is
-        cut."""
-        return corners_above(node.remainder.mesh if plane.limbs_mm is None else limb_mesh(node.remainder, plane), plane)
-
-    def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
-        """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
-        step_mm = self.step_mm(plane.offset_mm)
-        checked = check(node.remainder, limits, step_mm, np.zeros(1, np.int32), np.array([plane.offset_mm]))
-        if checked.reason[0] == Reason.FEASIBLE and self.is_weak(node, plane):
-            checked.reason[0] = Reason.WEAK
-        return checked
+        checks = {
+            Reason.INTERFACE: not sums.exists[0] or sums.contact_mm2[0] < limits.contact_area_mm2,
+            Reason.REACH: not np.isfinite(limits.least_height_mm[0]),
+            Reason.CLEARANCE: sums.lowest_mm[0] < limits.least_height_mm[0],
+            Reason.VOLUME: sums.volume_mm3[0] < limits.least_volume_mm3,
+            Reason.KEEP: ((keep_mm[:, 0] < offset_mm) & (offset_mm < keep_mm[:, 1])).any(),
+        }
+        first = next((reason for reason, out in checks.items() if out), None)
+        if first is not None:
+            return first, np.inf
+        sliver_mm = node.sliver_mm(plane)
+        return (Reason.FRAGILE if sliver_mm < limits.fragile_mm else Reason.FEASIBLE), sliver_mm
 
     def is_weak(self, node: Node, plane: Plane) -> bool:
         """Whether what lies above a plane could break off while it is printed."""
@@ -280,14 +231,17 @@ class Problem:
         upper, rest = vertices[plane.heights_mm(vertices) > 0.0], below(node.solid, plane)
         if len(upper) == 0 or rest.is_empty():
             return None
-        cuts = (*node.cuts, Cut(plane, node.solid, self._cost(node, plane) if cost is None else cost))
-        child = Node(rest, cuts, self.terms, node.places, node)
+        child = Node(rest, self.terms, node.places, node, plane, self._cost(node, plane) if cost is None else cost)
         if self.settings.clearance:
             lower = child.remainder.mesh.vertices
             corners = np.vstack([upper, lower[plane.heights_mm(lower) >= -BASE_TOLERANCE_MM]])
             if not allowed_poses(self.machine, plane.normal, corners + self.place_mm):
                 return None
         return child
+
+    def cut_row(self, table: CandidateTable, row: int) -> Node | None:
+        """The node after the cut of a row of a node's table."""
+        return self.cut(table.node, table.plane(row), table.scored.cost(row))
 
     def _cut_limbs(self, node: Node, plane: Plane) -> Node | None:
         """The node after limbs are cut off; None where something would float or the head would hit what stands."""
@@ -296,13 +250,13 @@ class Problem:
         limbs, rest = cut(node.solid, plane)
         if limbs.is_empty() or rest.is_empty() or _floats(rest, plane):
             return None
-        return Node(rest, (*node.cuts, Cut(plane, node.solid, self._cost(node, plane))), self.terms, node.places, node)
+        return Node(rest, self.terms, node.places, node, plane, self._cost(node, plane))
 
     def is_clear(self, node: Node, plane: Plane) -> bool:
         """Whether there is a pose at which the head clears what stands beside the limbs of a plane."""
         if not self.settings.clearance:
             return True
-        poses = allowed_poses(self.machine, plane.normal, self.corners_cut(node, plane) + self.place_mm)
+        poses = allowed_poses(self.machine, plane.normal, node.corners_cut(plane) + self.place_mm)
         return next(self.clear_poses(node, plane, poses), None) is not None
 
     def clear_poses(self, node: Node, plane: Plane, poses: Sequence[Pose]) -> Iterator[Pose]:
@@ -310,7 +264,7 @@ class Problem:
         mesh, limb = node.remainder.mesh, limb_faces(node.remainder, plane)
         corners = mesh.vertices[mesh.faces]
         stands = corners[(plane.heights_mm(mesh.vertices) > 0.0)[mesh.faces].any(axis=1) & ~limb]
-        return (pose for pose in poses if passes_clear(self.machine, pose, corners[limb], stands, plane.offset_mm))
+        return (pose for pose in poses if passes_clear(self.machine, pose, (corners[limb], stands), plane.offset_mm))
 
     def _cost(self, node: Node, plane: Plane) -> CutCost:
         """What a cut costs for ever."""

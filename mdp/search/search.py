@@ -24,16 +24,28 @@ from mdp.joint import is_sound
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.plans.plan_file import NO_PLAN, PlanFile, planned_row
 from mdp.ranking.candidates import REASONS
+from mdp.ranking.node import Node
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.ranking.record import Trace
 from mdp.search.beam import Beam, search_as_published, search_limbs
 from mdp.search.by_hand import check_plan, cut_by_hand, cut_near
-from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_row, price_rows
-from mdp.search.node import Node
-from mdp.search.parts import Outcome, decomposition_of, make_parts, notes_of_search
-from mdp.search.polish import make_regular, polish, settle
+from mdp.search.front import (
+    ASKED,
+    BY_PLAN,
+    Choice,
+    ParetoFront,
+    Pricing,
+    Weights,
+    choose,
+    front_row,
+    pays,
+    price_rows,
+    with_price,
+)
+from mdp.search.parts import decomposition_of, make_parts, notes_of_search
+from mdp.search.plan_file import NO_PLAN, PlanFile, planned_parts
+from mdp.search.polish import make_regular, polish, refine_planes
 from mdp.search.problem import Problem, with_search
 from mdp.sweep.limbs import cylinders_cut
 from mdp.sweep.rays import distances_mm
@@ -49,14 +61,9 @@ WORTH = 0.7  # share of the faces above which a copy saves too little
 COARSEST, *FINER = (0.5, 1.5), (0.25, 1.0), (0.125, 1.0), (0.0625, 1.0)
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where the search stands: after which stage, 0 when it begins. measure: what gives the best so far as a row of the front."""
-
-    stage: int
-    beam: int
-    best_share: float
-    measure: Callable[[], FrontRow]
+# Told after which stage a search stands, 0 when it begins, of how many nodes its beam is, what share of the model's cost the best
+# so far has, and what gives that as a row of the front.
+OnStage = Callable[[int, int, float, Callable[[], FrontRow]], None]
 
 
 @dataclass(frozen=True)
@@ -70,7 +77,7 @@ class SearchRequest:
     parts: int | None = None
     ranker: str = CLASSIC
     price: Pricing | None = None
-    on_stage: Callable[[Progress], None] = lambda progress: None
+    on_stage: OnStage = lambda stage, beam, best_share, measure: None
     on_phase: Callable[[str], None] = lambda text: None
     on_record: Callable[[bytes], None] | None = None
 
@@ -107,7 +114,7 @@ def decompose(mesh: Mesh, name: str, profile: Profile, request: SearchRequest = 
         copy = coarse_copy(mesh, profile, plan.zones)
     if copy is not None:
         with suppress(PlanError):  # of a plane by hand that cuts the mesh and not its copy
-            copy_began, own = perf_counter(), as_it_is(profile)
+            copy_began, own = perf_counter(), with_search(profile, simplify_faces=0)
             on_copy = _measure(on_pedestal(copy, profile.search.pedestal_mm), own, request)
             found = _search(on_copy, name, request, copy_began)
             problem = problem or _measure(lifted, profile, request)
@@ -127,7 +134,7 @@ def _measure(mesh: Mesh, profile: Profile, request: SearchRequest) -> Problem:
 
 def _search(problem: Problem, name: str, request: SearchRequest, began: float) -> Decomposition:
     """The parts of a problem's mesh. began: when the search did, by perf_counter."""
-    best, front, rounds, trace = problem.start, Front(problem.start), 0, None
+    best, front, rounds, trace = problem.start, ParetoFront(problem.start), 0, None
     if request.on_record is not None:
         trace = Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
     if problem.settings.method == "published" and not request.is_whole:
@@ -141,12 +148,12 @@ def _search(problem: Problem, name: str, request: SearchRequest, began: float) -
         request.on_record(trace.to_bytes())
     parts, rows, notes = _take(problem, front, best, request)
     notes = (*_notes(problem, len(parts), len(rows), request), *notes)
-    outcome = Outcome(name, request.ranker, rounds, problem.evaluated, perf_counter() - began, notes)
-    return decomposition_of(problem, parts, rows, outcome)
+    found = decomposition_of(problem, name, parts, rows, notes)
+    return replace(found, ranker=request.ranker, rounds=rounds, search_s=perf_counter() - began)
 
 
 def _take(
-    problem: Problem, front: Front, best: Node, request: SearchRequest
+    problem: Problem, front: ParetoFront, best: Node, request: SearchRequest
 ) -> tuple[tuple[Part, ...], list[FrontRow], tuple[str, ...]]:
     """The parts of a front to take, the front's rows with theirs marked, and notes on the choice: of at most the wanted number of
     parts, else the cheapest one, with its time where seconds cost anything; best: the one to take where seams cost nothing. Rows
@@ -159,7 +166,7 @@ def _take(
         sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, problem.profile, by_hand)}
         rows = [replace(row, sound=place in sound or place not in paying) for place, row in enumerate(rows)]
         rows = price_rows(rows, sound, price)
-    choice = choose(rows, problem.worth, problem.settings.least_saving)
+    choice = choose(rows, Weights.of(problem.profile), problem.settings.least_saving)
     if request.parts is not None:
         choice = Choice(nodes.index(front.up_to(request.parts)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
@@ -168,7 +175,7 @@ def _take(
     node, row = nodes[choice.place], rows[choice.place]
     parts = paying.get(choice.place) or make_parts(problem, node)
     if price is not None and row.time_s is None:
-        row = price_row(row, parts, price)
+        row = with_price(row, price(parts))
     rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
     return parts, rows, (*_feature_notes(node), *choice.note)
 
@@ -185,7 +192,7 @@ def _feature_notes(node: Node) -> list[str]:
     return notes
 
 
-def _search_beam(problem: Problem, request: SearchRequest, trace: Trace | None) -> tuple[Node, Front, int]:
+def _search_beam(problem: Problem, request: SearchRequest, trace: Trace | None) -> tuple[Node, ParetoFront, int]:
     """The best node of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
     beam, stage = Beam(problem, ranker_named(request.ranker), trace), 0
     try:
@@ -223,18 +230,18 @@ def _polish_finalists(problem: Problem, beam: Beam, limbs: Sequence[Node], repor
     return best
 
 
-def _polish_rows(problem: Problem, front: Front) -> None:
+def _polish_rows(problem: Problem, front: ParetoFront) -> None:
     """Move the planes of the rows of a front that may be taken to where they cost less, after a beam of two or more; then to
     necks, along flats, and symmetric where the model is."""
     for node in _paying(problem, front) if problem.settings.beam_width > 1 else ():
-        front.offer(settle(problem, node))
+        front.offer(refine_planes(problem, node))
     cut = _paying(problem, front)
     mirrors = find_mirrors(problem.mesh) if cut else []
     for node in cut:
         front.replace(node, make_regular(problem, node, mirrors))
 
 
-def _paying(problem: Problem, front: Front) -> list[Node]:
+def _paying(problem: Problem, front: ParetoFront) -> list[Node]:
     """The nodes of a front that the search has cut and that cost less than all with fewer cuts."""
     nodes = front.nodes
     return [node for node, good in zip(nodes, pays(nodes), strict=True) if good and len(node.cuts) > len(problem.start.cuts)]
@@ -243,12 +250,12 @@ def _paying(problem: Problem, front: Front) -> list[Node]:
 def _begin(problem: Problem, request: SearchRequest) -> None:
     """Tell that a search begins, where there is anything to search; its time limit counts from then on."""
     if problem.continues(0):
-        request.on_stage(Progress(0, 1, 1.0, partial(front_row, problem.start)))
+        request.on_stage(0, 1, 1.0, partial(front_row, problem.start))
         problem.begin()
 
 
 def _report(problem: Problem, request: SearchRequest, stage: int, beam: int, best: Node) -> None:
-    request.on_stage(Progress(stage, beam, best.cost_mm2 / problem.root.cost_mm2, partial(front_row, best)))
+    request.on_stage(stage, beam, best.cost_mm2 / problem.root.cost_mm2, partial(front_row, best))
 
 
 def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> list[str]:
@@ -303,11 +310,6 @@ def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
     return None
 
 
-def as_it_is(profile: Profile) -> Profile:
-    """The profile by which a mesh is searched itself, however fine it is."""
-    return with_search(profile, simplify_faces=0)
-
-
 def _cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) -> Decomposition | None:
     """A problem's mesh, from where its search goes on, cut by the planes that were chosen for its coarse copy, or by planes next
     to those where bumps that the copy has not forbid them, then moved a little as the mesh itself wants them; None where there
@@ -320,16 +322,17 @@ def _cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) -
         if child is None:
             return None
         node = child
-    node = settle(problem, node)
+    node = refine_planes(problem, node)
     parts, timed = make_parts(problem, node), rows[place].time_s is not None
     rows[place] = _measured(rows[place], node)
     if price is not None and timed:
-        rows[place] = price_row(rows[place], parts, price)
+        rows[place] = with_price(rows[place], price(parts))
     if place > 0 and len(rows[0].planes) == len(start.cuts):
         rows[0] = _measured(rows[0], start)
     searched_s = copy.search_s + perf_counter() - began
-    outcome = Outcome(copy.name, copy.ranker, copy.rounds, copy.candidates_evaluated, searched_s, notes_of_search(copy))
-    return decomposition_of(problem, parts, rows, outcome)
+    fine = decomposition_of(problem, copy.name, parts, rows, notes_of_search(copy))
+    evaluated = copy.candidates_evaluated
+    return replace(fine, ranker=copy.ranker, rounds=copy.rounds, candidates_evaluated=evaluated, search_s=searched_s)
 
 
 def _measured(row: FrontRow, node: Node) -> FrontRow:
@@ -356,37 +359,38 @@ def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest)
     check_plan(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)
     node = cut_by_hand(problem, plan)
-    planned = {len(row.parts): row for row in plan.front}
+    rows = {len(row.planes): _as_planned(row) for row in plan.front}
     own = request.plan.parts  # a person may have changed them: they are the row of their number where they can be cut
-    known = planned.get(len(own))
-    if own != plan.parts and all(part.plane is not None for part in own) and (known is None or known.parts != own):
+    known = rows.get(len(own))
+    if own != plan.parts and all(part.plane is not None for part in own) and (known is None or planned_parts(known) != own):
         with suppress(PlanError):
-            planned[len(own)] = planned_row(own, front_row(cut_by_hand(problem, request.plan)))
-    rows = {
-        count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2, stairs_mm2=row.stairs_mm2)
-        for count, row in planned.items()
-    }
+            planes = tuple(plane for part in reversed(own) if (plane := part.plane) is not None)
+            rows[len(own)] = _as_planned(replace(front_row(cut_by_hand(problem, request.plan)), planes=planes))
     rows[len(node.cuts)] = replace(front_row(node), chosen=True, reason=BY_PLAN)
     parts, front = make_parts(problem, node), [rows[count] for count in sorted(rows)]
     if request.price is not None:
-        front = _priced(problem, replace(plan, front=tuple(planned.values())), front, parts, request.price)
+        front = _priced(problem, plan, front, parts, request.price)
     notes = _fewer_parts(wanted, len(plan.parts) + 1, f"the plan {plan.name} holds")
-    outcome = Outcome(name, request.ranker, 0, problem.evaluated, perf_counter() - began, notes)
-    return decomposition_of(problem, parts, front, outcome)
+    cut = decomposition_of(problem, name, parts, front, notes)
+    return replace(cut, ranker=request.ranker, search_s=perf_counter() - began)
+
+
+def _as_planned(row: FrontRow) -> FrontRow:
+    """A row as a plan has it: its planes and what they cost."""
+    return FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2, stairs_mm2=row.stairs_mm2)
 
 
 def _priced(
     problem: Problem, plan: PlanFile, rows: Sequence[FrontRow], chosen: tuple[Part, ...], price: Pricing
 ) -> list[FrontRow]:
     """The rows of a plan's front with their prices, those that cannot be cut again or are not sound as they are."""
-    planned = {len(row.parts) + 1: row.parts for row in plan.front}
     parts: dict[int, Sequence[Part]] = {}
     for place, (row, good) in enumerate(zip(rows, pays(rows), strict=True)):
         with suppress(PlanError):
             if row.chosen:
                 parts[place] = chosen
             elif good:
-                parts[place] = make_parts(problem, cut_by_hand(problem, replace(plan, parts=planned[row.parts])))
+                parts[place] = make_parts(problem, cut_by_hand(problem, replace(plan, parts=planned_parts(row))))
     sound = {place for place, of_row in parts.items() if is_sound(problem.mesh, of_row, problem.profile)}
     rows = [replace(row, sound=place in sound or place not in parts) for place, row in enumerate(rows)]
     return price_rows(rows, {place: parts[place] for place in parts if place in sound or rows[place].chosen}, price)

@@ -1,4 +1,4 @@
-"""Trial: a person's planes tried one after the other, quickly enough to be moved by hand: figures of every cut, or why not.
+"""Trial: planes tried one after the other, quickly enough to be moved by hand: figures of every cut, or why not.
 
 The figures of all parts are summed over the model's surface without a cut. Whether a plane may cut what those cut before it
 have left is asked of what they have left, so all but the last are cut for that: at leisure, one after the other, and those that a
@@ -22,9 +22,9 @@ from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
 from mdp.pose import poses, rotation, shift
 from mdp.ranking.candidates import COPLANAR_MM, Reason
-from mdp.search.by_hand import Refusal, cut_or_refuse, name_limbs, planes_near, refusal
+from mdp.ranking.node import Node
+from mdp.search.by_hand import Rejection, name_limbs, planes_near, rejection, try_planes
 from mdp.search.neck import find_neck
-from mdp.search.node import Node
 from mdp.search.problem import Problem, with_search
 from mdp.sweep.limbs import limb_faces
 from mdp.sweep.slivers import SLIVER_COSINE
@@ -82,24 +82,28 @@ class Trials:
         takes longer to work out than all else: here all seams count alike."""
         lifted = on_pedestal(mesh, profile.search.pedestal_mm)
         self._problem = problem = Problem(lifted, with_search(profile, hidden_seam_share=1.0), zones)
-        root = problem.root
+        self._node = root = problem.root  # after the cuts of the last trial
         self._surface = Surface.of(root.remainder, problem.terms, root.seam_weights)
-        self._cut: list[tuple[Key, Node]] = []  # of the last trial, in the order of its cuts
+        self._keys: list[Key] = []  # of the planes of these cuts as they were asked for
 
     def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
         """Try the base planes of the parts from the second on, in print order. most_cuts: the most cuts that are made; where
         more are needed, parts are left unchecked."""
         order = planes[::-1]
         self._keep_alike(order)
-        for done in range(len(self._cut), len(order)):
-            whole = done < len(order) - 1 and most_cuts > 0
-            refused = self._cut_off(order[done]) if whole else self._look(order[done])
-            if refused is not None:
-                return self._refused(order, done, refused)
-            if not whole:
-                return self._allowed(order, len(order) - 1 - done)
-            most_cuts -= 1
-        return self._allowed(order, 0)
+        known = len(self._keys)
+        refused = self._cut_off(order[known : int(min(known + most_cuts, len(order) - 1))])
+        done = len(self._keys)
+        if refused is None and done < len(order):
+            refused = self._look(order[done])
+        if refused is not None:
+            parts, _ = forecast_parts(self._surface, self._named(order[:done]))
+            obstacle = find_refused(self._problem, refused, order[done])
+            unknown = [None] * (len(order) - done)
+            return Trial((*unknown, *parts[::-1]), len(order) + 1 - done, refused.text, obstacle=obstacle)
+        parts, left_mm2 = forecast_parts(self._surface, self._named(order))
+        support_mm2, seam_mm = left_mm2 + sum(part.support_mm2 for part in parts), sum(part.rim_mm for part in parts)
+        return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=max(len(order) - 1 - done, 0))
 
     def warm(self) -> None:
         """Have ready what the first trial needs of the whole model."""
@@ -141,54 +145,39 @@ class Trials:
         """Whether all planes can be cut with another one for the part of a number."""
         return not self.attempt((*planes[: number - 2], plane, *planes[number - 1 :])).refused
 
-    @property
-    def _node(self) -> Node:
-        return self._cut[-1][1] if self._cut else self._problem.root
-
     def _cut_later(self, planes: Sequence[Plane], number: int) -> bool:
         """Cut off the parts printed after that of a number; whether that can be done."""
         later = planes[number - 1 :][::-1]
         self._keep_alike(later)
-        return all(self._cut_off(plane) is None for plane in later[len(self._cut) :])
+        return self._cut_off(later[len(self._keys) :]) is None
 
     def _keep_alike(self, order: Sequence[Plane]) -> None:
         """Forget the cuts from the first on that is not one of these."""
         alike = 0
-        while alike < min(len(order), len(self._cut)) and self._cut[alike][0] == _key(order[alike]):
+        while alike < min(len(order), len(self._keys)) and self._keys[alike] == _key(order[alike]):
             alike += 1
-        del self._cut[alike:]
+        self._node = self._node.path[alike]
+        del self._keys[alike:]
 
-    def _cut_off(self, plane: Plane) -> Refusal | None:
-        """Make one more cut, or say why it cannot be made."""
-        child = cut_or_refuse(self._problem, self._node, plane)
-        if isinstance(child, Refusal):
-            return child
-        self._cut.append((_key(plane), child))
-        return None
+    def _cut_off(self, planes: Sequence[Plane]) -> Rejection | None:
+        """Make further cuts, or say why one of them cannot be made."""
+        reached = try_planes(self._problem, self._node, planes)
+        self._node = reached.node if isinstance(reached, Rejection) else reached
+        self._keys += map(_key, planes[: len(self._node.cuts) - len(self._keys)])
+        return reached if isinstance(reached, Rejection) else None
 
     def _named(self, order: Sequence[Plane]) -> list[Plane]:
         """Planes in the order of their cuts, their limbs named by vertices where they can be."""
-        made = [node.cuts[-1].base for _, node in self._cut[: len(order)]]
+        made = self._node.planes[: len(order)]
         others = [(plane, name_limbs(self._node, plane)) for plane in order[len(made) :]]
-        return [*made, *(plane if isinstance(named, Refusal) else named for plane, named in others)]
+        return [*made, *(plane if isinstance(named, Rejection) else named for plane, named in others)]
 
-    def _look(self, plane: Plane) -> Refusal | None:
+    def _look(self, plane: Plane) -> Rejection | None:
         """Why a plane cannot cut what is left. Only limbs are cut off for that: what they leave may float."""
         if plane.limbs_mm is None:
-            return refusal(self._problem, self._node, plane)
-        child = cut_or_refuse(self._problem, self._node, plane)
-        return child if isinstance(child, Refusal) else None
-
-    def _allowed(self, order: Sequence[Plane], unchecked: int) -> Trial:
-        parts, left_mm2 = forecast_parts(self._surface, self._named(order))
-        support_mm2, seam_mm = left_mm2 + sum(part.support_mm2 for part in parts), sum(part.rim_mm for part in parts)
-        return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=unchecked)
-
-    def _refused(self, order: Sequence[Plane], done: int, why: Refusal) -> Trial:
-        """What is known where the plane after the first `done` cannot be cut."""
-        parts, _ = forecast_parts(self._surface, self._named(order[:done]))
-        obstacle = find_refused(self._problem, self._node, order[done], why)
-        return Trial((*[None] * (len(order) - done), *parts[::-1]), len(order) + 1 - done, why.text, obstacle=obstacle)
+            return rejection(self._problem, self._node, plane)
+        child = try_planes(self._problem, self._node, [plane])
+        return child if isinstance(child, Rejection) else None
 
 
 def _are_near(plane: Plane, other: Plane, apart_mm: float) -> bool:
@@ -201,20 +190,21 @@ def _key(plane: Plane) -> Key:
     return *plane.normal.tolist(), plane.offset_mm, *limbs_mm
 
 
-def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -> Obstacle | None:
+def find_refused(problem: Problem, refused: Rejection, plane: Plane) -> Obstacle | None:
     """Where a plane that may not cut a node is in the way; None: nobody knows."""
-    named = name_limbs(node, plane)
-    if isinstance(named, Refusal):
+    named = name_limbs(refused.node, plane)
+    if isinstance(named, Rejection):
         return None
-    if refusal.reason == Reason.CLEARANCE:
-        return Obstacle(touch=_touch(problem, node, named))
-    places = _refused_places(problem, node, named, refusal.reason)
+    if refused.reason == Reason.CLEARANCE:
+        return Obstacle(touch=_touch(problem, refused.node, named))
+    places = _refused_places(problem, refused, named)
     return Obstacle(tuple(_vector(place) for place in places[:MOST_PLACES])) if len(places) else None
 
 
-def _refused_places(problem: Problem, node: Node, plane: Plane, reason: Reason) -> Sequence[Floats]:
+def _refused_places(problem: Problem, refused: Rejection, plane: Plane) -> Sequence[Floats]:
     """The places that speak against a plane; none where nobody knows."""
-    match reason:
+    node = refused.node
+    match refused.reason:
         case Reason.PLATFORM:
             centre, radius = problem.platform_disc
             across = plane.normal[:2] / max(float(np.hypot(*plane.normal[:2])), 1e-12)
@@ -235,9 +225,9 @@ def _refused_places(problem: Problem, node: Node, plane: Plane, reason: Reason) 
         case Reason.STANDING:  # what asks for a higher tip than the limbs beside it have
             corners, limb = node.remainder.mesh.vertices[node.remainder.mesh.faces], limb_faces(node.remainder, plane)
             for pose in poses(problem.machine, plane.normal)[:1]:
-                return list(places_met(problem.machine, pose, corners[limb], corners[~limb], plane.offset_mm))
+                return list(places_met(problem.machine, pose, (corners[limb], corners[~limb]), plane.offset_mm))
         case Reason.REACH:
-            return _outside(problem, problem.corners_cut(node, plane), plane)
+            return _outside(problem, node.corners_cut(plane), plane)
     return []
 
 
@@ -245,7 +235,7 @@ def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
     """The head at the lowest place of what is cut off, at the pose that needs least."""
     machine = problem.machine
     options = [(*lowest_body(machine, pose), pose) for pose in poses(machine, plane.normal)]
-    printed = problem.corners_cut(node, plane)
+    printed = node.corners_cut(plane)
     if not options or len(printed) == 0:
         return None
     _, body, point, pose = min(options, key=lambda option: option[0])

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from machine.app.cli import main
-from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.save import stl
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from profiles.profile import load
 from tests.machine.browser import Browser

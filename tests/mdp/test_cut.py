@@ -42,7 +42,7 @@ def test_what_a_cut_leaves_risky_is_what_is_risky_on_the_part(offset_mm: float) 
     node = problem.cut(problem.root, Plane(np.array([0.8, 0.0, 0.6]), 18.0 + offset_mm))
     assert node is not None
     last = node.cuts[-1]
-    part = mesh_of(last.solid)
+    part = mesh_of(last.part)
     risky_mm2 = part.areas_mm2[risky_above(part, last.base, problem.terms.angle_deg)].sum()
-    assert last.cost.residual_mm2 == pytest.approx(risky_mm2, rel=1e-9)
+    assert last.cut_cost.residual_mm2 == pytest.approx(risky_mm2, rel=1e-9)
     assert risky_mm2 > 1.0

@@ -20,7 +20,7 @@ def _box(x: float, width: float, height: float) -> Floats:
 
 def _clear(gap: float, height: float) -> bool:
     """Whether a limb of 10 mm can be printed so far beside a tower of that height."""
-    return passes_clear(MACHINE, level(MACHINE), _box(0.0, 10.0, 10.0), _box(10.0 + gap, 8.0, height), 0.0)
+    return passes_clear(MACHINE, level(MACHINE), (_box(0.0, 10.0, 10.0), _box(10.0 + gap, 8.0, height)), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -43,8 +43,8 @@ def test_what_may_stand_beside_a_limb_is_what_the_head_leaves_free_at_that_dista
 
 def test_a_limb_whose_every_layer_lies_higher_than_what_stands_is_clear_however_near_it_is() -> None:
     up = np.array([0.0, 0.0, 5.0])
-    assert passes_clear(MACHINE, level(MACHINE), _box(0.0, 10.0, 10.0) + up, _box(10.5, 8.0, 4.9), 0.0)
-    assert not passes_clear(MACHINE, level(MACHINE), _box(0.0, 10.0, 10.0) + up, _box(10.5, 8.0, 5.5), 0.0)
+    assert passes_clear(MACHINE, level(MACHINE), (_box(0.0, 10.0, 10.0) + up, _box(10.5, 8.0, 4.9)), 0.0)
+    assert not passes_clear(MACHINE, level(MACHINE), (_box(0.0, 10.0, 10.0) + up, _box(10.5, 8.0, 5.5)), 0.0)
 
 
 def _wide_box(x: float, height: float) -> Floats:
@@ -57,7 +57,7 @@ def _wide_box(x: float, height: float) -> Floats:
     ("gap", "height", "clear"), [(70.0, 38.0, True), (25.0, 30.0, True), (16.5, 40.0, False), (3.0, 2.5, False)]
 )
 def test_large_limbs_are_compared_with_large_things_that_stand(gap: float, height: float, clear: bool) -> None:
-    assert passes_clear(MACHINE, level(MACHINE), _wide_box(0.0, 20.0), _wide_box(70.0 + gap, height), 0.0) is clear
+    assert passes_clear(MACHINE, level(MACHINE), (_wide_box(0.0, 20.0), _wide_box(70.0 + gap, height)), 0.0) is clear
 
 
 @given(st.floats(0.0, 40.0), st.floats(0.0, 40.0), st.floats(0.5, 60.0), st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=2))

@@ -30,7 +30,7 @@ def test_a_face_with_a_point_in_the_zone_is_touched(seed: int, low: tuple[float,
     weights = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), 200)
     points = np.einsum("sc,fci->fsi", weights, mesh.vertices[mesh.faces])
     inside = ((points >= zone.min_mm) & (points <= zone.max_mm)).all(axis=2).any(axis=1)
-    assert (zone.touches(mesh) >= inside).all()
+    assert (zone.faces(mesh) >= inside).all()
 
 
 def test_a_face_whose_box_reaches_into_the_zone_but_not_itself_is_not_touched() -> None:
@@ -56,7 +56,7 @@ def test_a_box_that_is_turned_with_a_model_reaches_the_same_faces_and_the_same_p
     mesh, plain, shift = random_solid(seed), Zone((-4.0, -6.0, 1.0), (3.0, 5.0, 6.0)), np.array((3.0, -2.0, 1.0))
     turn, direction = about(random_direction(height, around), 0.001 * height), random_direction(around, height)
     turned = plain.transform(turn, np.zeros(3)).transform(np.eye(3), shift)
-    assert (turned.touches(mesh.transform(turn, shift)) == plain.touches(mesh)).all()
+    assert (turned.faces(mesh.transform(turn, shift)) == plain.faces(mesh)).all()
     np.testing.assert_allclose(turned.corners, plain.corners @ turn.T + shift, atol=1e-12)
     spans = spans_mm(direction[None], [plain])[0] + turn @ direction @ shift
     np.testing.assert_allclose(spans_mm((turn @ direction)[None], [turned])[0], spans, atol=1e-12)

@@ -27,7 +27,7 @@ from machine.app.terminal.progress import say
 from machine.gcode.blocks import check_blocks
 from machine.quantities import duration
 from mdp.batch.pool import connected
-from mdp.batch.progress import Progress
+from mdp.batch.progress import BatchProgress
 from mdp.batch.rows import append_row, read_rows, write_rows, writing_alone
 from mdp.formats.readers import READERS
 from mdp.kernels.workers import CallError
@@ -120,7 +120,7 @@ def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: 
     if request.workers.scheduler is None:
         _compile(job)
     folders = (request.folder.resolve(), job.out)
-    with connected(replace(request.workers, folders=folders)) as queue, Progress(len(calls), "models") as progress:
+    with connected(replace(request.workers, folders=folders)) as queue, BatchProgress(len(calls), "models") as progress:
         for name, result in queue.completed(row_of, calls, progress.tick):
             if isinstance(result, CallError):
                 result = Row(name, FAILED, sentence=plain_line(f"{name}: {result}"), inputs=inputs_of(files[name], job))

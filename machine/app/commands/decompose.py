@@ -19,8 +19,8 @@ from machine.app.terminal.report import joints_table, part_settings_lines, parts
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
 from mdp.joint import joints_of
-from mdp.plans.writing import plan_text
 from mdp.save import json_values
+from mdp.search.plan_writing import plan_text
 from profiles.profile import Profile
 
 

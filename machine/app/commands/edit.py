@@ -14,8 +14,8 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.serve import serve_workbench
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import DEMO, check_file, locate, plan_beside
-from mdp.plans.plan_file import PlanFile
-from mdp.plans.reading import read_plan
+from mdp.search.plan_file import PlanFile
+from mdp.search.plan_reading import read_plan
 from profiles.errors import MeshError, OutputError, PlanError
 
 PLAN_SUFFIX = ".toml"

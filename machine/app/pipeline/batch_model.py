@@ -20,9 +20,9 @@ from machine.dryrun.dryrun import summary
 from machine.planning.fit import check_parts
 from mdp.decomposition import Part
 from mdp.joint import joints_of
-from mdp.plans.writing import plan_text
 from mdp.ranking import SUFFIX
 from mdp.save import json_values, part_file
+from mdp.search.plan_writing import plan_text
 from profiles.errors import UserError
 from profiles.places import is_file_name
 from profiles.profile import Profile, load, with_part_settings

@@ -12,8 +12,8 @@ from mdp.directions.orientation import motion_between
 from mdp.directions.turns import turned_further
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import plan_beside
-from mdp.plans.plan_file import PlanFile
-from mdp.plans.reading import read_plan
+from mdp.search.plan_file import PlanFile
+from mdp.search.plan_reading import read_plan
 from mdp.search.search import check_part_count
 from mdp.zone import NO_ZONES, Modifier, Zones
 from profiles.errors import PlanError, ProfileError

@@ -37,16 +37,16 @@ from machine.planning.moves import MachineProgram
 from machine.planning.plan import has_purge, plan
 from machine.planning.stops import Stop
 from machine.program import Program
-from mdp.decomposition import Decomposition, Part
+from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.model_file import locate
-from mdp.plans.plan_file import NO_PLAN, PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
 from mdp.read import ReadModel, read_model
-from mdp.search.front import Worth
+from mdp.search.front import Weights
 from mdp.search.orient import orient_and_decompose
-from mdp.search.search import Progress, SearchRequest, cut_by_plan, decompose
+from mdp.search.plan_file import NO_PLAN, PlanFile, plan_of
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 from slicer.interface.interface import pin_width_mm, room_around_mm
@@ -137,7 +137,7 @@ class _Search:
     ) -> None:
         self._request, self._given, self._model, self._report = request, given, model, report
         cuts, profile = request.cuts, request.profile.of_all_parts
-        free = cuts.plan is not None or cuts.parts is not None or not Worth.of(profile)
+        free = cuts.plan is not None or cuts.parts is not None or not Weights.of(profile)
         self._price = None if prices_unused and free else pricing(profile)
         self._records: list[tuple[Decomposition, list[bytes]]] = []
 
@@ -166,12 +166,12 @@ class _Search:
         """What was recorded of the search that ended with a decomposition."""
         return next(record[0] for searched, record in self._records if searched is decomposition)
 
-    def _show(self, progress: Progress) -> None:
-        if progress.stage == 0:
+    def _show(self, stage: int, beam: int, best_share: float, measure: Callable[[], FrontRow]) -> None:
+        if stage == 0:
             compilers.wait_for(compilers.SEARCH, self._report)
             return
-        left = f"{100 * progress.best_share:.1f} % of the risky area left"
-        self._report(f"searching parts: stage {progress.stage}, {progress.beam} in the beam, {left}")
+        left = f"{100 * best_share:.1f} % of the risky area left"
+        self._report(f"searching parts: stage {stage}, {beam} in the beam, {left}")
 
 
 def build(

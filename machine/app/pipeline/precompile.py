@@ -103,7 +103,7 @@ def _limbs(remainder: Remainder) -> None:
     sum_limbs(remainder, [limb], -0.7, 2.0)
     limb_reach(remainder, limb)
     profile, corners = load(), remainder.mesh.vertices[remainder.mesh.faces]
-    passes_clear(profile.machine, level(profile.machine), corners, corners + np.array([60.0, 0.0, 0.0]), 0.0)
+    passes_clear(profile.machine, level(profile.machine), (corners, corners + np.array([60.0, 0.0, 0.0])), 0.0)
 
 
 def _slice() -> None:

@@ -19,6 +19,6 @@ def pricing(profile: Profile) -> Pricing:
             guess = estimate(parts, profile)
         except UserError:
             return None
-        return Price(guess.time_s, guess.filament_mm)
+        return guess.time_s, guess.filament_mm
 
     return price

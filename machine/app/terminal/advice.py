@@ -10,7 +10,7 @@ from mdp.cost.footing import Plate
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words, side_in_words
 from mdp.mesh import Mesh
-from mdp.search.front import ASKED, BY_PLAN, Worth, choose
+from mdp.search.front import ASKED, BY_PLAN, Weights, choose
 from mdp.search.orient import Oriented
 from profiles.profile import Profile
 
@@ -65,7 +65,7 @@ def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen
     search = profile.search
-    return front[choose(front, Worth.of(profile), search.least_saving).place]
+    return front[choose(front, Weights.of(profile), search.least_saving).place]
 
 
 def _without_front(decomposition: Decomposition) -> list[FrontRow]:

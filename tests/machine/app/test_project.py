@@ -16,9 +16,9 @@ from machine.app.project import INSIDE, STANDING, Project, close_projects, is_pr
 from machine.app.project_record import RECORD
 from machine.app.requests import Given
 from mdp.cut import mesh_of
-from mdp.plans.plan_file import PlanFile
 from mdp.read import read_mesh
 from mdp.save import MODEL_PART, stl
+from mdp.search.plan_file import PlanFile
 from tests.shapes import tee
 
 FAST = ("--set", "search.directions=20", "--set", "process.layer_height_mm=0.4", "--set", "machine.thumbnails_px=[]")

@@ -15,9 +15,9 @@ from machine.kinematics.table import workpiece_path
 from machine.view.contents import of_parts
 from machine.view.page import page, print_page
 from mdp.model_file import locate
-from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.read import read_mesh
 from mdp.save import stl
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from profiles.profile import load
 from tests.machine import hand

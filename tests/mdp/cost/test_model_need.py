@@ -70,7 +70,7 @@ def test_what_is_over_air_costs_so_many_times_its_area_and_counts_once_in_what_n
         assert node is not None
         assert problem.terms.need is not None
         rows.append(front_row(node))
-    part = node.places.surface.piece(above(node.cuts[0].whole, plane))
+    part = node.places.surface.piece(above(problem.root.solid, plane))
     classes = problem.terms.need.pieces(part).along(plane.normal)
     over_air_mm2 = part.mesh.areas_mm2[facing_down(part.mesh, plane.normal, 45.0) & (classes == UNSUPPORTABLE)].sum()
     assert over_air_mm2 > 50.0

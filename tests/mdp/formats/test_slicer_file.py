@@ -11,7 +11,7 @@ import pytest
 from mdp.formats.readers import READERS
 from mdp.mesh import Floats, Mesh
 from mdp.read import read_model
-from mdp.zone import MeshVolume, Zone, faces_of
+from mdp.zone import MeshVolume, Zone
 from profiles.errors import MeshError
 from tests.mdp import files
 from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, Placed, affine, bambu, printed, prusaslicer
@@ -400,7 +400,7 @@ def test_triangles_that_are_painted_on_more_than_half_are_marked_wherever_the_mo
     turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
     turned, zones = model.mesh.transform(turn, (1.0, 2.0, 3.0)), model.zones.transform(turn, np.array([1.0, 2.0, 3.0]))
     for mesh, marks in ((model.mesh, model.zones), (turned, zones)):
-        faces = [faces_of(mesh, zone).nonzero()[0].tolist() for (zone,) in (marks.support, marks.no_support, marks.no_seam)]
+        faces = [zone.faces(mesh).nonzero()[0].tolist() for (zone,) in (marks.support, marks.no_support, marks.no_seam)]
         assert faces == [[0, 4], [1], [2]]
     unpainted = "is not taken: only paints for and against support and against seams are, on more than half of a triangle"
     assert sorted(model.notes) == [
@@ -439,7 +439,7 @@ def test_paint_follows_what_is_left_of_a_face_and_a_note_counts_what_is_lost(
     model = read_model(path, rotate_deg=rotate_deg)
     (zone,) = model.zones.support
     assert not isinstance(zone, Zone)
-    assert model.mesh.areas_mm2[faces_of(model.mesh, zone)].sum() == pytest.approx(30.0 * 30.0 - 10.0 * 8.0)
+    assert model.mesh.areas_mm2[zone.faces(model.mesh)].sum() == pytest.approx(30.0 * 30.0 - 10.0 * 8.0)
     lost = "12 others are not on the surface of what is printed"
     assert f"paint for support on 2 of its triangles is taken as [[support]]; {lost}" in model.notes
 

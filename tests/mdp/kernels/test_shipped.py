@@ -103,7 +103,7 @@ def test_a_processor_that_lacks_an_instruction_of_the_common_target_compiles_for
         "host = binding.get_host_cpu_features()\n"
         f"host['avx2'] = host.get('avx2') and {can}\n"
         "binding.get_host_cpu_features = lambda: host\n"
-        "from mdp.kernels.target import COMMON, INSTRUCTIONS, TARGET\n"
+        "from mdp.kernels.cache import COMMON, INSTRUCTIONS, TARGET\n"
         "print(COMMON in TARGET, all(host.get(name) for name in INSTRUCTIONS))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=program.parent, capture_output=True, text=True, check=True)

@@ -12,7 +12,7 @@ import pytest
 
 from mdp.formats.readers import READERS
 from mdp.learning.collect import main
-from mdp.learning.index import INDEX, read_index
+from mdp.learning.collection import INDEX, read_index
 from mdp.mesh import Mesh
 from tests import shapes
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdp.learning import evaluate, train
-from mdp.learning.sources import Side, side
+from mdp.learning.lists import Side, side
 from mdp.ranking.features import COLUMNS
 from tests.mdp.learning.records import write_record
 

@@ -4,8 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdp.learning.lists import RatedList, followed, of_side, of_some_models, read_lists, scale
-from mdp.learning.sources import FOLDS, Side, side
+from mdp.learning.lists import FOLDS, RatedList, Side, followed, of_side, of_some_models, read_lists, scale, side
 from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
 from profiles.errors import UserError
 from tests.mdp.learning.records import write_record

@@ -5,7 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from mdp.learning.objective import regret_loss, thin, urank_loss
+from mdp.learning.training import regret_loss, thin, urank_loss
 from tests.mdp.learning.reference import reference_lists
 
 pytestmark = pytest.mark.train

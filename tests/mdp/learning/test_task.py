@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from mdp.batch.rows import append_row
-from mdp.learning.index import INDEX, Row, Search, read_index, summary, unfinished, write_index
+from mdp.learning.collection import INDEX, Row, Settings, read_index, run, summary, unfinished, write_index
 from mdp.learning.models import coarser, model_files, oriented, read_model
-from mdp.learning.task import Settings, run
 from mdp.mesh import Mesh
 from profiles.errors import MeshError, UserError
 from profiles.profile import load
@@ -24,10 +23,9 @@ def _npz(path: Path, mesh: Mesh) -> Path:
 
 def test_a_search_gives_its_record_and_its_line(tmp_path: Path) -> None:
     path = _npz(tmp_path / "ball.npz", shapes.ball())
-    result = run(Search("ball", 0, "paper"), path, Settings(beam_width=3))
-    with np.load(io.BytesIO(result.record)) as record:
-        least, lists, rows = record["node_cost"].min(), len(np.unique(record["stage"])), len(record["stage"])
-    row = result.row
+    row, record = run(Row("ball", 0, "paper", Settings(beam_width=3).in_words), path, Settings(beam_width=3))
+    with np.load(io.BytesIO(record)) as arrays:
+        least, lists, rows = arrays["node_cost"].min(), len(np.unique(arrays["stage"])), len(arrays["stage"])
     assert row.outcome == pytest.approx(least, abs=1e-6)
     assert (row.lists, row.mean_list_length) == (lists, round(rows / lists, 2))
     assert (row.settings, row.late, row.excluded) == ("B=3", 0, "")
@@ -37,8 +35,10 @@ def test_a_search_gives_its_record_and_its_line(tmp_path: Path) -> None:
     ("terms", "reason"), [("ours", "no risky face"), ("paper", "nothing feasible")], ids=lambda value: str(value)
 )
 def test_a_search_without_a_list_has_no_record(tmp_path: Path, terms: str, reason: str) -> None:
-    result = run(Search("box", 0, terms), _npz(tmp_path / "box.npz", shapes.box()), Settings(beam_width=1))
-    assert (result.row.excluded, result.record) == (reason, b"")
+    row, record = run(
+        Row("box", 0, terms, Settings(beam_width=1).in_words), _npz(tmp_path / "box.npz", shapes.box()), Settings(beam_width=1)
+    )
+    assert (row.excluded, record) == (reason, b"")
 
 
 def test_a_collection_searches_by_the_profiles_and_settings_that_it_is_given() -> None:
@@ -51,7 +51,7 @@ def test_a_collection_searches_by_the_profiles_and_settings_that_it_is_given() -
 
 def test_a_search_that_the_clock_ended_is_told_apart(tmp_path: Path) -> None:
     path = _npz(tmp_path / "ball.npz", shapes.ball())
-    assert run(Search("ball", 0, "paper"), path, Settings(1, None, 0.0)).row.late == 1
+    assert run(Row("ball", 0, "paper", Settings(1, None, 0.0).in_words), path, Settings(1, None, 0.0))[0].late == 1
 
 
 def test_orientations_are_the_sides_that_a_model_rests_on_and_end_with_them() -> None:
@@ -62,9 +62,11 @@ def test_orientations_are_the_sides_that_a_model_rests_on_and_end_with_them() ->
 
 
 def test_a_model_without_a_further_side_is_not_searched_again_in_another_turn(tmp_path: Path) -> None:
-    result = run(Search("tee", 3, "paper"), _npz(tmp_path / "tee.npz", shapes.tee()), Settings(beam_width=1))
-    assert (result.row.excluded, result.record) == ("no further side to rest on", b"")
-    assert unfinished(tmp_path, [result.row], [result.row.search]) == []
+    row, record = run(
+        Row("tee", 3, "paper", Settings(beam_width=1).in_words), _npz(tmp_path / "tee.npz", shapes.tee()), Settings(beam_width=1)
+    )
+    assert (row.excluded, record) == ("no further side to rest on", b"")
+    assert unfinished(tmp_path, [row], [row.key]) == []
 
 
 def test_a_fine_model_is_made_coarser_within_two_thousandths_of_its_diagonal() -> None:
@@ -100,8 +102,8 @@ def test_what_failed_or_lost_its_record_is_done_again(tmp_path: Path) -> None:
     reasons = {"a": "", "b": "", "c": "no risky face", "d": "failed: by accident"}
     rows = [Row(name, 0, "paper", "B=50", excluded=reason) for name, reason in reasons.items()]
     (tmp_path / "a.0.paper.npz").touch()
-    missing = unfinished(tmp_path, rows, [*(row.search for row in rows), Search("e", 0, "paper")])
-    assert [search.id for search in missing] == ["b", "d", "e"]
+    missing = unfinished(tmp_path, rows, [*(row.key for row in rows), ("e", 0, "paper")])
+    assert [name for name, _, _ in missing] == ["b", "d", "e"]
 
 
 def test_a_collection_is_summarized_in_tables() -> None:

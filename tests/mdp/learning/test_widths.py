@@ -3,14 +3,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdp.learning.widths import Search, compare, read_searches, table
+from mdp.learning.widths import TimedSearch, compare, read_searches, table
 from profiles.errors import UserError
 
 HEAD = "mesh,settings,method,width,risky_mm2,share,core_s,error"
 
 
-def search(mesh: str, ranker: str, width: int, share: float) -> Search:
-    return Search(mesh, "", "best", ranker, width, share, 2.0 * width)
+def search(mesh: str, ranker: str, width: int, share: float) -> TimedSearch:
+    return TimedSearch(mesh, "", "best", ranker, width, share, 2.0 * width)
 
 
 def cells(text: str, ranker: str, width: int) -> list[str]:
@@ -51,7 +51,7 @@ def test_a_learned_ranker_without_a_plain_search_beside_it_is_compared_with_noth
 
 
 def test_core_times_of_nothing_are_compared_with_nothing() -> None:
-    (comparison,) = compare([Search("a", "", "best", "classic", 1, 0.5, 0.0)])
+    (comparison,) = compare([TimedSearch("a", "", "best", "classic", 1, 0.5, 0.0)])
     assert cells(table(comparison), "classic", 1)[5] == "-"
 
 
@@ -68,7 +68,7 @@ def test_the_interval_agrees_with_the_normal_law() -> None:
 def test_models_without_a_risky_face_and_failed_searches_do_not_count(tmp_path: Path) -> None:
     file = tmp_path / "widths.csv"
     file.write_text(f"{HEAD}\na,s,best,1,9,0.5,2,\nb,s,best,1,0,0,2,\nc,s,best,1,0,1,2,MeshError: open\n")
-    assert read_searches(file) == [Search("a", "s", "best", "classic", 1, 0.5, 2.0)]
+    assert read_searches(file) == [TimedSearch("a", "s", "best", "classic", 1, 0.5, 2.0)]
 
 
 def test_ranker_files_of_the_same_name_count_as_one_ranker(tmp_path: Path) -> None:

@@ -1,17 +1,16 @@
-"""Network: a learned ranker, its file, and what it does to a search."""
+"""LearnedRanker: a learned ranker, its file, and what it does to a search."""
 
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mdp.mesh import Floats
-from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import CHECKED, COLUMNS, features
-from mdp.ranking.ranker import Network, ranker_named, shipped
+from mdp.ranking.ranker import LearnedRanker, ranker_named, shipped
 from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, shortlist
 from mdp.search.beam import Beam, search_as_published
 from mdp.search.problem import Problem
@@ -27,7 +26,7 @@ def _problem(width: int = 1, shape: str = "branch") -> Problem:
     return Problem(getattr(shapes, shape)(), load(settings=(*SETTINGS, f"search.beam_width={width}")))
 
 
-class ByColumn(Network):
+class ByColumn(LearnedRanker):
     """A network in whose place stands a plain sum, so that the order it must give is known."""
 
     def __init__(self, column: str) -> None:
@@ -43,7 +42,7 @@ def test_candidates_come_by_their_scores_and_equal_ones_as_they_were_offered(col
     problem = _problem()
     table = problem.table(problem.root, described=True)
     offered = list(shortlist([table], np.inf))
-    ranked = list(ByColumn(column).rank(offered, [table]))
+    ranked = list(ByColumn(column).rank(offered))
     values = features(table, np.array([each.row for each in offered]), (column,))[:, 0]
     assert [each.row for each in ranked] == [offered[place].row for place in np.argsort(-values, kind="stable")]
 
@@ -52,8 +51,8 @@ def test_candidates_beyond_the_list_keep_their_order_behind_it() -> None:
     problem = _problem()
     table = problem.table(problem.root, described=True)
     table.check_rows(np.arange(len(table.reason)))
-    offered = [RankedCandidate(0, int(row), 0) for row in np.flatnonzero(table.reason == 0)[:60]]
-    ranked = list(ByColumn("M1").rank(offered, [table]))
+    offered = [RankedCandidate(table, int(row)) for row in np.flatnonzero(table.reason == 0)[:60]]
+    ranked = list(ByColumn("M1").rank(offered))
     assert ranked[50:] == offered[50:]
     assert {each.row for each in ranked[:50]} == {each.row for each in offered[:50]}
 
@@ -128,10 +127,10 @@ def test_the_published_search_follows_the_plain_best_beside_what_a_learned_ranke
     assert best.cuts[-1].base.offset_mm == pytest.approx(table.plane(plain.row).offset_mm)
 
 
-class LastFirst(Network):
+class LastFirst(LearnedRanker):
     """A learned ranker that likes best what the classic ranking likes least."""
 
-    def rank(self, offered: Iterable[RankedCandidate], tables: Sequence[CandidateTable]) -> Iterator[RankedCandidate]:
+    def rank(self, offered: Iterable[RankedCandidate]) -> Iterator[RankedCandidate]:
         return reversed(list(offered))
 
 

@@ -1,7 +1,8 @@
 """The orders of candidates against plain sorting: every candidate looked at, nothing checked ahead, no round cut short."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -11,16 +12,20 @@ from hypothesis import strategies as st
 from mdp.directions.spread import spread
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.ranking.candidate_table import (
+from mdp.ranking.candidates import Bounds, Feasibility, Reason, ScoredCandidates
+from mdp.ranking.ranking import (
+    EACH,
+    LISTED,
     RESIDUAL_THRESHOLDS,
     CandidateTable,
     Model,
-    Situation,
+    RankedCandidate,
     nearly_equal,
+    rank_by_trade_off,
+    rank_classic,
     relaxation_rounds,
+    shortlist,
 )
-from mdp.ranking.candidates import Bounds, Feasibility, Reason, ScoredCandidates
-from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_by_trade_off, rank_classic, shortlist
 
 DIRECTIONS = spread(40, 0.2)
 RISKY_MM2, BOUND_MM2 = 100.0, 60.0
@@ -93,8 +98,8 @@ def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
     scored = ScoredCandidates(
         None, limits, own.direction, own.offset, **costs, **unused, first=own.direction, columns=own.direction
     )  # type: ignore[arg-type]
-    situation = Situation(Model(RISKY_MM2, 1.0, 1.0), own.saved, own.left, own.lost_before, 0.0, 0.0, 1.0, 0, DIRECTIONS[0])
-    table = CandidateTable(scored, situation, least_gain_mm2, is_weak)
+    node: Any = SimpleNamespace(saved_mm2=own.saved, residual_mm2=own.left, lost_mm2=own.lost_before)
+    table = CandidateTable(scored, node, Model(RISKY_MM2, 1.0, 1.0), least_gain_mm2, is_weak)
     table.check = answer
     return table
 
@@ -114,8 +119,8 @@ def without_alike(
     return taken
 
 
-def places(candidates: Sequence[RankedCandidate]) -> list[Place]:
-    return [(candidate.table, candidate.row) for candidate in candidates]
+def places(tables: Sequence[CandidateTable], candidates: Sequence[RankedCandidate]) -> list[Place]:
+    return [(tables.index(candidate.table), candidate.row) for candidate in candidates]
 
 
 def by_trade_off(tables: Sequence[Drawn], weight: float, least_gain: float = 0.0) -> list[Place]:
@@ -138,8 +143,9 @@ def by_trade_off(tables: Sequence[Drawn], weight: float, least_gain: float = 0.0
 @given(seeds, st.integers(1, 3), st.sampled_from((0.0, 1.0, 2.5)), st.sampled_from((0.0, 20.0)))
 def test_candidates_by_trade_off_are_those_that_plain_sorting_finds(seed: int, count: int, weight: float, least: float) -> None:
     own = [drawn(seed + k) for k in range(count)]
-    ranked = list(rank_by_trade_off([table_of(one, least) for one in own], weight, BOUND_MM2))
-    assert places(ranked) == by_trade_off(own, weight, least)
+    tables = [table_of(one, least) for one in own]
+    ranked = list(rank_by_trade_off(tables, weight, BOUND_MM2))
+    assert places(tables, ranked) == by_trade_off(own, weight, least)
 
 
 @settings(max_examples=10)
@@ -150,7 +156,8 @@ def test_a_shortlist_has_the_first_few_by_each_trade_off_once(seed: int) -> None
     for number, one in enumerate(own):
         rows = [row for weight in LISTED for _, row in by_trade_off([one], weight)[:EACH]]
         expected += [(number, row) for row in dict.fromkeys(rows)]
-    assert places(list(shortlist([table_of(one) for one in own], BOUND_MM2))) == expected
+    tables = [table_of(one) for one in own]
+    assert places(tables, list(shortlist(tables, BOUND_MM2))) == expected
 
 
 def classic(tables: Sequence[Drawn], preferred: float, least_reduction: float) -> list[Place]:
@@ -192,9 +199,10 @@ def test_the_order_of_the_paper_is_the_one_worked_out_round_by_round(
     seed: int, count: int, preferred: float, least: float
 ) -> None:
     own = [drawn(seed + k, 120) for k in range(count)]
-    ranked = list(rank_classic([table_of(one) for one in own], BOUND_MM2, least, preferred))
-    assert places(ranked) == classic(own, preferred, least)
-    assert [c.round for c in ranked] == [_round(own[c.table].lost[c.row]) for c in ranked]
+    tables = [table_of(one) for one in own]
+    ranked = list(rank_classic(tables, BOUND_MM2, least, preferred))
+    assert places(tables, ranked) == classic(own, preferred, least)
+    assert [c.round for c in ranked] == [_round(own[index].lost[row]) for index, row in places(tables, ranked)]
 
 
 @pytest.mark.parametrize(("share", "number"), [(0.0, 0), (0.99e-4, 0), (1e-4, 1), (4.9e-4, 1), (5e-4, 2), (1.0, 6), (1e6, 11)])

@@ -5,8 +5,8 @@ import pytest
 
 from mdp.mesh import Floats
 from mdp.plane import Plane
-from mdp.ranking.candidate_table import SAME_COSINE, nearly_equal
 from mdp.ranking.candidates import directions
+from mdp.ranking.ranking import SAME_COSINE, nearly_equal
 from profiles.profile import load
 
 

@@ -6,9 +6,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mdp.plane import Plane
-from mdp.ranking.candidate_table import Model
 from mdp.ranking.features import COLUMNS
-from mdp.ranking.record import Child, Offer, Trace, npz
+from mdp.ranking.ranking import Model
+from mdp.ranking.record import Offer, Trace, npz
 
 MODEL = Model(risky_mm2=200.0, volume_mm3=1000.0, radius_mm=10.0)
 
@@ -24,10 +24,10 @@ def trace() -> Trace:
     """Model -> a (100), b (120), c (90, left behind); a -> d (20) and e (60); b -> the twin of d."""
     search = Trace("figure.stl", MODEL, "model")
     search.begin_stage(["model"])
-    first = [Child(0, "a", 100.0), Child(2, "b", 120.0), Child(3, "c", 90.0)]
+    first = [(0, "a", 100.0), (2, "b", 120.0), (3, "c", 90.0)]
     search.add([offer("model", gain) for gain in (10, 11, 12, 13)], first)
     search.begin_stage(["a", "b"])
-    second = [Child(0, "d", 20.0), Child(1, "e", 60.0), Child(2, "d", 20.0)]
+    second = [(0, "d", 20.0), (1, "e", 60.0), (2, "d", 20.0)]
     search.add([offer("a", 5), offer("a", 6, 1), offer("b", 7, 2)], second)
     return search
 
@@ -76,18 +76,18 @@ def test_an_outcome_is_the_least_cost_through_a_node_stopping_there_included() -
 def test_a_worse_child_does_not_make_its_parent_worse() -> None:
     search = Trace("m", MODEL, "model")
     search.begin_stage(["model"])
-    search.add([offer("model", 1)], [Child(0, "a", 50.0)])
+    search.add([offer("model", 1)], [(0, "a", 50.0)])
     search.begin_stage(["a"])
-    search.add([offer("a", 2)], [Child(0, "b", 80.0)])
+    search.add([offer("a", 2)], [(0, "b", 80.0)])
     assert search.outcomes().tolist() == [0.25, 0.25, 0.4]
 
 
 def test_a_twin_of_an_earlier_stage_passes_its_outcome_on() -> None:
     search = Trace("m", MODEL, "model")
     search.begin_stage(["model"])
-    search.add([offer("model", 1), offer("model", 2)], [Child(0, "a", 50.0), Child(1, "b", 90.0)])
+    search.add([offer("model", 1), offer("model", 2)], [(0, "a", 50.0), (1, "b", 90.0)])
     search.begin_stage(["a", "b"])
-    search.add([offer("b", 3), offer("a", 4)], [Child(0, "a", 50.0), Child(1, "c", 10.0)])
+    search.add([offer("b", 3), offer("a", 4)], [(0, "a", 50.0), (1, "c", 10.0)])
     assert search.outcomes().tolist() == [0.05, 0.05, 0.05, 0.05]
 
 
@@ -107,8 +107,8 @@ def test_a_node_that_the_beam_left_behind_is_told_apart() -> None:
 def test_what_is_added_twice_in_a_stage_is_one_row() -> None:
     search = Trace("m", MODEL, "model")
     search.begin_stage(["model"])
-    search.add([offer("model", 1), offer("model", 2)], [Child(0, "a", 50.0)])
-    search.add([offer("model", 2), offer("model", 1), offer("model", 3)], [Child(1, "a", 50.0), Child(0, "b", 60.0)])
+    search.add([offer("model", 1), offer("model", 2)], [(0, "a", 50.0)])
+    search.add([offer("model", 2), offer("model", 1), offer("model", 3)], [(1, "a", 50.0), (0, "b", 60.0)])
     record = search.arrays()
     assert record["offset_mm"].tolist() == [1, 2, 3]
     assert (record["chosen"].tolist(), record["child"].tolist()) == ([True, True, False], [1, 2, -1])
@@ -117,9 +117,9 @@ def test_what_is_added_twice_in_a_stage_is_one_row() -> None:
 def test_a_twin_whose_signature_rounds_otherwise_is_the_same_node() -> None:
     search = Trace("m", MODEL, "model")
     search.begin_stage(["model"])
-    search.add([offer("model", 1)], [Child(0, "a", 50.0), Child(0, "a rounded", 50.0)])
+    search.add([offer("model", 1)], [(0, "a", 50.0), (0, "a rounded", 50.0)])
     search.begin_stage(["a", "a rounded"])
-    search.add([offer("a rounded", 2)], [Child(0, "b", 10.0)])
+    search.add([offer("a rounded", 2)], [(0, "b", 10.0)])
     assert search.arrays()["parent"].tolist() == [0, 1]
     assert search.outcomes().tolist() == [0.05, 0.05, 0.05]
 

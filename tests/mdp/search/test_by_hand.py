@@ -13,10 +13,10 @@ from mdp.cut import below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
-from mdp.plans.reading import read_plan
-from mdp.plans.writing import plan_text
 from mdp.save import stl
+from mdp.search.plan_file import PlanFile, PlannedPart, plan_of
+from mdp.search.plan_reading import read_plan
+from mdp.search.plan_writing import plan_text
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
@@ -95,7 +95,7 @@ def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
 def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_row_is_cut() -> None:
     searched = plan_of(_searched_arms())
     mine = replace(searched, parts=_by_hand((UP, 35.0), (UP, 40.0)).parts)
-    for front in (searched.front, tuple(row for row in searched.front if len(row.parts) < 2)):
+    for front in (searched.front, tuple(row for row in searched.front if row.parts < 3)):
         saved = plan_of(cut_by_plan(_two_arms(), "shape", _profile(), SearchRequest(plan=replace(mine, front=front), parts=2)))
         assert saved.row(3) == mine.parts
         assert saved.front[2].cost_mm2 == pytest.approx(

@@ -9,10 +9,9 @@ from mdp.cut import mesh_of, simplify, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart
-from mdp.search.by_hand import Refusal, cut_near, cut_or_refuse
-from mdp.search.front import Price
+from mdp.search.by_hand import Rejection, cut_near, try_planes
 from mdp.search.orient import orient_and_decompose
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.problem import Problem
 from mdp.search.search import SearchRequest, coarse_copy, decompose
 from mdp.zone import NO_ZONES, Painted, Zone, Zones
@@ -114,9 +113,9 @@ def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itse
 
     def search(mesh: Mesh) -> Decomposition:
         searched.append(mesh)
-        return decompose(mesh, "tee", profile, SearchRequest(price=lambda parts: Price(100.0, 1000.0)))
+        return decompose(mesh, "tee", profile, SearchRequest(price=lambda parts: (100.0, 1000.0)))
 
-    oriented = orient_and_decompose(mesh, profile, lambda profile: lambda parts: Price(100.0, 1000.0), search)
+    oriented = orient_and_decompose(mesh, profile, lambda profile: lambda parts: (100.0, 1000.0), search)
     assert oriented.orientation is not None
     assert [len(mesh.faces) for mesh in searched] == [len(mesh.faces)]
     assert oriented.decomposition.mesh is searched[0]
@@ -133,7 +132,7 @@ def test_a_search_that_is_recorded_is_one_of_the_model_itself(fine: Mesh) -> Non
 def test_a_plane_that_leaves_a_sliver_is_moved_to_the_nearest_that_cuts() -> None:
     problem = Problem(shapes.tee(), _profile(0))
     flush = Plane(np.array([1.0, 0.0, 0.0]), 19.8)
-    assert isinstance(cut_or_refuse(problem, problem.root, flush), Refusal)
+    assert isinstance(try_planes(problem, problem.root, [flush]), Rejection)
     moved = cut_near(problem, problem.root, flush)
     assert moved is not None
     plane = moved.cuts[-1].base
@@ -153,7 +152,7 @@ def test_a_copy_is_searched_before_the_mesh_itself_is_measured_and_every_phase_i
         "post",
         _profile(2000, "search.beam_width=2"),
         SearchRequest(
-            on_stage=lambda progress: heard.append("stage"), on_phase=lambda text: heard.append(text.partition(" of ")[0])
+            on_stage=lambda *told: heard.append("stage"), on_phase=lambda text: heard.append(text.partition(" of ")[0])
         ),
     )
     measured = [k for k, text in enumerate(heard) if text == "measuring overhangs and seams"]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
-from mdp.search.front import Worth, choose, pays
+from mdp.search.front import Weights, choose, pays
 from profiles.profile import load
 
 PLANE = Plane(np.array([0.0, 0.0, 1.0]), 5.0)
@@ -27,7 +27,7 @@ BUNNY = front((1885.0, 10529.0), (1771.0, 10751.0), (1495.0, 11350.0), (1384.0, 
 
 @pytest.mark.parametrize(("second_mm2", "parts"), [(0.0, 4), (0.1, 4), (0.3, 3), (0.45, 3), (0.5, 2), (0.6, 1), (100.0, 1)])
 def test_the_dearer_a_second_the_fewer_the_parts_that_take_long(second_mm2: float, parts: int) -> None:
-    assert choose(BUNNY, Worth(second_mm2)).place + 1 == parts
+    assert choose(BUNNY, Weights(second_mm2)).place + 1 == parts
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
@@ -37,18 +37,18 @@ def test_where_time_is_free_the_fewest_parts_are_taken_that_are_within_one_perce
     rows = front(*values)
     least_mm2 = min(row.cost_mm2 for row in rows)
     limit_mm2 = least_mm2 + 0.01 * rows[0].cost_mm2
-    assert choose(rows, Worth(0.0)).place == next(place for place, row in enumerate(rows) if row.cost_mm2 <= limit_mm2)
+    assert choose(rows, Weights(0.0)).place == next(place for place, row in enumerate(rows) if row.cost_mm2 <= limit_mm2)
 
 
 def test_a_small_part_that_saves_next_to_nothing_is_not_cut_off() -> None:
-    assert choose(front((640.0, None), (336.0, None), (331.0, None)), Worth(0.0)).place == 1
+    assert choose(front((640.0, None), (336.0, None), (331.0, None)), Weights(0.0)).place == 1
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
 def test_where_only_time_counts_the_fastest_row_that_saves_scars_is_taken(values: list[tuple[float, float]]) -> None:
     rows = front(*values)
     fastest_s = min(row.time_s or 0.0 for row, good in zip(rows, pays(rows), strict=True) if good)
-    assert (rows[choose(rows, Worth(1e9)).place].time_s or 0.0) - fastest_s <= 1e-3
+    assert (rows[choose(rows, Weights(1e9)).place].time_s or 0.0) - fastest_s <= 1e-3
 
 
 # Three pieces with 100 mm2 of time each; every cut saves 200 mm2 of scars more than the next.
@@ -57,37 +57,37 @@ THREE = front((1000.0, 200.0), (600.0, 200.0), (400.0, 200.0))
 
 @pytest.mark.parametrize(("least_saving", "parts"), [(0.0, 3), (0.18, 3), (0.19, 2), (0.36, 2), (0.37, 1)])
 def test_every_further_part_saves_at_least_that_share_of_the_cost_of_one_piece(least_saving: float, parts: int) -> None:
-    assert choose(THREE, Worth(0.5), least_saving=least_saving).place + 1 == parts
+    assert choose(THREE, Weights(0.5), least_saving=least_saving).place + 1 == parts
 
 
 def test_the_reason_names_the_demand_that_more_parts_do_not_meet() -> None:
-    assert choose(THREE, Worth(0.5), least_saving=0.19).reason == "more parts would save less than 19 % each"
+    assert choose(THREE, Weights(0.5), least_saving=0.19).reason == "more parts would save less than 19 % each"
 
 
 def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:
-    choice = choose(THREE, Worth(0.5), least_saving=0.4)
+    choice = choose(THREE, Weights(0.5), least_saving=0.4)
     assert choice.note == ("3 parts would save 600 mm2 of scars with 2 more cuts: --parts 3",)
     rows = front((1000.0, 900.0), (500.0, 800.0))
     rows = [replace(row, filament_mm=filament_mm) for row, filament_mm in zip(rows, (10_000.0, 12_000.0), strict=True)]
-    choice = choose(rows, Worth(0.5), least_saving=0.6)
+    choice = choose(rows, Weights(0.5), least_saving=0.6)
     assert choice.note == ("2 parts would save 500 mm2 of scars but take 2.0 m more filament: --parts 2",)
 
 
 def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fast() -> None:
-    assert choose(front((100.0, 900.0), (120.0, 1.0)), Worth(1.0)).place == 0
+    assert choose(front((100.0, 900.0), (120.0, 1.0)), Weights(1.0)).place == 0
 
 
 def test_a_row_that_cannot_be_printed_is_not_taken_while_another_one_can() -> None:
     rows = front((200.0, 900.0), (100.0, None))
-    assert [choose(rows, Worth(second_mm2)).place for second_mm2 in (0.0, 1.0)] == [0, 0]
-    assert choose(front((200.0, None), (100.0, None)), Worth(1.0)).place == 1
+    assert [choose(rows, Weights(second_mm2)).place for second_mm2 in (0.0, 1.0)] == [0, 0]
+    assert choose(front((200.0, None), (100.0, None)), Weights(1.0)).place == 1
 
 
 def test_what_is_given_up_for_time_is_told_with_figures() -> None:
-    choice = choose(BUNNY, Worth(1.0))
+    choice = choose(BUNNY, Weights(1.0))
     assert choice.reason == "the least cost with its time"
     assert choice.note == ("4 parts would save 501 mm2 of scars but take 24 min longer: --parts 4",)
-    assert choose(BUNNY, Worth(0.0)).note == ()
+    assert choose(BUNNY, Weights(0.0)).note == ()
 
 
 @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ def test_what_is_given_up_for_time_is_told_with_figures() -> None:
     ],
 )
 def test_seconds_and_filament_count_where_scars_do_and_support_is_printed(setting: str, price: float) -> None:
-    worth = Worth.of(load(settings=["search.second_mm2=0.3", "search.metre_mm2=40", setting]))
-    assert worth == Worth(price, 0.04 * (price > 0.0))
+    worth = Weights.of(load(settings=["search.second_mm2=0.3", "search.metre_mm2=40", setting]))
+    assert worth == Weights(price, 0.04 * (price > 0.0))
 
 
 def test_of_two_rows_that_take_as_long_the_one_with_less_filament_is_taken_where_filament_is_dear() -> None:
@@ -110,17 +110,17 @@ def test_of_two_rows_that_take_as_long_the_one_with_less_filament_is_taken_where
         replace(row, filament_mm=filament_mm)
         for row, filament_mm in zip(front((100.0, 60.0), (90.0, 60.0)), (4e3, 5e3), strict=True)
     ]
-    assert [choose(rows, Worth(0.5, filament_mm2)).place for filament_mm2 in (0.0, 0.05)] == [1, 0]
+    assert [choose(rows, Weights(0.5, filament_mm2)).place for filament_mm2 in (0.0, 0.05)] == [1, 0]
 
 
 def test_a_row_without_a_time_is_said_to_be_no_choice() -> None:
-    assert choose(front((200.0, 900.0), (100.0, None)), Worth(1.0)).reason == "the least cost of what can be printed well"
+    assert choose(front((200.0, 900.0), (100.0, None)), Weights(1.0)).reason == "the least cost of what can be printed well"
 
 
 def test_where_time_counts_nothing_as_without_support_there_is_no_charge() -> None:
-    assert choose(THREE, Worth(0.0), least_saving=1.0).place == 2
+    assert choose(THREE, Weights(0.0), least_saving=1.0).place == 2
 
 
 def test_a_row_that_is_not_sound_is_not_taken_though_it_has_a_time() -> None:
     rows = [*THREE[:2], replace(THREE[2], sound=False)]
-    assert choose(rows, Worth(0.5)).place == 1
+    assert choose(rows, Weights(0.5)).place == 1

@@ -50,7 +50,7 @@ def rim_mm(mesh: Mesh, plane: Plane) -> float:
 
 
 def neck(mesh: Mesh, plane: Plane, reach_mm: float = 12.0) -> Plane | None:
-    return find_neck(mesh, np.ones(len(mesh.faces)), plane, reach_mm, 25.0)
+    return find_neck(mesh, np.ones(len(mesh.faces)), plane, reach_mm)
 
 
 @settings(max_examples=6, deadline=None)

@@ -14,11 +14,11 @@ from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import facet_orientations, side_in_words, standing_still
 from mdp.mesh import Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.pose import about
 from mdp.search import orient
-from mdp.search.front import Price, Pricing, Worth
+from mdp.search.front import Price, Pricing, Weights
 from mdp.search.orient import Oriented, distinct_orientations, forecast_orientations, orient_and_decompose, total_mm2
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, decompose
 from profiles.profile import Profile, load
 from tests.shapes import box, branch, tee
@@ -30,7 +30,7 @@ def by_height(profile: Profile) -> Pricing:
     """A printer that takes 10 s for every mm of height."""
 
     def price(parts: Sequence[Part]) -> Price:
-        return Price(sum(10.0 * float(np.ptp(part.in_part_frame().vertices[:, 2])) for part in parts), 1000.0)
+        return sum(10.0 * float(np.ptp(part.in_part_frame().vertices[:, 2])) for part in parts), 1000.0
 
     return price
 
@@ -66,13 +66,13 @@ def test_what_lies_best_stays_as_it_stands() -> None:
 def test_laid_down_it_costs_no_more_than_in_one_piece_as_it_stands(mesh: Mesh) -> None:
     whole = decompose(mesh, "mesh", PROFILE, SearchRequest(price=by_height(PROFILE))).front[0]
     footing_mm2 = forecast_orientations(mesh, PROFILE, by_height)[0].footing_mm2
-    assert found(mesh).total_mm2 <= total_mm2(whole, Worth.of(PROFILE)) + footing_mm2
+    assert found(mesh).total_mm2 <= total_mm2(whole, Weights.of(PROFILE)) + footing_mm2
 
 
 def test_a_model_stays_where_turning_it_saves_less_than_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     standing = decompose(tee(), "mesh", PROFILE, SearchRequest(price=by_height(PROFILE))).front[0]
     footing_mm2 = forecast_orientations(tee(), PROFILE, by_height)[0].footing_mm2
-    saved_mm2 = total_mm2(standing, Worth.of(PROFILE)) + footing_mm2 - 110.0  # of 100 s and a metre
+    saved_mm2 = total_mm2(standing, Weights.of(PROFILE)) + footing_mm2 - 110.0  # of 100 s and a metre
     for share, turned in ((0.9, True), (1.1, False)):
         monkeypatch.setattr(orient, "TURNED", share * saved_mm2 / 3000.0)
         assert (found(tee()).orientation is not None) == turned
@@ -129,7 +129,7 @@ def test_a_way_that_ends_dearer_than_good_cuts_would_leave_it_is_compared_with_h
             low = profile.process.support != "none" and np.ptp(parts[0].mesh.vertices[:, 2]) < 39
             found = by_height(profile)(parts)
             assert found is not None
-            return Price(found.time_s + more_s * low, found.filament_mm)
+            return found[0] + more_s * low, found[1]
 
         return price
 

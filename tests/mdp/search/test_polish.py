@@ -9,7 +9,7 @@ from mdp.cut import cut, mesh_of, solid_of
 from mdp.mesh import Floats
 from mdp.overhang import risky_above, risky_upright
 from mdp.plane import Plane
-from mdp.search.node import Node
+from mdp.ranking.node import Node
 from mdp.search.polish import make_regular, polish
 from mdp.search.problem import Problem
 from mdp.search.search import SearchRequest, decompose

@@ -1,5 +1,5 @@
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 from dataclasses import replace
 from functools import cache
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mdp.clearance import least_tip_height_mm
-from mdp.decomposition import Decomposition, Part
+from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.overhang import facing_down
@@ -19,9 +19,9 @@ from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.ranking.candidates import directions
 from mdp.ranking.features import COLUMNS
-from mdp.search.front import Front, Price
+from mdp.search.front import ParetoFront, Price
 from mdp.search.parts import folded_mm3
-from mdp.search.search import Progress, SearchRequest, decompose
+from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
 from profiles.profile import load
 from tests import shapes
@@ -204,8 +204,8 @@ def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.Monkey
         begun.append(ahead(*work))
         return begun[-1]
 
-    def interrupt(progress: Progress) -> None:
-        if progress.stage > 0:
+    def interrupt(stage: int, beam: int, best_share: float, measure: Callable[[], FrontRow]) -> None:
+        if stage > 0:
             raise KeyboardInterrupt
 
     monkeypatch.setattr("mdp.search.beam.ahead", note)
@@ -283,8 +283,8 @@ def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
 @pytest.mark.parametrize("method", ["published", "best"])
 def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     words = (f"search.method={method}", "search.objective=risky", "search.directions=100", "search.polish=false")
-    usual, offer = decompose(shapes.tee(), "tee", load(settings=words)), Front.offer
-    monkeypatch.setattr(Front, "offer", lambda front, node: offer(front, replace(node)))
+    usual, offer = decompose(shapes.tee(), "tee", load(settings=words)), ParetoFront.offer
+    monkeypatch.setattr(ParetoFront, "offer", lambda front, node: offer(front, replace(node)))
     twin = decompose(shapes.tee(), "tee", load(settings=words))
     assert [row.chosen for row in twin.front] == [row.chosen for row in usual.front]
     assert len(twin.parts) == len(usual.parts) > 1
@@ -296,11 +296,11 @@ def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_
         shapes.tee(),
         "tee",
         load(settings=["search.directions=60"]),
-        SearchRequest(on_stage=lambda progress: told.append(progress.stage)),
+        SearchRequest(on_stage=lambda stage, *others: told.append(stage)),
     )
     assert told[:2] == [0, 1]
     told.clear()
-    decompose(shapes.box(10.0, 10.0, 10.0), "box", load(), SearchRequest(on_stage=lambda progress: told.append(progress.stage)))
+    decompose(shapes.box(10.0, 10.0, 10.0), "box", load(), SearchRequest(on_stage=lambda stage, *others: told.append(stage)))
     assert told == []
 
 
@@ -311,7 +311,7 @@ def test_a_cut_through_the_bulk_of_a_model_is_made_only_on_demand() -> None:
     profile = load(settings=["search.directions=60", "search.clearance=false", "search.seam_mm=0.8"])
 
     def price(parts: Sequence[Part]) -> Price:
-        return Price(10.0 * len(parts), 100.0)
+        return 10.0 * len(parts), 100.0
 
     chosen = decompose(shapes.from_manifold(rimmed), "rimmed", profile, SearchRequest(price=price))
     assert len(chosen.parts) == 1

@@ -6,7 +6,7 @@ import pytest
 
 from mdp.mesh import Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.search.trial import Trials
 from profiles.profile import load

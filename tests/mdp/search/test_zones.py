@@ -5,7 +5,7 @@ from manifold3d import Manifold
 
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
-from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import AnyZone, Grown, Zone, Zones
 from profiles.errors import PlanError

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mdp.cut import mesh_of
 from mdp.mesh import Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.pose import about, unit
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, decompose
 from mdp.sweep.cylinders import Cylinder, crossings, find_cylinders, spoiled_by_cuts
 from profiles.profile import load

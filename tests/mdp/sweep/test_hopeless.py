@@ -43,7 +43,7 @@ def test_what_no_cut_can_save_is_split_by_a_plane_and_bounds_every_cost() -> Non
     rows = np.arange(len(table.reason), dtype=np.int32)
     columns = ("hopeless", "hopeless_left", "wasted", "M6")
     above, below, wasted, residual = features(table, rows, columns).T
-    total = table.situation.hopeless_mm2 / table.model.risky_mm2
+    total = table.scored.hopeless_here_mm2 / table.model.risky_mm2
     assert above + below == pytest.approx(np.full(len(rows), total))
     assert above + wasted == pytest.approx(residual)
     assert (wasted >= -1e-9).all()

@@ -1,3 +1,6 @@
+from types import SimpleNamespace
+from typing import Any
+
 import manifold3d as m3
 import numpy as np
 import pytest
@@ -8,8 +11,8 @@ from hypothesis import strategies as st
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import Reason, bounds_of, platform_disc, score_candidates
+from mdp.ranking.ranking import CandidateTable, Model
 from mdp.sweep.slivers import SLIVER_COSINE, least_distance_mm
 from mdp.sweep.sweep import Remainder, sweep
 from profiles.profile import load
@@ -113,5 +116,5 @@ def _table(mesh: Mesh, fragile_mm: float = 1.0) -> CandidateTable:
     limits = bounds_of(UP[None], mesh, profile, platform_disc(mesh, profile.search))
     terms = CostTerms(45.0, False)
     scored = score_candidates(_remainder(mesh), limits, terms, -np.inf)
-    situation = Situation(Model(1.0, mesh.volume_mm3, 1.0), 0.0, 0.0, 0.0, 1.0, 0.0, mesh.volume_mm3, 0, UP)
-    return CandidateTable(scored, situation)
+    uncut: Any = SimpleNamespace(saved_mm2=0.0, residual_mm2=0.0, lost_mm2=0.0)
+    return CandidateTable(scored, uncut, Model(1.0, mesh.volume_mm3, 1.0))

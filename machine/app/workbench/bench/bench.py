@@ -19,8 +19,8 @@ from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
 from mdp.overhang import UP
-from mdp.plans.plan_file import PlanFile, PlannedPart, planned_row
-from mdp.search.front import Worth, choose, pays
+from mdp.search.front import Weights, choose, pays
+from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
@@ -226,7 +226,7 @@ def _placing(bench: Bench, factor: float = 1.0) -> Placing:
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
     """The front of a search, cut by the row that it has chosen. A limb may be named by another point there than it was before."""
     chosen = next(row for row in rows if row.chosen)
-    parts = parts_of(chosen)
+    parts = planned_parts(chosen)
     same_cuts = {before: _same_cuts(before, parts) for before in bench.cuts or ()}
     names = {before: min(same, key=partial(_apart_mm, before)) for before, same in same_cuts.items() if same}
     cuts, locked = (tuple(names.get(part, part) for part in several) for several in (bench.cuts or (), bench.locked))
@@ -289,7 +289,7 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
     if not bench.recommended:
         return replace(bench, rows=tuple(rows), priced=True)
     search = bench.profile.search
-    choice = choose(rows, Worth.of(bench.profile), search.least_saving)
+    choice = choose(rows, Weights.of(bench.profile), search.least_saving)
     marked = [
         replace(row, chosen=number == choice.place, reason=choice.reason if number == choice.place else "")
         for number, row in enumerate(rows)
@@ -307,20 +307,14 @@ def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: P
 def with_parts(bench: Bench, count: int) -> Bench:
     """The bench with the row of the front taken that has `count` parts. Raises KeyError where there is none."""
     rows = {row.parts: row for row in bench.rows}
-    return with_cuts(bench, parts_of(rows[count]))
-
-
-def parts_of(row: FrontRow) -> tuple[PlannedPart, ...]:
-    """The parts of a row from the second on, in print order."""
-    return tuple(map(PlannedPart.of, reversed(row.planes)))
+    return with_cuts(bench, planned_parts(rows[count]))
 
 
 def plan_of_bench(bench: Bench, name: str) -> PlanFile:
     """What is to be cut, as a plan's file says it. The model is the one on the bench, so it needs no sha256."""
-    rows = tuple(planned_row(parts_of(row), row) for row in bench.rows)
     orientation = None if bench.rotation == STANDING else bench.rotation
     model = "" if bench.model is None else bench.model.name
-    return PlanFile(name, model, "", orientation, bench.cuts or (), bench.zones, rows, tuple(bench.profile.parts))
+    return PlanFile(name, model, "", orientation, bench.cuts or (), bench.zones, bench.rows, tuple(bench.profile.parts))
 
 
 def locked_plan(bench: Bench) -> PlanFile:

@@ -10,9 +10,9 @@ from machine.app.workbench.bench.values import MOST_MM, Asked, number, rotation_
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
-from mdp.plans.plan_file import ZONE_KINDS
-from mdp.plans.reading import MOST_ZONES
-from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones, faces_of
+from mdp.search.plan_file import ZONE_KINDS
+from mdp.search.plan_reading import MOST_ZONES
+from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones
 from profiles.errors import PlanError
 
 WORDS = {
@@ -80,5 +80,5 @@ def named_faces(bench: Bench) -> Mask:
     for row, kind in zip(rows, ZONE_KINDS, strict=True):
         for zone in getattr(bench.zones, kind):
             if not isinstance(zone, Zone):
-                row |= faces_of(mesh, zone)
+                row |= zone.faces(mesh)
     return rows

@@ -7,7 +7,7 @@ import numpy as np
 
 from machine.app.workbench.bench.values import vector_of
 from mdp.mesh import Floats, Mesh
-from mdp.plans.plan_file import MOST_MM, ZONE_KINDS, PlannedPart
+from mdp.search.plan_file import MOST_MM, ZONE_KINDS, PlannedPart
 from mdp.zone import AnyZone, Grown, MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector

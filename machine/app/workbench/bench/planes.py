@@ -9,7 +9,7 @@ from dataclasses import replace
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.values import MOST_MM, Asked, number, unit_vector, vector, whole
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from machine.planning.stops import Stop
-from mdp.plans.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart
 
 Cuts = Sequence[PlannedPart]
 

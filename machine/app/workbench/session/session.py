@@ -14,7 +14,6 @@ from machine.app.project import Project, unpack
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import (
     Bench,
-    parts_of,
     with_cuts,
     with_model,
     with_model_turned_as_read,
@@ -43,9 +42,9 @@ from machine.app.workbench.work.received import NAMES_KEPT, files_in
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.directions.turns import turned_by
 from mdp.model_file import locate, plan_beside
-from mdp.plans.plan_file import PlanFile
-from mdp.plans.reading import read_plan
 from mdp.read import MANY_FACES
+from mdp.search.plan_file import PlanFile, planned_parts
+from mdp.search.plan_reading import read_plan
 from mdp.zone import NO_ZONES
 from profiles.errors import MeshError, PlanError
 from profiles.profile import Profile
@@ -356,7 +355,7 @@ class Session(SessionBase):
             bench = with_scaled_model(bench, model, new.scale / old.scale)
         effect = effect_of_change(before.profile, bench.profile)
         if effect == Effect.REACH and bench.rows:
-            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, parts_of(row))).refused]
+            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).refused]
             bench = with_rows(bench, rows)
         if bench.cuts is not None and effect >= Effect.REACH:
             trial = await self.trials.attempt(bench, bench.cuts)

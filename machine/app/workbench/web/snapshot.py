@@ -15,8 +15,8 @@ from machine.view.front import front_record
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
-from mdp.plans.plan_file import ZONE_KINDS
 from mdp.save import plane_values
+from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import AnyZone, MeshVolume, Modifier, Zone
 
 MOST_FACES = 2_000_000  # that a page draws

@@ -1,7 +1,7 @@
 """Cutting: finding parts, cutting by planes and making the parts' files, as tasks of the workbench."""
 
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -16,7 +16,7 @@ from machine.app.pipeline.given_plan import lies_freely, with_file_marks
 from machine.app.pipeline.pricing import pricing
 from machine.app.project import PICTURE_PX, project_bytes, with_meshes_beside
 from machine.app.terminal.advice import orientation_in_words, standing_in_words
-from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
+from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench
 from machine.app.workbench.work.kept_work import work_of
 from machine.planning.stops import check_stop_parts
 from mdp.decomposition import Decomposition, FrontRow
@@ -24,12 +24,12 @@ from mdp.directions.orientation import standing_still
 from mdp.joint import is_sound
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
-from mdp.plans.plan_file import PlanFile, plan_of
-from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
 from mdp.search.orient import orient_and_decompose
-from mdp.search.search import Progress, SearchRequest, cut_by_plan, decompose
+from mdp.search.plan_file import PlanFile, plan_of, planned_parts
+from mdp.search.plan_writing import plan_text
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
 
@@ -79,16 +79,16 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
         def say(phase: str) -> None:
             tell(Searched(f"{otherwise}{phase}", best))
 
-        def show(progress: Progress) -> None:
+        def show(stage: int, beam: int, best_share: float, measure: Callable[[], FrontRow]) -> None:
             nonlocal best
-            if progress.stage == 0:
+            if stage == 0:
                 compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text, best)))
                 tell(Searched(f"{otherwise}looking for the first cut along {profile.search.directions:,} directions", best))
                 return
-            left = f"{100 * progress.best_share:.1f} % of the overhangs left"
+            left = f"{100 * best_share:.1f} % of the overhangs left"
             if candidate is mesh:
-                best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
-            tell(Searched(f"{otherwise}trying cut {progress.stage}, {left}", best))
+                best = measure()  # planes of a model that lies otherwise are none of the one in the picture
+            tell(Searched(f"{otherwise}trying cut {stage}, {left}", best))
 
         by_hand = with_shapes(bench, locked, candidate)
         return decompose(
@@ -116,7 +116,7 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
     sound."""
     row = bench.rows[number]
     with suppress(PlanError):
-        parts = parts_of(row)
+        parts = planned_parts(row)
         cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts, front=()), prices=True)
         by_hand = sum(1 for _ in takewhile(bench.locked.__contains__, reversed(parts)))
         return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile, by_hand) else replace(row, sound=False)

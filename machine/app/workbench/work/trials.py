@@ -15,7 +15,7 @@ from machine.app.workbench.work.cutting import PLAN_NAME, turned_mesh, with_shap
 from mdp.cut import convex_hull
 from mdp.kernels.workers import Tell
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial, Trials
 from profiles.profile import load
 

@@ -7,7 +7,7 @@ import numpy as np
 from machine.app.pictures.front_picture import BORDER, front_picture
 from machine.view.parts import part_colours
 from mdp.decomposition import FrontRow
-from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from tests.machine.app.pictures.test_picture import PROFILE, share_like
 from tests.shapes import branch

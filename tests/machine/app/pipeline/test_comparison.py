@@ -18,7 +18,7 @@ from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.plate import on_one_plate
 from machine.program import Alternative, Program, joints_of_print
 from mdp.cut import mesh_of
-from mdp.plans.plan_file import PlanFile
+from mdp.search.plan_file import PlanFile
 from mdp.search.search import SearchRequest, decompose
 from mdp.zone import Modifier, Zone, Zones
 from profiles.profile import Profile, load

@@ -13,7 +13,7 @@ from machine.dryrun.conformity.agreement import agreement
 from machine.planning.fit import places_on_plate, standing_at
 from machine.program import Program
 from mdp.decomposition import Decomposition
-from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.zone import Marked, Zone
 from profiles.errors import MoveError, PlanError

@@ -17,8 +17,8 @@ from machine.planning.fit import check_parts, standing_at
 from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
-from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.parts import one_piece
+from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from profiles.errors import MoveError, ProfileError
 from profiles.profile import Profile, load

@@ -10,7 +10,7 @@ from machine.app.workbench.bench.bench import STANDING, Bench, History, Step, pl
 from machine.app.workbench.bench.changes import lay, stand, take, turn
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import changed, model
@@ -76,7 +76,7 @@ def test_what_changes_nothing_is_no_step() -> None:
 def test_a_plan_has_the_planes_in_print_order() -> None:
     plan = plan_of_bench(with_front(history().now.bench, FRONT), "plan.toml")
     assert [part.offset_mm for part in plan.parts] == [10.0, 30.0]
-    assert [len(row.parts) for row in plan.front] == [0, 1, 2]
+    assert [row.parts for row in plan.front] == [1, 2, 3]
     assert (plan.model, plan.orientation, plan.sha256) == ("tee.stl", None, "")
 
 

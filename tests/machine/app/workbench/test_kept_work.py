@@ -23,9 +23,9 @@ from machine.app.workbench.work.kept_work import MOST_KEPT, folders_kept, new_fo
 from machine.app.workbench.work.received import Received, tidy_left
 from machine.app.workbench.work.worker_pool import WorkerPools
 from machine.planning.stops import parse_stops
-from mdp.plans.plan_file import PlannedPart
-from mdp.plans.reading import read_plan
 from mdp.save import stl
+from mdp.search.plan_file import PlannedPart
+from mdp.search.plan_reading import read_plan
 from profiles import files
 from profiles.errors import PlanError
 from profiles.files import lock_folder

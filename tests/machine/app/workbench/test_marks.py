@@ -17,10 +17,10 @@ from machine.app.workbench.bench.bench import (
 from machine.app.workbench.bench.marks import named_faces, workpiece_mesh
 from mdp.directions.orientation import standing_still
 from mdp.directions.turns import turned_by
-from mdp.plans.plan_file import PlannedPart
-from mdp.plans.reading import read_plan
-from mdp.plans.writing import plan_text
 from mdp.pose import about, unit
+from mdp.search.plan_file import PlannedPart
+from mdp.search.plan_reading import read_plan
+from mdp.search.plan_writing import plan_text
 from mdp.zone import Grown, MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.profile import load
@@ -43,7 +43,7 @@ def test_marks_stay_where_they_are_on_the_model_however_often_it_is_turned(angle
     for bench in (turned, again):
         (box,), (zone,) = bench.zones.keep, bench.zones.no_support
         assert isinstance(box, Zone)
-        assert (box.touches(workpiece_mesh(bench)) == BOX.touches(tee())).all()
+        assert (box.faces(workpiece_mesh(bench)) == BOX.faces(tee())).all()
         assert (named_faces(bench) == named_faces(BENCH)).all()
         assert isinstance(zone, Grown)
         assert zone.away_mm(workpiece_mesh(bench)) < 0.002
@@ -67,7 +67,7 @@ def test_a_plan_of_boxes_without_end_on_a_model_turned_by_rounded_numbers_is_rea
     file.write_text(plan_text(plan_of_bench(replace(bench, cuts=()), "tiltprint")))
     assert read_plan(file).zones.keep == (box,)
     assert isinstance(box, Zone)
-    assert (box.touches(workpiece_mesh(bench)) == half.touches(tee())).all()
+    assert (box.faces(workpiece_mesh(bench)) == half.faces(tee())).all()
 
 
 def test_modifiers_go_along_with_a_model_but_for_meshes(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_marks_go_along_with_a_model_that_is_read_turned_otherwise_and_larger() 
     for bench in (turned, stood):
         (box,), (zone,) = bench.zones.keep, bench.zones.no_support
         assert isinstance(box, Zone)
-        assert (box.touches(workpiece_mesh(bench)) == BOX.touches(tee())).all()
+        assert (box.faces(workpiece_mesh(bench)) == BOX.faces(tee())).all()
         assert isinstance(zone, Grown)
         assert zone.away_mm(workpiece_mesh(bench)) < 0.005
 

@@ -25,9 +25,9 @@ from machine.app.workbench.work.models import read_model
 from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.mesh import Mesh
-from mdp.plans.plan_file import PlanFile
-from mdp.plans.reading import read_plan
 from mdp.save import stl
+from mdp.search.plan_file import PlanFile
+from mdp.search.plan_reading import read_plan
 from mdp.zone import MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.profile import load

@@ -8,7 +8,7 @@ import pytest
 from machine.app.workbench.bench.bench import Bench, History, Step, locked_plan, with_cuts
 from machine.app.workbench.bench.changes import lock
 from machine.app.workbench.bench.planes import add_plane, move_plane, remove_plane, reorder
-from mdp.plans.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.app.workbench.models import changed, model

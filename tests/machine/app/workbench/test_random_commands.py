@@ -22,11 +22,11 @@ from machine.app.workbench.work.tasks import TASKS
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
-from mdp.plans.plan_file import ZONE_KINDS
-from mdp.plans.reading import read_plan
-from mdp.plans.writing import plan_text
 from mdp.pose import about, unit
 from mdp.save import stl
+from mdp.search.plan_file import ZONE_KINDS
+from mdp.search.plan_reading import read_plan
+from mdp.search.plan_writing import plan_text
 from mdp.search.trial import Trial
 from profiles.errors import UserError
 from profiles.profile import load, with_part_settings

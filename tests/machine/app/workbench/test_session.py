@@ -24,7 +24,7 @@ from machine.app.workbench.work.tasks import TASKS
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
 from profiles.profile import Profile, load
 from tests.machine.app.workbench.models import model

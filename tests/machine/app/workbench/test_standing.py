@@ -11,7 +11,7 @@ from machine.app.workbench.work import standing as work
 from machine.app.workbench.work.standing import Standing, stand
 from mdp.directions.turns import turned_by
 from mdp.mesh import Mesh
-from mdp.plans.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart
 from profiles.errors import MeshError
 from profiles.profile import load
 from tests.machine.app.workbench.models import model

@@ -16,8 +16,8 @@ from machine.app.workbench.work.worker_pool import TaskQueue, WorkerPool, Worker
 from mdp.kernels.workers import Worker
 from mdp.model_file import locate
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlannedPart
 from mdp.read import read_mesh
+from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trials
 from profiles.errors import UserError
 from profiles.profile import load

@@ -13,7 +13,7 @@ import numpy as np
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.zone import NO_ZONES, Zones
+from mdp.zone import NO_ZONES, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
@@ -51,22 +51,6 @@ class PlannedPart:
 
 
 @dataclass(frozen=True)
-class PlannedRow:
-    """A decomposition into some other number of parts: its parts from the second on, and what it costs."""
-
-    parts: tuple[PlannedPart, ...]
-    support_area_mm2: float = 0.0
-    seam_mm: float = 0.0
-    stairs_mm2: float = 0.0
-    cost_mm2: float = 0.0
-
-    @property
-    def planes(self) -> tuple[Plane, ...]:
-        """The planes in the order of the cuts, which is the reverse of the print order."""
-        return tuple(plane for part in reversed(self.parts) if (plane := part.plane) is not None)
-
-
-@dataclass(frozen=True)
 class PlanFile:
     """What a file holds. name: the file's; sha256: of the model it was made of, "": made by hand for any; orientation: rows of
     the rotation that laid the model down before it was cut, None: it stands as in its file; parts: in print order, without
@@ -78,12 +62,12 @@ class PlanFile:
     orientation: tuple[Vector, ...] | None = None
     parts: tuple[PlannedPart, ...] = ()
     zones: Zones = NO_ZONES
-    front: tuple[PlannedRow, ...] = ()
+    front: tuple[FrontRow, ...] = ()
     settings: tuple[PartSettings, ...] = ()
 
     def row(self, most_parts: int) -> tuple[PlannedPart, ...]:
         """The parts, from the second on, of the row with the most parts up to a number. Raises PlanError."""
-        rows = {len(row.parts) + 1: row.parts for row in self.front} | {len(self.parts) + 1: self.parts}
+        rows = {row.parts: planned_parts(row) for row in self.front} | {len(self.parts) + 1: self.parts}
         allowed = [count for count in rows if count <= most_parts]
         if not allowed:
             counts = ", ".join(map(str, sorted(rows)))
@@ -92,6 +76,11 @@ class PlanFile:
 
 
 NO_PLAN = PlanFile("")
+
+
+def height_range(low_mm: float, high_mm: float) -> Zone:
+    """The box of all that lies between two heights."""
+    return Zone((-MOST_MM, -MOST_MM, low_mm), (MOST_MM, MOST_MM, high_mm))
 
 
 def mesh_sha256(mesh: Mesh) -> str:
@@ -107,19 +96,18 @@ def plan_of(
     settings: Sequence[PartSettings] = (),
 ) -> PlanFile:
     """The plan of a decomposition."""
-    rows = tuple(planned_row(tuple(map(PlannedPart.of, reversed(row.planes))), row) for row in decomposition.front)
     parts = []
     for part in decomposition.parts[1:]:
         pose = f"tilt {part.pose.tilt_deg:.2f} and turn {part.pose.turn_deg:.2f} deg"
         parts.append(PlannedPart.of(part.base, f"part {part.index}: {part.volume_mm3 / 1000:.2f} cm3, printed at {pose}"))
     turned = None if orientation is None else tuple(_vector(row) for row in orientation)
     sha = mesh_sha256(decomposition.mesh)
-    return PlanFile("plan.toml", decomposition.name, sha, turned, tuple(parts), zones, rows, tuple(settings))
+    return PlanFile("plan.toml", decomposition.name, sha, turned, tuple(parts), zones, decomposition.front, tuple(settings))
 
 
-def planned_row(parts: tuple[PlannedPart, ...], row: FrontRow) -> PlannedRow:
-    """A row of a front with its parts from the second on, in print order."""
-    return PlannedRow(parts, **{figure: float(getattr(row, figure)) for figure in ROW_FIGURES})
+def planned_parts(row: FrontRow) -> tuple[PlannedPart, ...]:
+    """The parts of a row of a front from the second on, in print order."""
+    return tuple(map(PlannedPart.of, reversed(row.planes)))
 
 
 def _vector(values: Floats) -> Vector:

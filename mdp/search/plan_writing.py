@@ -7,9 +7,10 @@ from typing import Any
 
 import tomlkit
 
+from mdp.decomposition import FrontRow
 from mdp.mesh import colour_text
 from mdp.plane import Plane
-from mdp.plans.plan_file import MOST_MM, ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.search.plan_file import ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, height_range
 from mdp.zone import AnyZone, Grown, MeshVolume, Modifier, Painted, Zone
 
 
@@ -51,15 +52,10 @@ def _zone_values(zone: AnyZone, folder: Path | None) -> dict[str, Any]:
 
 
 def _modifier_table(modifier: Modifier, folder: Path | None) -> tomlkit.items.Table:
-    volume = modifier.volume
-    values = _zone_values(volume, folder)
-    if isinstance(volume, Zone) and _is_height_range(volume):
+    volume, values = modifier.volume, _zone_values(modifier.volume, folder)
+    if isinstance(volume, Zone) and volume == height_range(volume.min_mm[2], volume.max_mm[2]):
         values = {"z_mm": [volume.min_mm[2], volume.max_mm[2]]}
     return _table({**values, "process": _inline(modifier.process)})
-
-
-def _is_height_range(box: Zone) -> bool:
-    return (box.axes, box.room) == (None, None) and (*box.min_mm[:2], *box.max_mm[:2]) == (-MOST_MM, -MOST_MM, MOST_MM, MOST_MM)
 
 
 def _path_from(folder: Path | None, file: Path) -> str:
@@ -110,13 +106,12 @@ def _numbers(plane: Plane) -> list[float]:
     return [*plane.normal.tolist(), plane.offset_mm, *limbs_mm]
 
 
-def _row_table(row: PlannedRow) -> tomlkit.items.Table:
+def _row_table(row: FrontRow) -> tomlkit.items.Table:
     """A row of the front, each plane on a line of its own."""
     table = tomlkit.table()
-    count = len(row.parts) + 1
-    table.add(tomlkit.comment(f"{count} part{'s' * (count > 1)}"))
+    table.add(tomlkit.comment(f"{row.parts} part{'s' * (row.parts > 1)}"))
     planes = tomlkit.array()
-    planes.extend([_numbers(plane) for part in row.parts if (plane := part.plane) is not None])
-    table["planes"] = planes.multiline(len(row.parts) > 1)
-    table.update({figure: getattr(row, figure) for figure in ROW_FIGURES})
+    planes.extend([_numbers(plane) for plane in reversed(row.planes)])
+    table["planes"] = planes.multiline(row.parts > 2)
+    table.update({figure: float(getattr(row, figure)) for figure in ROW_FIGURES})
     return table

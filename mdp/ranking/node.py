@@ -7,38 +7,32 @@ import numpy as np
 
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, measure_seam, stair_weights
 from mdp.cost.model_need import Piece
-from mdp.cut import Solid, above, cut
+from mdp.cut import Solid, above, corners_above, cut
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats
 from mdp.overhang import risky_upright
-from mdp.plane import Plane
-from mdp.sweep.limbs import limb_faces
+from mdp.plane import PLATFORM, Plane
+from mdp.sweep.limbs import limb_faces, limb_mesh, limb_vertices
 from mdp.sweep.rims import Rim
+from mdp.sweep.slivers import sliver_mm
 from mdp.sweep.sweep import Remainder
 
-
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """A part cut off: its base plane, the solid it is cut off, and what that costs for ever."""
-
-    base: Plane
-    whole: Solid
-    cost: CutCost
-
-    @cached_property
-    def solid(self) -> Solid:
-        """The part. Most of what a search cuts off is never looked at, so it is made when it is asked for."""
-        return above(self.whole, self.base) if self.base.limbs_mm is None else cut(self.whole, self.base)[0]
+UNCUT = CutCost(0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """What remains after some cuts, and how good that is; parent: the node before the last cut, None for the whole model."""
+    """What remains after some cuts, and how good that is.
+
+    parent: the node before the last cut, None for the whole model; base: the plane of that cut, cut_cost: what it costs for ever.
+    """
 
     solid: Solid
-    cuts: tuple[Cut, ...]
     terms: CostTerms
     places: SeamPlaces
     parent: "Node | None" = None
+    base: Plane = PLATFORM
+    cut_cost: CutCost = UNCUT
 
     @property
     def path(self) -> "list[Node]":
@@ -46,9 +40,22 @@ class Node:
         return [self] if self.parent is None else [*self.parent.path, self]
 
     @property
+    def cuts(self) -> "list[Node]":
+        """The nodes after each of the cuts."""
+        return self.path[1:]
+
+    @property
     def planes(self) -> list[Plane]:
         """The planes of the cuts in the order in which they are made."""
-        return [cut.base for cut in self.cuts]
+        return [node.base for node in self.cuts]
+
+    @cached_property
+    def part(self) -> Solid:
+        """What the last cut took off. Most of what a search cuts off is never looked at, so it is made when it is asked for."""
+        if self.parent is None:
+            return self.solid
+        whole = self.parent.solid
+        return above(whole, self.base) if self.base.limbs_mm is None else cut(whole, self.base)[0]
 
     @cached_property
     def piece(self) -> Piece:
@@ -75,14 +82,13 @@ class Node:
     @cached_property
     def seams(self) -> tuple[Rim, ...]:
         """The seams of the cuts."""
-        before = self.parent
+        before, base = self.parent, self.base
         if before is None:
             return ()
-        base, weights = self.cuts[-1].base, before.seam_weights
+        weights = before.seam_weights
         if base.limbs_mm is not None:
             weights = np.where(limb_faces(before.remainder, base), weights, 0.0)
-        seam = measure_seam(before.remainder.mesh, weights, base, self.terms.feather)
-        return (*before.seams, seam)
+        return (*before.seams, measure_seam(before.remainder.mesh, weights, base, self.terms.feather))
 
     @cached_property
     def risky_mm2(self) -> float:
@@ -92,12 +98,17 @@ class Node:
     @cached_property
     def residual_mm2(self) -> float:
         """What the parts cut off so far cost for ever: a lower bound of the cost of every descendant."""
-        return sum(cut.cost.residual_mm2 for cut in self.cuts)
+        return sum(node.cut_cost.residual_mm2 for node in self.cuts)
 
     @cached_property
     def lost_mm2(self) -> float:
         """What the cuts so far have made worse."""
-        return sum(cut.cost.lost_mm2 for cut in self.cuts)
+        return sum(node.cut_cost.lost_mm2 for node in self.cuts)
+
+    @property
+    def saved_mm2(self) -> float:
+        """How much less it costs when the search stops here than the whole model does."""
+        return self.path[0].cost_mm2 - self.cost_mm2
 
     @cached_property
     def stairs_mm2(self) -> float:
@@ -114,7 +125,16 @@ class Node:
         """Equal for two orders of the same cuts."""
         return (round(self.solid.volume(), 3), round(self.risky_mm2 + self.stairs_mm2, 3), round(self.residual_mm2, 3))
 
-    def let_go(self) -> None:
+    def corners_cut(self, plane: Plane) -> Floats:
+        """(n, 3) the corners of what a plane would cut off: vertices, and where edges pass through it. Nothing is cut."""
+        return corners_above(self.remainder.mesh if plane.limbs_mm is None else limb_mesh(self.remainder, plane), plane)
+
+    def sliver_mm(self, plane: Plane) -> float:
+        """Thickness of the thinnest sliver that cutting off the limbs of a plane would leave."""
+        limb = limb_vertices(self.remainder, plane)
+        return sliver_mm(self.remainder.facets, limb, plane, frame_across(plane.normal))
+
+    def release(self) -> None:
         """Forget what is large and made again when it is asked for: a search keeps all its nodes and comes back to few."""
         for name in ("piece", "remainder", "seam_weights"):
             self.__dict__.pop(name, None)

@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from mdp.plans.plan_file import KEYS, PlannedPart
-from mdp.plans.reading import read_plan
+from mdp.search.plan_file import KEYS, PlannedPart
+from mdp.search.plan_reading import read_plan
 from mdp.zone import Grown, Modifier, Painted, Zone, Zones
 from profiles.part_settings import OF_A_PLACE
 
