@@ -79,8 +79,7 @@ def passing_places(mesh: Mesh, plane: Plane) -> Floats:
     rising = (heights[starts] <= 0.0) & (heights[ends] > 0.0)  # every edge rises along one of its two faces
     low, high = starts[rising], ends[rising]
     share = (heights[low] / (heights[low] - heights[high]))[:, None]
-    places: Floats = mesh.vertices[low] + share * (mesh.vertices[high] - mesh.vertices[low])
-    return places
+    return mesh.vertices[low] + share * (mesh.vertices[high] - mesh.vertices[low])
 
 
 def convex_hull(points: Floats) -> Mesh:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.kernels.kernel import no_nrt
 from mdp.mesh import Floats
 from mdp.pose import UP

@@ -56,16 +56,16 @@ class _Piece:
 
 def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
     """The joints of a decomposition's parts 2, 3, ... in print order; what is printed later and held by nothing else counts
-    with what holds it. Pieces lower than the search's crumbs count for nothing where there are others."""
+    with what holds it. Pieces lower than the search's fragments count for nothing where there are others."""
     if len(parts) < 2:
         return ()
-    pieces, crumb_mm = _pieces(parts), float(np.sqrt(profile.search.least_interface_mm2))
+    pieces, fragment_mm = _pieces(parts), float(np.sqrt(profile.search.least_interface_mm2))
     joints = []
     for part in parts:
         if part.on_platform:
             continue
         own = [k for k, piece in enumerate(pieces) if piece.part is part]
-        high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= crumb_mm] or own
+        high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= fragment_mm] or own
         several = [_joint(pieces, k, profile.material.cold_weld_mpa) for k in high]
         weakest = min(several, key=lambda joint: joint.load_n)
         joints.append(replace(weakest, area_mm2=sum(joint.area_mm2 for joint in several), seam_mm=part.seam_mm))

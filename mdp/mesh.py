@@ -84,8 +84,7 @@ class Mesh:
     def normals(self) -> Floats:
         """(m, 3) unit outward normals; zero for a face without area."""
         lengths = 2.0 * self.areas_mm2
-        normals: Floats = self._crosses / np.where(lengths > 0, lengths, 1.0)[:, None]
-        return normals
+        return self._crosses / np.where(lengths > 0, lengths, 1.0)[:, None]
 
     @cached_property
     def volume_mm3(self) -> float:

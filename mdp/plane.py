@@ -1,5 +1,6 @@
 """Plane: a cutting or base plane of the workpiece frame."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot
 
@@ -65,6 +66,12 @@ class Plane:
         array([1.])
         """
         return dot(points, self.normal) - self.offset_mm
+
+
+def normals_and_offsets(planes: Sequence[Plane]) -> tuple[Floats, Floats]:
+    """(k, 3) normals and (k,) offsets of planes, mm."""
+    normals = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
+    return normals, np.array([plane.offset_mm for plane in planes], dtype=np.float64)
 
 
 PLATFORM = Plane(UP, 0.0)

@@ -2,14 +2,15 @@
 
 The table's rotation is R = R_tilt R_turn with each factor a right-handed rotation about its axis by
 -sign * (value - zero_deg), the rule of LinuxCNC's xyzac-trt-kins written for any two axes. The search asks for poses as well as
-the machine does; where the workpiece's points are at a pose is in machine.kinematics.
+the machine does; where the workpiece's points are at a pose is in machine.kinematics. A rotation of a whole model is also given
+as turns about x, then y, then z, as process.rotate_deg has it.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from math import atan2, ceil, cos, degrees, floor, hypot, radians, sin
+from math import asin, atan2, ceil, cos, degrees, floor, hypot, radians, sin
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from profiles.machine import Machine
 
 SINGULAR = 1e-7  # sine of an angle that no table can show; nearer to the singular pose the turn is not defined
 KNOWN = 256  # rotations
+DECIMALS = 9  # of an angle as a file or a person says it: off by less than a tenth of a micrometre over a metre
+LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,39 @@ def about(axis: Floats, angle_rad: float) -> Floats:
 def unit(vector: object) -> Floats:
     """The vector scaled to length 1."""
     array = np.asarray(vector, dtype=np.float64)
-    scaled: Floats = array / np.linalg.norm(array)
-    return scaled
+    return array / np.linalg.norm(array)
+
+
+def turned_by(angles_deg: tuple[float, float, float]) -> Floats:
+    """(3, 3) the rotation of turns about x, then y, then z."""
+    whole = np.eye(3)
+    for axis, angle in zip(np.eye(3), np.radians(angles_deg), strict=True):
+        whole = about(axis, float(angle)) @ whole
+    return whole
+
+
+def turns_of(rotation: Floats) -> tuple[float, float, float]:
+    """The turns about x, then y, then z that a (3, 3) rotation is made of, degrees.
+
+    >>> turns_of(turned_by((0.0, 0.0, 90.0)))
+    (0.0, 0.0, 90.0)
+    """
+    sine = min(max(-float(rotation[2, 0]), -1.0), 1.0)
+    if abs(sine) > LEVEL:
+        return 0.0, degrees(asin(sine)), degrees(atan2(-rotation[0, 1], rotation[1, 1])) + 0.0
+    x, z = atan2(rotation[2, 1], rotation[2, 2]), atan2(rotation[1, 0], rotation[0, 0])
+    return degrees(x) + 0.0, degrees(asin(sine)) + 0.0, degrees(z) + 0.0
+
+
+def turned_further(rotate_deg: tuple[float, float, float], rotation: Floats) -> tuple[float, float, float]:
+    """The process.rotate_deg by which a model is read as it lies when it was read by another one and then turned by a (3, 3)
+    rotation, degrees.
+
+    >>> turned_further((30.0, 0.0, 0.0), turned_by((60.0, 0.0, 0.0)))
+    (90.0, 0.0, 0.0)
+    """
+    x, y, z = (round(angle, DECIMALS) + 0.0 for angle in turns_of(rotation @ turned_by(rotate_deg)))
+    return x, y, z
 
 
 def axis_rotation(axis: RotaryAxis, value_deg: float) -> Floats:
@@ -65,8 +99,7 @@ def _about(axis: tuple[float, ...], angle_rad: float) -> Floats:
 
 def rotation(machine: Machine, pose: Pose) -> Floats:
     """(3, 3) rotation from the workpiece frame to the orientation of the machine frame at a pose."""
-    both: Floats = axis_rotation(machine.tilt, pose.tilt_deg) @ axis_rotation(machine.turn, pose.turn_deg)
-    return both
+    return axis_rotation(machine.tilt, pose.tilt_deg) @ axis_rotation(machine.turn, pose.turn_deg)
 
 
 def shift(machine: Machine, pose: Pose) -> Floats:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mdp.directions.turns import turned_by
 from mdp.foreign.marks import Marks
 from mdp.foreign.printed import printed
 from mdp.formats.readers import READERS
@@ -15,6 +14,7 @@ from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import check_file
 from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.pose import turned_by
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
 from mdp.topology.components import vertex_components

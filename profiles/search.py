@@ -104,7 +104,7 @@ class Search(Frozen):
         0.1, "criterion IV as a preference: the classic ranking takes parts of at least this share of the volume first"
     )
     least_interface_mm2: float = advanced("Smallest face a part stands on", "minimum area", ge=0, le=1e6)(
-        4.0, "least area that a part, and each of its pieces that is no crumb, stands on, mm2"
+        4.0, "least area that a part, and each of its pieces that is no fragment, stands on, mm2"
     )
     nozzle_load_n: float = rare("Push of the nozzle", "strength force", ge=0, le=1000)(
         5.0,

@@ -15,9 +15,8 @@ from mdp.model_file import locate
 from mdp.overhang import risky_upright, threshold
 from mdp.read import read_mesh
 from mdp.search.problem import Problem
-from mdp.sweep.components import View, count_pieces, find_critical
-from mdp.sweep.contact_area import find_contact_areas
-from mdp.sweep.integrals import OffsetGrid, find_heights, find_lowest, integrate_risky_area, integrate_volume
+from mdp.sweep.components import count_pieces, find_contact_areas, find_critical, plant_tree
+from mdp.sweep.crossing import OffsetGrid, find_heights, find_lowest, integrate_scars, integrate_volume
 from mdp.sweep.slivers import find_slivers
 from mdp.sweep.sweep import Remainder, gains, scars_of, sweep
 from profiles.profile import Profile, load
@@ -87,11 +86,9 @@ def _all_heights(points, directions, step):  # type: ignore[no-untyped-def]
 
 @numba.njit
 def _risks(scars, grids):  # type: ignore[no-untyped-def]
-    directions, heights, counts, step, columns = grids
-    areas = np.zeros(columns), np.zeros(columns), np.zeros(columns)
-    scratch = np.zeros((2, len(scars.faces.risky) + 1), np.int32)
+    directions, heights, counts, step, _ = grids
     for k in range(len(directions)):
-        integrate_risky_area(scars, k, OffsetGrid(directions[k], heights[k], counts[k], step), scratch, areas)
+        integrate_scars(scars, k, OffsetGrid(directions[k], heights[k], counts[k], step))
 
 
 @numba.njit
@@ -127,13 +124,14 @@ def _pieces(layout, grids, cosines, above):  # type: ignore[no-untyped-def]
     pieces, contact_area = np.zeros(columns, np.int32), np.zeros(columns)
     scratch, wanted = np.empty(layout.faces.points.shape[1], np.int32), np.zeros(columns, np.int32)
     for k in range(len(directions)):
-        critical = scratch[: find_critical(cosines[k], layout.flatness, heights[k], layout.rings, scratch)]
-        view = View(OffsetGrid(directions[k], heights[k], counts[k], step), cosines[k], critical)
-        count_pieces(layout, view, pieces)
+        critical = scratch[: find_critical(layout, heights[k], cosines[k], scratch)]
+        grid = OffsetGrid(directions[k], heights[k], counts[k], step)
+        count_pieces(plant_tree(layout, grid, cosines[k], critical, counts[k] < 0), pieces)
         if above:
             for column in range(counts[k]):
                 wanted[column] = pieces[column] == 0
-            find_contact_areas(layout, view, 2.0, wanted[: counts[k]], contact_area)
+            tree = plant_tree(layout, grid, cosines[k], critical, counts[k] >= 0)
+            find_contact_areas(tree, 2.0, wanted[: counts[k]], contact_area)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from compare_walls import BARE, Print, arachne, ours
 
 from machine.reader.parsed import MoveKind
 from mdp.cut import mesh_of, solid_of
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import locate
 from mdp.read import read_mesh
@@ -109,7 +109,7 @@ def judged(mesh: Mesh, seams: Floats, height_mm: float = 0.2) -> tuple[float, ..
 def visibility(tree: TriangleTree, places: Floats) -> Floats:
     """(n,) of all directions those in which nothing stands before (n, 3) places beside a surface: 1 for half of them and more."""
     frames = np.tile(np.eye(3), (len(places), 1, 1))
-    return np.minimum(2.0 * (1.0 - blocked_shares(tree, places, frames, spread(RAYS), FAR_MM)), 1.0)
+    return np.minimum(2.0 * (1.0 - blocked_shares(tree, (places, frames), spread(RAYS), FAR_MM)), 1.0)
 
 
 def on_outline(seam: Floats, loops: Sequence[Floats]) -> tuple[Floats, float]:

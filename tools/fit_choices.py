@@ -25,9 +25,8 @@ from judge_parts import scaled
 from offer_parts import sheet_name
 
 from machine.app.pipeline.pricing import pricing
-from mdp.cost.cost import measure_seam, weight_of_stairs
-from mdp.cost.footing import Plate
-from mdp.cost.model_need import MADE_BY_A_CUT
+from mdp.cost.cost import weight_of_stairs
+from mdp.cost.footing import BuildPlate
 from mdp.directions.orientation import diameter_mm, standing_still
 from mdp.directions.revolution import find_revolution
 from mdp.joint import is_sound
@@ -42,6 +41,8 @@ from mdp.search.orient import NARROW, TURNED, UNSTEADY
 from mdp.search.parts import make_parts
 from mdp.search.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.search.problem import SIZE_MM, Problem
+from mdp.support_need.need import MADE_BY_A_CUT
+from mdp.sweep.crossing import measure_rim
 from mdp.sweep.limbs import limb_faces
 from profiles.profile import Profile, load
 
@@ -139,7 +140,7 @@ def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[
     price = pricing(profile)(parts) or (nan, nan)
     seen_mm, hidden_mm = seams_by_sight(node, profile.search.hidden_seam_share)
     revolution = find_revolution(problem.mesh)
-    footing = Plate.under(problem.mesh, profile).footing(np.eye(3))
+    footing = BuildPlate.under(problem.mesh, profile).footing(np.eye(3))
     askew = revolution is not None and not revolution.is_square_to(UP)
     scars_mm2, stairs_mm2 = sum(cut.cut_cost.seam_mm2 for cut in node.cuts), row.stairs_mm2 / weight_of_stairs(profile)
     support_mm2 = row.cost_mm2 - scars_mm2 - row.stairs_mm2
@@ -164,7 +165,7 @@ def seams_by_sight(node: Node, hidden_share: float) -> tuple[float, float]:
             sources == MADE_BY_A_CUT, 0.0, np.clip((weights[sources] - hidden_share) / (1.0 - hidden_share), 0.0, 1.0)
         )
         cut: Mask = np.ones(len(sources), np.bool_) if base.limbs_mm is None else limb_faces(before.remainder, base)
-        rim = measure_seam(before.remainder.mesh, np.where(cut, seen, 0.0), base, 0.0)
+        rim = measure_rim(before.remainder.mesh, np.where(cut, seen, 0.0), base, 0.0)
         seen_mm, hidden_mm = seen_mm + rim.weighted_mm, hidden_mm + max(step.seams[-1].length_mm - rim.weighted_mm, 0.0)
     return seen_mm, hidden_mm
 

@@ -27,7 +27,7 @@ from machine.app.pictures.png import write_png
 from machine.app.pictures.raster import Image, View, draw
 from machine.app.pipeline.pricing import pricing
 from machine.view.parts import part_colours, residual_faces
-from mdp.cost.model_need import needing_upright
+from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import resting_orientations, standing_still
 from mdp.mesh import Floats, Mesh

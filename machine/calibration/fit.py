@@ -13,7 +13,7 @@ from math import acos, atan2, cos, degrees, radians, sin
 import numpy as np
 
 from machine.kinematics.table import workpiece_path
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats
 from mdp.pose import Pose, unit
 from profiles.errors import ProfileError

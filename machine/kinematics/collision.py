@@ -13,7 +13,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from machine.kinematics.table import machine_points
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.head import Body, corners, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation

@@ -254,7 +254,7 @@ def _transport_sentence(error: httpx.TransportError, address: ServerAddress, htt
         return f"{address.text}: {where} cannot be reached: {_reason(error)}"
     if isinstance(error, httpx_.TimeoutException):
         return f"{address.text}: {where} has stopped answering"
-    if isinstance(error, httpx_.PrinterError):
+    if isinstance(error, httpx_.RemoteProtocolError):
         return f"{address.text}: what answers on {where} breaks off or speaks no HTTP ({_reason(error)})"
     return f"{address.text}: the connection to {where} broke off ({_reason(error)})"
 

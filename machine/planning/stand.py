@@ -15,7 +15,7 @@ from math import ceil, hypot, inf, radians
 import numpy as np
 
 from machine.kinematics.collision import Printed, solids, sweep_gaps, swing_mm
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.head import bodies, directions
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats

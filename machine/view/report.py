@@ -17,7 +17,7 @@ from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, page_kinds
 from machine.view.settings import settings_tables
-from mdp.cost.model_need import needing_upright
+from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, standing_still
 from mdp.joint import Joint, weakest_of

@@ -86,7 +86,7 @@ class Footing:
 
 
 @dataclass(frozen=True, eq=False)
-class Plate:
+class BuildPlate:
     """The plate under a model: its mesh, (3 m,) the half-edge across each half-edge, its centre of mass and diameter, the width
     of the brim that a small base gets, and the density, as if it were printed solid."""
 
@@ -98,7 +98,7 @@ class Plate:
     density_g_cm3: float
 
     @classmethod
-    def under(cls, mesh: Mesh, profile: Profile) -> "Plate":
+    def under(cls, mesh: Mesh, profile: Profile) -> "BuildPlate":
         """The plate under a mesh, by a profile. A pedestal or a raft holds no more than a plate; a brim would go round that."""
         process = profile.process
         stands_off = profile.search.pedestal_mm > 0.0 or process.raft_layers > 0
@@ -123,7 +123,7 @@ class Plate:
         tensions = [_tension_mpa(section_edges(area), high - low, self.weight_n, centre[:2]) for area in (base, brim)]
         corners = section_edges(base)[:, :2] - centre[:2]
         lean_deg = tipping_angle_deg(corners, float(centre[2]) - low) if len(corners) else -90.0
-        shadow_mm2 = self._shadow_mm2(rotation)
+        shadow_mm2 = 0.5 * float((np.abs(dot(self.mesh.normals, rotation[2])) * self.mesh.areas_mm2).sum())
         return Footing(base.area() / shadow_mm2, touching.area() / shadow_mm2, lean_deg, *tensions)
 
     def stance_bounds(self, rotations: Floats) -> tuple[Floats, Floats]:
@@ -135,18 +135,16 @@ class Plate:
         hull, rotations = convex_hull(self.mesh.vertices), np.ascontiguousarray(rotations)
         corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm])
         bounds = np.zeros((len(rotations), 2))
-        in_threads(_measure_hull, len(rotations), corners, hull.faces, rotations, above_mm, bounds)
+        in_threads(_measure_hull, len(rotations), (corners, hull.faces, above_mm), rotations, bounds)
         return bounds[:, 0], bounds[:, 1]
-
-    def _shadow_mm2(self, rotation: Floats) -> float:
-        """The area of the model's shadow, overlapping surfaces each counted."""
-        return 0.5 * float((np.abs(dot(self.mesh.normals, rotation[2])) * self.mesh.areas_mm2).sum())
 
 
 @kernel
-def _measure_hull(begin: int, end: int, corners: Floats, faces: Ints, rotations: Floats, above_mm: Floats, out: Floats) -> None:
+def _measure_hull(begin: int, end: int, hull: tuple[Floats, Ints, Floats], rotations: Floats, out: Floats) -> None:
     """The area of a turned hull's section at the first of two heights above its lowest corner, no higher than its middle, and the
-    angle by which it can be leaned before the origin is over the edge of the section at either."""
+    angle by which it can be leaned before the origin is over the edge of the section at either. hull: its corners, its faces, and
+    the heights."""
+    corners, faces, above_mm = hull
     turned, ends, reach = table(len(corners), 3), table(2, 2), floats(SIDES.shape[1], 0.0)
     for k in range(begin, end):
         lowest, highest = np.inf, -np.inf

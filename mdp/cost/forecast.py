@@ -1,64 +1,64 @@
-"""Forecast: what a sequence of planes would cost, summed over a solid's surface without cutting it.
+"""Forecast: what a sequence of planes would cost, and how large its parts would be and what of them would need support, summed
+over a solid's surface without cutting it.
 
 A piece of the surface belongs to the first part whose plane it lies above, what lies above none to the part on the platform.
-The faces that these cuts lay open are not in the sum, though later ones may turn them into overhangs. A rim runs over what the
-planes before its own have left. Faces are convex polygons in space, clipped by one plane after the other; directions, normals and
-corners are columns of (3, n) arrays.
+A rim runs over what the planes before its own have left. Faces are convex polygons in space, clipped by one plane after the
+other; normals and corners are columns of (3, n) arrays.
+
+The cost leaves out the faces that the cuts lay open, though later ones may turn them into overhangs. The parts have them, as
+fans: the chord of every face in a plane makes a triangle with one point of that plane, and the areas of these triangles, with
+their signs, add up to the cut. They are cut by the planes that follow like any other face, which gives volumes by the divergence
+theorem.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import acos, degrees, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.cost.cost import CostTerms
-from mdp.kernels.arrays import floats, table
+from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
-from mdp.mesh import Floats
-from mdp.overhang import Mask, threshold
-from mdp.plane import Plane
-from mdp.stairs import step_share
+from mdp.mesh import Floats, Indices, Ints
+from mdp.overhang import Mask, step_share, threshold
+from mdp.plane import Plane, normals_and_offsets
 from mdp.support_need.patches import Classes
-from mdp.sweep.cylinders import crossings
+from mdp.sweep.crossing import ROUNDING_MM, weigh_chord
+from mdp.sweep.cylinders import crossed_by
 from mdp.sweep.facets import FaceTable, Scars, times_along
 from mdp.sweep.limbs import cylinders_cut, limb_reach
-from mdp.sweep.rims import ROUNDING_MM, weigh_chord
 from mdp.sweep.sweep import Remainder
 
 LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own
+NEEDED, RIM, COSINE, VOLUME, COLUMNS = range(5)  # of the sums over a part; the others are mm2 and mm
+LEAST_EDGE_MM = 1e-3  # of the line in which two cuts meet; fans leave less than nothing
+Vector = tuple[float, float, float]
 
 
-class Planes(NamedTuple):
-    """Planes in the order of their cuts: (3, k) normals, (k,) offsets, (k, m) which faces each may cut, (0, 0): all, and (3, k) a
-    point in each, needed for parts only."""
+@dataclass(frozen=True)
+class PartForecast:
+    """A part cut off: what of it needs support, the length of its rim where it is seen, the smallest angle of an edge that the
+    cut makes, and its volume."""
 
-    directions: Floats
-    offsets_mm: Floats
-    reach: Mask
-    apexes: Floats
-
-
-def planes_of(planes: Sequence[Plane], reach: Mask) -> Planes:
-    """Planes for kernels, without points."""
-    normals = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
-    offsets_mm = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
-    return Planes(np.ascontiguousarray(normals.T), offsets_mm, reach, np.zeros((3, 0)))
+    support_mm2: float
+    rim_mm: float
+    edge_deg: float
+    volume_mm3: float
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Forecast:
     """What remains of a model, (k,) the numbers of its faces that count, and what blemishes them along no direction yet."""
 
     remainder: Remainder
     terms: CostTerms
-    chosen: NDArray[np.int64]
+    chosen: Indices
     scars: Scars
 
     @classmethod
-    def of(cls, remainder: Remainder, terms: CostTerms, rim_weights: Floats | None = None) -> "Surface":
+    def of(cls, remainder: Remainder, terms: CostTerms, rim_weights: Floats | None = None) -> "Forecast":
         """The surface of what remains. rim_weights: (m,) how much a mm of rim counts on each face; None: what seams of the
         remainder cost. Where they cost nothing, faces that no direction above the horizon finds risky are left out."""
         faces, least, count = remainder.faces, threshold(terms.angle_deg), len(remainder.risky)
@@ -76,7 +76,7 @@ class Surface:
 
     def classes(self, planes: Sequence[Plane]) -> Classes:
         """(k, n) what the faces of the model need along the planes' normals."""
-        return self.remainder.classes(np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3))
+        return self.remainder.classes(normals_and_offsets(planes)[0])
 
     def reach(self, planes: Sequence[Plane]) -> Mask:
         """(k, m) which of the faces each plane may cut: those of its limbs and below them; (0, 0): all of them."""
@@ -90,44 +90,59 @@ class Surface:
 
         classes, reach: those of planes that lean a little otherwise; absent: the planes' own.
         """
-        needs = self.classes(planes) if classes is None else classes
         cuts_mm2 = self.terms.cut_mm2 * len(planes) + self._crossed_mm2(planes)
-        cuts = planes_of(planes, self.reach(planes) if reach is None else reach)
-        return _sum_left(self.scars._replace(classes=needs), cuts) + cuts_mm2
+        normals, offsets_mm = normals_and_offsets(planes)
+        needs = self.classes(planes) if classes is None else classes
+        scars = self.scars._replace(directions=normals, classes=needs)
+        return _sum_left(scars, offsets_mm, self.reach(planes) if reach is None else reach) + cuts_mm2
+
+    def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
+        """The parts that planes cut off a whole model, all of whose faces count, in the order of the cuts, and what of the rest
+        needs support printed straight up, mm2."""
+        middle, (directions, offsets_mm) = self.remainder.mesh.bounds_mm.mean(axis=0), normals_and_offsets(planes)
+        apexes = middle - (directions @ middle - offsets_mm)[:, None] * directions
+        scars = self.scars._replace(directions=directions, classes=self.classes(planes))
+        sums = _sum_parts(scars, offsets_mm, self.reach(planes), apexes)
+        rows, before = np.nonzero(np.abs(sums[:-1, COLUMNS:]) > LEAST_EDGE_MM)
+        np.maximum.at(sums[:, COSINE], rows, np.abs((directions[rows] * directions[before]).sum(axis=1)))
+        parts = (PartForecast(s[NEEDED], s[RIM], degrees(acos(min(s[COSINE], 1.0))), s[VOLUME]) for s in sums[:-1].tolist())
+        return tuple(parts), float(sums[-1, NEEDED])
 
     def _crossed_mm2(self, planes: Sequence[Plane]) -> float:
         """What it costs that bores are cut askew, each as long as something of it is left."""
         left, crossed = self.remainder.cylinders if self.terms.feature_mm2 > 0.0 else (), 0.0
         for plane in planes:
             cut = cylinders_cut(self.remainder, left, plane)
-            crossed += float(crossings(cut, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])
+            crossed += crossed_by(cut, plane)
             left = tuple(cylinder for cylinder in left if cylinder not in cut or cylinder.reaches_below(plane))
         return self.terms.feature_mm2 * crossed
 
 
 @kernel
-def _sum_left(scars: Scars, planes: Planes) -> float:
-    """Risky area, seams and stairs of the planes, cut in their order."""
-    faces, normals, directions, cuts = scars.faces, scars.faces.normals, planes.directions, len(planes.offsets_mm)
+def _sum_left(scars: Scars, offsets_mm: Floats, reach: Mask) -> float:
+    """Risky area, seams and stairs of planes along the directions of the scars, cut in their order. reach (k, m): which faces
+    each may cut, (0, 0): all."""
+    faces, normals, directions, cuts = scars.faces, scars.faces.normals, scars.directions, len(offsets_mm)
     polygon, spare, heights, ends = table(3, cuts + 4), table(3, cuts + 4), floats(cuts + 4, 0.0), table(3, 2)
     total = 0.0
     for face in range(len(faces.areas_mm2)):
         size, area = 3, faces.areas_mm2[face]
-        put_face(faces, face, polygon)
+        _put_face(faces, face, polygon)
         for cut in range(cuts):
-            if len(planes.reach) > 0 and not planes.reach[cut, face]:
+            if len(reach) > 0 and not reach[cut, face]:
                 continue
-            lowest, highest = find_heights(polygon, size, planes, cut, heights)
+            lowest, highest = _find_heights(polygon, size, directions[cut], offsets_mm[cut], heights)
             if highest <= 0.0:
                 continue
-            cosine, below = along(normals, face, directions, cut), 0.0
+            cosine, below = _along(normals, face, directions[cut]), 0.0
             if lowest < 0.0:
                 if faces.seam_weights[face] > 0.0 and highest > ROUNDING_MM and lowest < -ROUNDING_MM:
-                    chord_mm = find_chord(polygon, heights, size, ends)
-                    total += faces.seam_weights[face] * chord_mm * rim_per_mm(cosine, scars.feather)
-                size = clip_below(polygon, spare, heights, size)
+                    chord_mm = _find_chord(polygon, heights, size, ends)
+                    sine = max(np.sqrt(max(1.0 - cosine * cosine, 0.0)), LEAST_SINE)
+                    total += faces.seam_weights[face] * chord_mm * (weigh_chord(cosine, scars.feather) / sine)
+                size = _clip_below(polygon, spare, heights, size)
                 polygon, spare = spare, polygon
-                below = flat_area_mm2(polygon, size, normals, face)
+                below = _flat_area_mm2(polygon, size, (normals[0, face], normals[1, face], normals[2, face]))
             if cosine < scars.risky_below:
                 total += (area - below) * times_along(scars, cut, face) * faces.counts[face]
             total += (area - below) * faces.stair_weights[face] * step_share(cosine)
@@ -141,7 +156,7 @@ def _sum_left(scars: Scars, planes: Planes) -> float:
 
 
 @no_nrt
-def put_face(faces: FaceTable, face: int, polygon: Floats) -> None:
+def _put_face(faces: FaceTable, face: int, polygon: Floats) -> None:
     """Put the corners of a face into the first columns of `polygon`."""
     for corner in range(3):
         for axis in range(3):
@@ -149,25 +164,24 @@ def put_face(faces: FaceTable, face: int, polygon: Floats) -> None:
 
 
 @no_nrt
-def along(vectors: Floats, column: int, directions: Floats, second_column: int) -> float:
-    """Product of a column of (3, n) vectors with a column of others."""
-    product: float = vectors[0, column] * directions[0, second_column] + vectors[1, column] * directions[1, second_column]
-    product += vectors[2, column] * directions[2, second_column]
+def _along(vectors: Floats, column: int, d: Floats) -> float:
+    """Product of a column of (3, n) vectors with a direction."""
+    product: float = vectors[0, column] * d[0] + vectors[1, column] * d[1] + vectors[2, column] * d[2]
     return product
 
 
 @helper
-def find_heights(polygon: Floats, size: int, planes: Planes, cut: int, heights: Floats) -> tuple[float, float]:
-    """Put the heights of a polygon's corners above one of some planes into `heights`; the least and the greatest."""
+def _find_heights(polygon: Floats, size: int, d: Floats, offset_mm: float, heights: Floats) -> tuple[float, float]:
+    """Put the heights of a polygon's corners above a plane into `heights`; the least and the greatest."""
     lowest, highest = np.inf, -np.inf
     for i in range(size):
-        heights[i] = along(polygon, i, planes.directions, cut) - planes.offsets_mm[cut]
+        heights[i] = _along(polygon, i, d) - offset_mm
         lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
     return lowest, highest
 
 
 @no_nrt
-def clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
+def _clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
     """Put into `below` what of a convex polygon lies below height 0; the number of its corners."""
     count = 0
     for i in range(size):
@@ -185,26 +199,18 @@ def clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> in
 
 
 @no_nrt
-def flat_area_mm2(polygon: Floats, size: int, normals: Floats, face: int) -> float:
+def _flat_area_mm2(polygon: Floats, size: int, normal: Vector) -> float:
     """Area of a flat convex polygon with a known unit normal."""
-    twice = 0.0
+    twice, (x, y, z) = 0.0, normal
     for i in range(1, size - 1):
         a0, a1, a2 = polygon[0, i] - polygon[0, 0], polygon[1, i] - polygon[1, 0], polygon[2, i] - polygon[2, 0]
         b0, b1, b2 = polygon[0, i + 1] - polygon[0, 0], polygon[1, i + 1] - polygon[1, 0], polygon[2, i + 1] - polygon[2, 0]
-        across = normals[0, face] * (a1 * b2 - a2 * b1) + normals[1, face] * (a2 * b0 - a0 * b2)
-        twice += across + normals[2, face] * (a0 * b1 - a1 * b0)
+        twice += x * (a1 * b2 - a2 * b1) + y * (a2 * b0 - a0 * b2) + z * (a0 * b1 - a1 * b0)
     return 0.5 * twice
 
 
-@helper
-def rim_per_mm(cosine: float, feather: float) -> float:
-    """How much a mm of rim counts where a face's normal has that cosine with the plane's."""
-    sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
-    return float(weigh_chord(cosine, feather) / max(sine, LEAST_SINE))
-
-
 @no_nrt
-def find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> float:
+def _find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> float:
     """Put the ends (3, 2) of a convex polygon's chord at height 0 into `ends`, first where its outline rises through it; its
     length, mm. The polygon reaches to both sides."""
     for i in range(size):
@@ -214,3 +220,105 @@ def find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> flo
             for axis in range(3):
                 ends[axis, int(heights[i] > 0.0)] = polygon[axis, i] + share * (polygon[axis, j] - polygon[axis, i])
     return float(np.sqrt((ends[0, 1] - ends[0, 0]) ** 2 + (ends[1, 1] - ends[1, 0]) ** 2 + (ends[2, 1] - ends[2, 0]) ** 2))
+
+
+class Division(NamedTuple):
+    """What divides the faces of a model among parts: the cuts' offsets (k,), which faces each may cut (k, m), (0, 0): all, and a
+    point in each (k, 3); the sums, see _sum_parts; triangles that wait to be cut: (3, 3 n) corners, (n,) the cut whose fan each
+    belongs to, below 0: it is a face of the model, and the plane that is next; two polygons, their heights above a plane, and the
+    ends of a chord."""
+
+    offsets_mm: Floats
+    reach: Mask
+    apexes: Floats
+    sums: Floats
+    corners: Floats
+    fans: Ints
+    cuts: Ints
+    polygon: Floats
+    spare: Floats
+    heights: Floats
+    ends: Floats
+
+
+@kernel
+def _sum_parts(scars: Scars, offsets_mm: Floats, reach: Mask, apexes: Floats) -> Floats:
+    """(k + 1, COLUMNS + k) the sums over the parts in the order of the cuts, the last one what remains; behind them the signed
+    length of the line in which a plane (row) meets the cut of one before (column)."""
+    count = len(offsets_mm)
+    sums, most = table(count + 1, COLUMNS + count), (count + 1) * (count + 2) // 2
+    corners, fans, cuts = table(3, 3 * most), ints(most, 0), ints(most, 0)
+    polygon, spare, heights, ends = table(3, count + 4), table(3, count + 4), floats(count + 4, 0.0), table(3, 2)
+    division = Division(offsets_mm, reach, apexes, sums, corners, fans, cuts, polygon, spare, heights, ends)
+    for face in range(len(scars.faces.areas_mm2)):
+        fans[0], cuts[0], waiting = -1, 0, 1
+        _put_face(scars.faces, face, corners)
+        while waiting > 0:
+            waiting = _divide(scars, division, face, waiting - 1)
+    return sums
+
+
+@no_nrt
+def _divide(scars: Scars, division: Division, face: int, waiting: int) -> int:
+    """Divide the last triangle that waits among the parts; how many wait afterwards."""
+    fan, cut, directions, count = division.fans[waiting], division.cuts[waiting], scars.directions, len(division.offsets_mm)
+    polygon, spare, heights, ends, sums = division.polygon, division.spare, division.heights, division.ends, division.sums
+    x, y, z = scars.faces.normals[0, face], scars.faces.normals[1, face], scars.faces.normals[2, face]
+    if fan >= 0:
+        x, y, z = directions[fan, 0], directions[fan, 1], directions[fan, 2]
+    for corner in range(3):
+        for axis in range(3):
+            polygon[axis, corner] = division.corners[axis, 3 * waiting + corner]
+    size, area = 3, _flat_area_mm2(polygon, 3, (x, y, z))
+    while cut < count and size > 0:
+        if len(division.reach) > 0 and not division.reach[cut, face]:
+            cut += 1
+            continue
+        d, apex = directions[cut], division.apexes[cut]
+        lowest, highest = _find_heights(polygon, size, d, division.offsets_mm[cut], heights)
+        if highest > 0.0:
+            cosine, left = x * d[0] + y * d[1] + z * d[2], 0.0
+            height = polygon[0, 0] * x + polygon[1, 0] * y + polygon[2, 0] * z - (apex[0] * x + apex[1] * y + apex[2] * z)
+            if lowest < 0.0:
+                length = _find_chord(polygon, heights, size, ends)
+                if fan >= 0:
+                    sums[cut, COLUMNS + fan] += _signed(ends, directions[fan], d)
+                elif highest > ROUNDING_MM and lowest < -ROUNDING_MM:
+                    sums[cut, COSINE] = max(sums[cut, COSINE], abs(cosine))
+                    sums[cut, RIM] += length if scars.faces.seam_weights[face] > 0.0 else 0.0
+                _add_fan(division, waiting, cut)
+                waiting += 1
+                size = _clip_below(polygon, spare, heights, size)
+                polygon, spare = spare, polygon
+                left = _flat_area_mm2(polygon, size, (x, y, z))
+            else:
+                size = 0
+            sums[cut, VOLUME] += (area - left) * height / 3.0
+            if cosine < scars.risky_below:
+                needing = fan >= 0 or times_along(scars, cut, face) > 0.0
+                sums[cut, NEEDED] += area - left if needing else 0.0
+            area = left
+        cut += 1
+    if size > 0 and (scars.faces.risky[face] if fan < 0 else z < scars.risky_below):
+        sums[count, NEEDED] += area
+    return waiting
+
+
+@no_nrt
+def _add_fan(division: Division, waiting: int, cut: int) -> None:
+    """Have the triangle of a chord and a point of its plane wait: it closes what remains below the plane."""
+    division.fans[waiting], division.cuts[waiting] = cut, cut + 1
+    for axis in range(3):
+        division.corners[axis, 3 * waiting] = division.apexes[cut, axis]
+        division.corners[axis, 3 * waiting + 1] = division.ends[axis, 1]
+        division.corners[axis, 3 * waiting + 2] = division.ends[axis, 0]
+
+
+@no_nrt
+def _signed(ends: Floats, first: Floats, second: Floats) -> float:
+    """Length of a chord along the line in which two planes with these normals meet, with the sign of its sense."""
+    total = 0.0
+    for axis in range(3):
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        total += (ends[axis, 1] - ends[axis, 0]) * (first[j] * second[k] - first[k] * second[j])
+    return total

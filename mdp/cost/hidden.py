@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mdp.cut import simplify
-from mdp.directions.spread import spread_like_light
+from mdp.directions.unit_vectors import spread_like_light
 from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.sweep.rays import TriangleTree, blocked_shares, first_hit, frames_about, triangle_tree
+from mdp.sweep.rays import blocked_shares, faces_met, frames_about, triangle_tree
 from mdp.topology.edges import opposites
 
 NEIGHBOURHOOD = 0.03  # radius of a face's neighbourhood, as a share of the model's diagonal
@@ -32,12 +32,14 @@ WORTH = 0.7  # share of the faces above which a copy saves too little
 ALIKE = 0.5  # least cosine between the normals of a face and of what stands for it on the copy
 
 
-class Neighbourhood(NamedTuple):
-    """A surface for looking around a face: middles (m, 3), normals (m, 3) and areas (m,) of the faces, the faces across their
-    edges (m, 3), and for every edge its length times its dihedral angle, positive where concave, and its direction (m, 3, 3)."""
+class Surroundings(NamedTuple):
+    """A surface for looking around a face as far as a radius: for each face how occluded it is (m,), its middle (m, 3), its area
+    (m,), and the faces across its edges (m, 3); for every edge its length times its dihedral angle, positive where concave, and
+    its direction (m, 3, 3)."""
 
+    radius_mm: float
+    occluded: Floats
     middles: Floats
-    normals: Floats
     areas_mm2: Floats
     across: Ints
     bends: Floats
@@ -55,36 +57,23 @@ def hidden_shares(mesh: Mesh) -> Floats:
 
 def _looked_up(mesh: Mesh, copy: Mesh, off_mm: float) -> Floats:
     """(m,) the shares of the copy's faces that lie within so much above or below each face of a mesh; 0 where none does."""
-    on_copy, found = hidden_shares(copy), np.empty(len(mesh.faces), np.int32)
-    middles = mesh.vertices[mesh.faces].mean(axis=1)
-    in_threads(_stand_for, len(mesh.faces), triangle_tree(copy), middles, mesh.normals, 2.0 * off_mm, found)
+    on_copy, middles, reach_mm = hidden_shares(copy), mesh.vertices[mesh.faces].mean(axis=1), 2.0 * off_mm
+    rays = np.stack([middles - reach_mm * mesh.normals, mesh.normals], axis=1)
+    found = faces_met(triangle_tree(copy), rays, 2.0 * reach_mm, ALIKE)
     return np.where(found >= 0, on_copy[found], 0.0)
-
-
-@kernel
-def _stand_for(begin: int, end: int, tree: TriangleTree, middles: Floats, normals: Floats, reach: float, out: Ints) -> None:
-    """The face of a copy that is met along the normal of each face from below it."""
-    origin, ray = floats(3, 0.0), floats(3, 0.0)
-    for f in range(begin, end):
-        for axis in range(3):
-            ray[axis] = normals[f, axis]
-            origin[axis] = middles[f, axis] - reach * ray[axis]
-        out[f] = first_hit(tree, origin, ray, 2.0 * reach, -1, ALIKE)
 
 
 def _shares(mesh: Mesh, diagonal_mm: float) -> Floats:
     """(m,) the same, every face looked at."""
-    surface = _look_around(mesh)
-    places = surface.middles + LIFT * diagonal_mm * surface.normals
-    occluded = blocked_shares(
-        triangle_tree(mesh), places, frames_about(surface.normals), spread_like_light(RAYS), REACH * diagonal_mm
-    )
+    places = mesh.vertices[mesh.faces].mean(axis=1) + LIFT * diagonal_mm * mesh.normals
+    views = places, frames_about(mesh.normals)
+    occluded = blocked_shares(triangle_tree(mesh), views, spread_like_light(RAYS), REACH * diagonal_mm)
     hidden = np.zeros(len(mesh.faces))
-    in_threads(_hide, len(mesh.faces), surface, NEIGHBOURHOOD * diagonal_mm, occluded, hidden)
+    in_threads(_hide, len(mesh.faces), _surroundings(mesh, NEIGHBOURHOOD * diagonal_mm, occluded), hidden)
     return hidden
 
 
-def _look_around(mesh: Mesh) -> Neighbourhood:
+def _surroundings(mesh: Mesh, radius_mm: float, occluded: Floats) -> Surroundings:
     corners = mesh.vertices[mesh.faces]
     edges = np.roll(corners, -1, axis=1) - corners
     lengths = np.linalg.norm(edges, axis=2)
@@ -93,22 +82,23 @@ def _look_around(mesh: Mesh) -> Neighbourhood:
     beyond = normals[across]
     sine = np.einsum("mki,mki->mk", np.cross(normals[:, None], beyond), directions)
     angles = np.arctan2(-sine, np.einsum("mi,mki->mk", normals, beyond))
-    return Neighbourhood(corners.mean(axis=1), normals, mesh.areas_mm2, across, angles * lengths, directions)
+    return Surroundings(radius_mm, occluded, corners.mean(axis=1), mesh.areas_mm2, across, angles * lengths, directions)
 
 
 @kernel
-def _hide(begin: int, end: int, surface: Neighbourhood, radius: float, occluded: Floats, out: Floats) -> None:
-    """How hidden every face is, by what lies within a radius of it."""
+def _hide(begin: int, end: int, surface: Surroundings, out: Floats) -> None:
+    """How hidden every face is, by what lies around it."""
+    radius = surface.radius_mm
     seen, near, tensor = ints(len(surface.areas_mm2), -1), ints(MOST_NEIGHBOURS, 0), floats(6, 0.0)
     for f in range(begin, end):
-        count = _gather(surface, f, radius, seen, near)
+        count = _gather(surface, f, seen, near)
         area, dark = 0.0, 0.0
         for k in range(6):
             tensor[k] = 0.0
         for at in range(count):
             g = near[at]
             area += surface.areas_mm2[g]
-            dark += surface.areas_mm2[g] * occluded[g]
+            dark += surface.areas_mm2[g] * surface.occluded[g]
             for e in range(3):
                 bend = 0.5 * surface.bends[g, e]  # an edge is met from both of its faces
                 p, q, r = surface.directions[g, e, 0], surface.directions[g, e, 1], surface.directions[g, e, 2]
@@ -125,9 +115,9 @@ def _hide(begin: int, end: int, surface: Neighbourhood, radius: float, occluded:
 
 
 @no_nrt
-def _gather(surface: Neighbourhood, face: int, radius: float, seen: Ints, near: Ints) -> int:
+def _gather(surface: Surroundings, face: int, seen: Ints, near: Ints) -> int:
     """Put the faces around one into `near`, nearest rings first, as far as their middles lie within the radius; their number."""
-    middles = surface.middles
+    middles, radius = surface.middles, surface.radius_mm
     near[0], count, at = face, 1, 0
     seen[face] = face
     while at < count:

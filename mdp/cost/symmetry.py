@@ -11,7 +11,7 @@ from math import radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 

@@ -1,4 +1,4 @@
 """Directions: spread evenly, frames across them, and those in which a model rests.
 
-`spread.spread`, `frame.frame_across`, `orientation.best_orientation`.
+`unit_vectors.spread`, `unit_vectors.frame_across`, `orientation.best_orientation`.
 """

@@ -12,19 +12,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import update_wrapper
 from math import atan2, cos, degrees, factorial, hypot, pi, radians, sin
-from typing import Concatenate, NamedTuple, ParamSpec, TypeVar
+from typing import Concatenate, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from mdp.cut import convex_hull
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh, dot
-from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
-from mdp.stairs import step_share
+from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, step_share, threshold
 
 LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips over
 SAME_FACET_DEG = 0.5
@@ -133,45 +132,36 @@ def motion_between(before: Mesh, after: Mesh) -> tuple[Floats, Floats]:
     return rotation, second - rotation @ first
 
 
-class _Faces(NamedTuple):
-    """A mesh for a kernel: (n, 3) vertices, (m, 3) corners, (m, 3) normals, and (m,) areas of its faces."""
-
-    vertices: Floats
-    corners: Ints
-    normals: Floats
-    areas_mm2: Floats
-
-
 RISKY, STAIRS, SHADOW = range(3)
+Surface = tuple[Floats, Ints, Floats, Floats, float]  # vertices, faces, normals, areas, and the cosine below which one is risky
 
 
 def face_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
     """(k, 3) areas, mm2, of the model printed along (k, 3) unit directions: the faces that overhang too far and do not stand on
     the plate; all faces, each times the height of its steps as a share of a layer's; and their shadow."""
     areas_mm2 = np.zeros((len(directions), 3))
-    faces = _Faces(mesh.vertices, mesh.faces, mesh.normals, mesh.areas_mm2)
-    in_threads(_sum_faces, len(directions), faces, np.ascontiguousarray(directions), threshold(angle_deg), areas_mm2)
+    surface = mesh.vertices, mesh.faces, mesh.normals, mesh.areas_mm2, threshold(angle_deg)
+    in_threads(_sum_faces, len(directions), surface, np.ascontiguousarray(directions), areas_mm2)
     return areas_mm2
 
 
 @kernel
-def _sum_faces(begin: int, end: int, faces: _Faces, directions: Floats, limit: float, areas_mm2: Floats) -> None:
-    heights = floats(len(faces.vertices), 0.0)
+def _sum_faces(begin: int, end: int, surface: Surface, directions: Floats, sums_mm2: Floats) -> None:
+    vertices, corners, normals, areas_mm2, limit = surface
+    heights = floats(len(vertices), 0.0)
     for k in range(begin, end):
         x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
         lowest = np.inf
         for v in range(len(heights)):
-            heights[v] = faces.vertices[v, 0] * x + faces.vertices[v, 1] * y + faces.vertices[v, 2] * z
+            heights[v] = vertices[v, 0] * x + vertices[v, 1] * y + vertices[v, 2] * z
             lowest = min(lowest, heights[v])
         level = lowest + PLATFORM_TOLERANCE_MM
-        for face in range(len(faces.normals)):
-            cosine = faces.normals[face, 0] * x + faces.normals[face, 1] * y + faces.normals[face, 2] * z
-            areas_mm2[k, STAIRS] += step_share(cosine) * faces.areas_mm2[face]
-            areas_mm2[k, SHADOW] += 0.5 * abs(cosine) * faces.areas_mm2[face]
-            if cosine < limit:
-                a, b, c = faces.corners[face, 0], faces.corners[face, 1], faces.corners[face, 2]
-                if heights[a] > level or heights[b] > level or heights[c] > level:
-                    areas_mm2[k, RISKY] += faces.areas_mm2[face]
+        for f in range(len(normals)):
+            cosine = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z
+            sums_mm2[k, STAIRS] += step_share(cosine) * areas_mm2[f]
+            sums_mm2[k, SHADOW] += 0.5 * abs(cosine) * areas_mm2[f]
+            if cosine < limit and max(heights[corners[f, 0]], heights[corners[f, 1]], heights[corners[f, 2]]) > level:
+                sums_mm2[k, RISKY] += areas_mm2[f]
 
 
 @cached_with_mesh
@@ -337,12 +327,8 @@ def side_in_words(orientation: Orientation) -> str:
 
 def in_words(orientation: Orientation, held: bool = False) -> str:
     """How the model is turned, in the order process.rotate_deg takes, and whether it needs holding; held: the plate holds it."""
-    turns = [(_angle(angle), axis) for angle, axis in zip(orientation.turns_deg, "xy", strict=True)]
+    turns = [(f"{round(angle, 1) + 0.0:g}", axis) for angle, axis in zip(orientation.turns_deg, "xy", strict=True)]
     words = ", then ".join(f"{angle} about {axis}" for angle, axis in turns if angle != "0")
     return (f"turned {words}" if words else "as it stands") + (
         "" if held or orientation.stable else ", rests nowhere without a raft"
     )
-
-
-def _angle(value_deg: float) -> str:
-    return f"{round(value_deg, 1) + 0.0:g}"

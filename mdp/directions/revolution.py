@@ -10,8 +10,8 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from mdp.directions.frame import frame_across
 from mdp.directions.orientation import cached_with_mesh, centre_of_mass
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 
@@ -126,5 +126,4 @@ def _off(points: Floats, normals: Floats, axis: Floats, moment: Floats) -> Float
 
 def _fits(points: Floats, normals: Floats, axis: Floats, moment: Floats) -> Mask:
     """(m,) whether each face, no cap, is turned about the axis."""
-    fits: Mask = (_off(points, normals, axis, moment) <= OFF) & (np.abs(normals @ axis) < CAP)
-    return fits
+    return (_off(points, normals, axis, moment) <= OFF) & (np.abs(normals @ axis) < CAP)

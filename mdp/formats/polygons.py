@@ -10,7 +10,7 @@ from pathlib import Path
 import manifold3d as m3
 import numpy as np
 
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.formats.surface import Surface, check_surface, check_vertices, parse_floats, parse_integers, text_lines
 from mdp.mesh import Floats, Indices
 from profiles.errors import MeshError, counted

@@ -13,11 +13,11 @@ import numpy as np
 
 from mdp.clearance import least_height_mm
 from mdp.cost.cost import CostTerms, CutCost
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
-from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
+from mdp.sweep.components import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.limbs import LimbSums
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import KeptFaces, Zone, spans_mm
@@ -68,7 +68,7 @@ def directions(search: Search) -> Floats:
 @dataclass(frozen=True, eq=False)
 class Bounds:
     """What every direction must respect, worked out once a search: (k,) arrays. keep_mm: (k, spans, 2) offsets between which a
-    plane passes through a zone; crumb_mm: a piece that is lower is a crumb; fragile_mm: what is thinner is a sliver;
+    plane passes through a zone; fragment_mm: a piece that is lower is a fragment; fragile_mm: what is thinner is a sliver;
     step_mm: between the candidates of a direction."""
 
     directions: Floats
@@ -77,7 +77,7 @@ class Bounds:
     least_volume_mm3: float
     least_interface_mm2: float
     keep_mm: Floats
-    crumb_mm: float
+    fragment_mm: float
     fragile_mm: float
     step_mm: float
 
@@ -103,7 +103,7 @@ def bounds_of(
         least_volume_mm3=search.least_volume_share * mesh.volume_mm3,
         least_interface_mm2=search.least_interface_mm2,
         keep_mm=spans_mm(chosen, keep),
-        crumb_mm=sqrt(search.least_interface_mm2),
+        fragment_mm=sqrt(search.least_interface_mm2),
         fragile_mm=max(search.fragile_mm, COPLANAR_MM),
         step_mm=search.offset_step_mm,
     )
@@ -130,8 +130,8 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 class ScoredCandidates:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
     not known yet. direction is a row of limits.directions; above_mm2: what is risky above the plane printed straight up;
-    residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; hopeless_mm2: what of the first two no cut can save,
-    hopeless_here_mm2: what of the solid's risky area, both 0 unless requested. first, columns: (k,) the first plane along each
+    residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; unavoidable_mm2: what of the first two no cut can save,
+    unavoidable_here_mm2: what of the solid's risky area, both 0 unless requested. first, columns: (k,) the first plane along each
     direction, in steps of limits.step_mm, and the number of all planes along it."""
 
     remainder: Remainder
@@ -144,10 +144,10 @@ class ScoredCandidates:
     lost_mm2: Floats
     stairs_mm2: Floats
     seam_mm2: Floats
-    hopeless_mm2: Floats
+    unavoidable_mm2: Floats
     first: Ints
     columns: Ints
-    hopeless_here_mm2: float = 0.0
+    unavoidable_here_mm2: float = 0.0
 
     @property
     def end_mm(self) -> Floats:
@@ -171,7 +171,7 @@ class Feasibility:
     """What the sweep gives for some candidates, one array row each; reason is FEASIBLE or why not.
 
     fragile_mm is the distance to the nearest surface that the plane would cut into a sliver. contact_area_mm2 is the least area
-    that a piece of the part stands on. A piece lower than the side of a square of least_interface_mm2 is a crumb and may stand
+    that a piece of the part stands on. A piece lower than the side of a square of least_interface_mm2 is a fragment and may stand
     on less.
     """
 
@@ -183,11 +183,11 @@ class Feasibility:
 
 
 def score_candidates(
-    remainder: Remainder, limits: Bounds, terms: CostTerms, least_gain_mm2: float, hopeless: Mask | None = None
+    remainder: Remainder, limits: Bounds, terms: CostTerms, least_gain_mm2: float, unavoidable: Mask | None = None
 ) -> ScoredCandidates:
     """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe and the stairs that
-    it takes away, less those that it brings and its seam. hopeless: the faces that no cut can save, see sweep.gains."""
-    swept = gains(remainder, limits.directions, limits.step_mm, threshold(terms.angle_deg), hopeless)
+    it takes away, less those that it brings and its seam. unavoidable: the faces that no cut can save, see sweep.gains."""
+    swept = gains(remainder, limits.directions, limits.step_mm, threshold(terms.angle_deg), unavoidable)
     residual, offset = residual_mm2(swept, terms), swept.offsets_mm(limits.step_mm)
     gain = gain_mm2(swept, residual)
     above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
@@ -206,10 +206,10 @@ def score_candidates(
         lost_mm2=lost_mm2(swept, residual)[scored],
         stairs_mm2=swept.stairs_mm2[scored],
         seam_mm2=seam_mm2(swept, terms)[scored],
-        hopeless_mm2=swept.hopeless_mm2[scored],
+        unavoidable_mm2=swept.unavoidable_mm2[scored],
         first=swept.first,
         columns=swept.columns,
-        hopeless_here_mm2=0.0 if hopeless is None else float(remainder.facets.faces.counted_mm2[hopeless].sum()),
+        unavoidable_here_mm2=0.0 if unavoidable is None else float(remainder.facets.faces.counted_mm2[unavoidable].sum()),
     )
 
 
@@ -237,7 +237,7 @@ def seam_mm2(swept: Gains | LimbSums, terms: CostTerms) -> Floats:
 def check(remainder: Remainder, limits: Bounds, step_mm: float, direction: Ints, offset_mm: Floats) -> Feasibility:
     """Which of the planes (rows of limits.directions, offsets on a grid of step_mm) can be cut."""
     rows, inverse = np.unique(direction, return_inverse=True)
-    swept = sweep(remainder, limits.directions[rows], step_mm, limits.least_height_mm[rows], limits.crumb_mm)
+    swept = sweep(remainder, limits.directions[rows], step_mm, limits.least_height_mm[rows], limits.fragment_mm)
     at = (inverse, np.rint(offset_mm / step_mm).astype(np.int64) - swept.first[inverse])
     reason, keep_mm = np.zeros(len(direction), np.int32), limits.keep_mm[direction]
     checks = {

@@ -41,11 +41,11 @@ FEATURES: dict[str, Column] = {
     "M5": lambda table, rows: _radii(table, np.array([table.fragile_mm(int(row)) for row in rows], dtype=np.float64)),
     "M6": lambda table, rows: (table.lost_mm2 + table.scored.lost_mm2[rows]) / table.model.risky_mm2,
     "wasted": lambda table, rows: (
-        (table.scored.lost_mm2 - table.scored.seam_mm2 - table.scored.hopeless_mm2)[rows] / table.model.risky_mm2
+        (table.scored.lost_mm2 - table.scored.seam_mm2 - table.scored.unavoidable_mm2)[rows] / table.model.risky_mm2
     ),
-    "hopeless": lambda table, rows: table.scored.hopeless_mm2[rows] / table.model.risky_mm2,
+    "hopeless": lambda table, rows: table.scored.unavoidable_mm2[rows] / table.model.risky_mm2,
     "hopeless_left": lambda table, rows: (
-        (table.scored.hopeless_here_mm2 - table.scored.hopeless_mm2[rows]) / table.model.risky_mm2
+        (table.scored.unavoidable_here_mm2 - table.scored.unavoidable_mm2[rows]) / table.model.risky_mm2
     ),
     "risky_left": lambda table, rows: (table.node.risky_mm2 - table.scored.above_mm2[rows]) / table.model.risky_mm2,
     "seam": lambda table, rows: table.scored.seam_mm2[rows] / table.model.risky_mm2,

@@ -5,15 +5,14 @@ from functools import cached_property
 
 import numpy as np
 
-from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, measure_seam, stair_weights
-from mdp.cost.model_need import Piece
+from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, TracedMesh, stair_weights
 from mdp.cut import Solid, above, corners_above, cut
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats
 from mdp.overhang import risky_upright
 from mdp.plane import PLATFORM, Plane
+from mdp.sweep.crossing import Rim, measure_rim
 from mdp.sweep.limbs import limb_faces, limb_mesh, limb_vertices
-from mdp.sweep.rims import Rim
 from mdp.sweep.slivers import sliver_mm
 from mdp.sweep.sweep import Remainder
 
@@ -58,9 +57,9 @@ class Node:
         return above(whole, self.base) if self.base.limbs_mm is None else cut(whole, self.base)[0]
 
     @cached_property
-    def piece(self) -> Piece:
+    def piece(self) -> TracedMesh:
         """The remaining solid, and which faces of the model its own are."""
-        return self.places.surface.piece(self.solid)
+        return self.places.piece(self.solid)
 
     @cached_property
     def remainder(self) -> Remainder:
@@ -69,7 +68,7 @@ class Node:
         weights = self.seam_weights if terms.seam_mm > 0.0 else None
         risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
         stairs = stair_weights(self.piece, terms.stair_weight)
-        pieces = None if terms.need is None else terms.need.pieces(self.piece)
+        pieces = None if terms.need is None else terms.need.pieces(mesh, self.piece.sources)
         if pieces is not None:
             risky = risky & pieces.upright
         return Remainder(mesh, risky, weights, terms.feather, pieces, stairs, self.places.cylinders_of(self.piece))
@@ -88,7 +87,7 @@ class Node:
         weights = before.seam_weights
         if base.limbs_mm is not None:
             weights = np.where(limb_faces(before.remainder, base), weights, 0.0)
-        return (*before.seams, measure_seam(before.remainder.mesh, weights, base, self.terms.feather))
+        return (*before.seams, measure_rim(before.remainder.mesh, weights, base, self.terms.feather))
 
     @cached_property
     def risky_mm2(self) -> float:

@@ -257,7 +257,7 @@ def _limb_grid(problem: Problem, limits: Bounds) -> LimbGrid:
         least_gain_mm2=max(problem.least_gain_mm2, WORTH * problem.root.cost_mm2),
         least_volume_mm3=limits.least_volume_mm3,
         least_interface_mm2=limits.contact_area_mm2,
-        crumb=limits.crumb_mm / limits.step_mm,
+        fragment=limits.fragment_mm / limits.step_mm,
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from mdp.clearance import find_obstacle, lowest_body
 from mdp.cut import above, divide, mesh_of, passing_places
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text
 from mdp.overhang import BASE_TOLERANCE_MM, threshold
 from mdp.plane import Plane

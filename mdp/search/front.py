@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mdp.cost.model_need import excess_mm2
+from mdp.cost.cost import excess_mm2
 from mdp.decomposition import FrontRow, Part
 from mdp.kernels.processes import parallel_map
 from mdp.ranking.node import Node

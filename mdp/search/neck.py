@@ -10,11 +10,11 @@ from math import atan2, ceil, cos, pi, radians, sin
 
 import numpy as np
 
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats, Ints, Mesh, dot
 from mdp.plane import Plane
 from mdp.pose import about
-from mdp.sweep.rims import measure_rim
+from mdp.sweep.crossing import sum_chords
 from mdp.sweep.sweep import Remainder, gains
 
 REACH_SHARE, REACH_DEG = 0.15, 25.0  # how far a neck is looked for: of the diagonal of what is cut, and tilted by so much
@@ -39,8 +39,8 @@ class _Surface:
 
     def rim_mm(self, plane: Plane) -> float:
         """The length of a plane's rim where it is seen."""
-        heights = self._heights_mm(plane)
-        return float(measure_rim(self.faces, heights, dot(self.normals, plane.normal), self.areas_mm2, self.seen, 0.0).length_mm)
+        corners_mm, cosines = self._heights_mm(plane)[self.faces], dot(self.normals, plane.normal)
+        return float(sum_chords(corners_mm, cosines, self.areas_mm2, self.seen, 0.0).length_mm)
 
     def _heights_mm(self, plane: Plane) -> Floats:
         heights: Floats = plane.heights_mm(self.vertices)

@@ -16,7 +16,7 @@ from math import ceil, cos, inf, radians
 import numpy as np
 
 from mdp.cost.cost import weight_of_stairs
-from mdp.cost.footing import SMALL_BASE, Footing, Plate
+from mdp.cost.footing import SMALL_BASE, BuildPlate, Footing
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import Orientation, facet_orientations, standing_still, straight_orientations
 from mdp.directions.revolution import find_revolution
@@ -203,7 +203,7 @@ def _with_footing(
     angle_deg = profile.process.self_supporting_angle_deg
     upright, *others = *facet_orientations(mesh, angle_deg), *straight_orientations(mesh, angle_deg)
     worst_mm2 = max(orientation.risky_mm2 + orientation.stairs_mm2 for orientation in [upright, *others])
-    plate = Plate.under(mesh, profile)
+    plate = BuildPlate.under(mesh, profile)
     standing = plate.footing(upright.rotation)
     held = standing.held(of_file=True)
     keep = held and not for_person
@@ -229,7 +229,7 @@ def _with_footing(
     return [(upright, standing), *distinct]
 
 
-def _that_may_hold(orientations: list[Orientation], plate: Plate, on_face: bool) -> list[Orientation]:
+def _that_may_hold(orientations: list[Orientation], plate: BuildPlate, on_face: bool) -> list[Orientation]:
     """Those that the model's hull does not rule out: the plate may hold it, with on_face on more than a tip."""
     if not orientations:
         return []
@@ -241,7 +241,9 @@ def _that_may_hold(orientations: list[Orientation], plate: Plate, on_face: bool)
     return [orientations[k] for k in np.flatnonzero(able)]
 
 
-def _cheapest_first(orientations: Sequence[Orientation], plate: Plate, profile: Profile) -> Iterator[tuple[Orientation, Footing]]:
+def _cheapest_first(
+    orientations: Sequence[Orientation], plate: BuildPlate, profile: Profile
+) -> Iterator[tuple[Orientation, Footing]]:
     """Orientations by the sum of their guessed cost and their footing's, equal sums in the order given.
 
     A footing takes a hundred times as long as a guess and never lowers the sum, so it is measured only when the guess comes up.

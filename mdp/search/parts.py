@@ -13,7 +13,7 @@ from mdp.ranking.node import Node
 from mdp.ranking.ranker import CLASSIC
 from mdp.search.problem import Problem
 from mdp.support_need.patches import CARRIES_ITSELF
-from mdp.sweep.rims import NO_RIM
+from mdp.sweep.crossing import NO_RIM
 from mdp.zone import NOWHERE, ZonesOnModel
 from profiles.machine import Machine
 
@@ -32,7 +32,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     """Parts in print order: what remains first, then the cuts, last one first."""
     machine, clearance = problem.machine, problem.settings.clearance
     bases = [PLATFORM, *reversed(node.planes)]
-    pieces = [node.piece, *(node.places.surface.piece(cut.part) for cut in reversed(node.cuts))]
+    pieces = [node.piece, *(node.places.piece(cut.part) for cut in reversed(node.cuts))]
     before = node.path[::-1]  # for each part but the first the node that it was cut off
 
     def allowed(position: int, near_turn_deg: float | None = None) -> list[Pose]:
@@ -52,7 +52,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
     seams = (NO_RIM, *reversed(node.seams))
     zones, terms, parts = node.places.zones, node.terms, []
     for position, (base, piece, pose) in enumerate(zip(bases, pieces, chosen, strict=True)):
-        mesh, needs = piece.mesh, None if terms.need is None else terms.need.pieces(piece)
+        mesh, needs = piece.mesh, None if terms.need is None else terms.need.pieces(piece.mesh, piece.sources)
         risky = risky_above(mesh, base, terms.angle_deg) if position else node.remainder.risky
         upright: Mask | None = None
         if needs is not None:

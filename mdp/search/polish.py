@@ -12,11 +12,11 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from mdp.cost.forecast import Surface
+from mdp.cost.forecast import Forecast
 from mdp.cost.symmetry import Mirror
 from mdp.cut import passing_places
-from mdp.directions.frame import framed
 from mdp.directions.orientation import diameter_mm
+from mdp.directions.unit_vectors import framed
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
@@ -122,7 +122,7 @@ def _drop_cuts(problem: Problem, best: Node) -> Node:
     position = len(problem.start.cuts)
     while position < len(best.planes) and not problem.late():
         before, planes = best.path[position], best.planes[position:]
-        surface, shorter = Surface.of(before.remainder, before.terms), None
+        surface, shorter = Forecast.of(before.remainder, before.terms), None
         if surface.left_mm2(planes[1:]) <= surface.left_mm2(planes) + SAME_MM2:
             shorter = problem.replay(before, planes[1:])
         if shorter is not None and shorter.cost_mm2 <= best.cost_mm2 + SAME_MM2:
@@ -139,7 +139,7 @@ def refine_planes(problem: Problem, best: Node) -> Node:
         if problem.late():
             break
         before = best.path[position]
-        surface = Surface.of(before.remainder, before.terms)
+        surface = Forecast.of(before.remainder, before.terms)
         ever_better = list(_climb(problem, surface, best, position))
         for planes in ever_better[: -TRIES - 1 : -1]:
             if problem.late() or before.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
@@ -163,7 +163,7 @@ def _add_cuts(problem: Problem, node: Node) -> Node:
     return node
 
 
-def _climb(problem: Problem, surface: Surface, last: Node, position: int) -> Iterator[list[Plane]]:
+def _climb(problem: Problem, surface: Forecast, last: Node, position: int) -> Iterator[list[Plane]]:
     """Ever better planes from a position on, the first of them moved, the best ones last. surface: before the cut there."""
     here, *later = last.planes[position:]
     classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own
@@ -187,7 +187,7 @@ def _neighbours(problem: Problem, plane: Plane, pivots: Floats, share: float, tu
     without a shift, and about the others without one."""
     step_mm = share * problem.settings.offset_step_mm
     yield from (replace(plane, offset_mm=plane.offset_mm + shift) for shift in (-step_mm, step_mm))
-    ((aside, across),) = framed(plane.normal[None], problem.axes).frames
+    ((aside, across),) = framed(plane.normal[None], problem.axes)[1]
     for lean in (-aside, aside, -across, across):
         normal = cos(radians(turn_deg)) * plane.normal + sin(radians(turn_deg)) * lean
         for number, pivot in enumerate(pivots):

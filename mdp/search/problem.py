@@ -9,7 +9,6 @@ import numpy as np
 
 from mdp.clearance import allowed_poses, passes_clear
 from mdp.cost.cost import CostTerms, CutCost, SeamPlaces, weight_of_stairs
-from mdp.cost.model_need import ModelNeed, ModelSurface
 from mdp.cut import Solid, below, cut, mesh_of, solid_of
 from mdp.directions.flats import Flats
 from mdp.directions.orientation import diameter_mm
@@ -35,10 +34,8 @@ from mdp.ranking.node import Node
 from mdp.ranking.ranking import CandidateTable, Model
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
-from mdp.sweep.cylinders import spoiled_by_cuts
-from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.limbs import LimbSums, limb_faces, limb_vertices, sum_limbs
-from mdp.sweep.sweep import Gains, gains
+from mdp.sweep.sweep import Gains, gains, unavoidable_faces
 from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -61,10 +58,9 @@ class Problem:
         self.place_mm = np.array([*profile.process.place_mm, 0.0])
         self.mesh, self.zones = mesh, zones.on(mesh)
         solid = solid_of(mesh, apart=self.zones.by_face)
-        surface, need = ModelSurface.of(mesh, solid), None
+        need = None
         if settings.objective == "scar":
-            support_need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight, self.zones.support.touched(mesh))
-            need = ModelNeed(support_need, self.zones.no_support)
+            need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight, self.zones)
         self.terms = CostTerms(
             angle_deg=profile.process.self_supporting_angle_deg,
             count_platform_faces=settings.count_platform_faces,
@@ -75,11 +71,7 @@ class Problem:
             feature_mm2=settings.feature_mm2,
             need=need,
         )
-        cylinders = spoiled_by_cuts(mesh) if settings.feature_mm2 > 0.0 or settings.feature_weight > 1.0 else ()
-        places = SeamPlaces.of(
-            surface, solid, settings.hidden_seam_share, self.zones, cylinders=cylinders, feature_weight=settings.feature_weight
-        )
-        self.root = self.start = Node(solid, self.terms, places)
+        self.root = self.start = Node(solid, self.terms, SeamPlaces.of(mesh, solid, settings, self.zones))
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.platform_disc = platform_disc(mesh, settings)
@@ -107,7 +99,7 @@ class Problem:
     @property
     def axes(self) -> Floats:
         """(3, 3) rows: the axes of a frame that turns about z with the model; on the paper's terms those of the workpiece."""
-        return np.eye(3) if self.terms.need is None else self.terms.need.need.axes
+        return np.eye(3) if self.terms.need is None else self.terms.need.axes
 
     @cached_property
     def flats(self) -> Flats:
@@ -151,12 +143,11 @@ class Problem:
         with what no cut can save, for features; limits: of some directions in place of all."""
         limits = self.limits if limits is None else limits
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
-        hopeless = None
+        unavoidable = None
         if described:
             least_mm = np.where(np.isfinite(self.limits.least_height_mm), self.limits.least_offset_mm, np.inf)
-            savers = Savers(self.limits.directions, least_mm, threshold(self.terms.angle_deg))
-            hopeless = hopeless_faces(node.remainder.facets, savers)
-        scored = score_candidates(node.remainder, limits, self.terms, least_mm2, hopeless)
+            unavoidable = unavoidable_faces(node.remainder, self.limits.directions, least_mm, threshold(self.terms.angle_deg))
+        scored = score_candidates(node.remainder, limits, self.terms, least_mm2, unavoidable)
         self._evaluated.append(scored.evaluated)
         if node is self.root and limits is self.limits:
             self._root_scored = scored
@@ -213,11 +204,11 @@ class Problem:
 
     def stress_mpa(self, node: Node, plane: Plane) -> float:
         """The stress at the base of what lies above a plane when the nozzle pushes its top."""
-        remainder, crumb_mm = node.remainder, sqrt(self.settings.least_interface_mm2)
+        remainder, fragment_mm = node.remainder, sqrt(self.settings.least_interface_mm2)
         if plane.limbs_mm is None:
-            stress = stress_per_newton(remainder.mesh, plane, crumb_mm)
+            stress = stress_per_newton(remainder.mesh, plane, fragment_mm)
         else:
-            stress = stress_per_newton(remainder.facets.mesh, plane, crumb_mm, limb_vertices(remainder, plane))
+            stress = stress_per_newton(remainder.facets.mesh, plane, fragment_mm, limb_vertices(remainder, plane))
         return self.settings.nozzle_load_n * stress
 
     def cut(self, node: Node, plane: Plane, cost: CutCost | None = None) -> Node | None:

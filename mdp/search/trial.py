@@ -13,8 +13,7 @@ from math import inf
 import numpy as np
 
 from mdp.clearance import lowest_body, places_met
-from mdp.cost.forecast import Surface
-from mdp.cost.part_forecast import PartForecast, forecast_parts
+from mdp.cost.forecast import Forecast, PartForecast
 from mdp.cut import Solid, above, below, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP
@@ -83,7 +82,7 @@ class Trials:
         lifted = on_pedestal(mesh, profile.search.pedestal_mm)
         self._problem = problem = Problem(lifted, with_search(profile, hidden_seam_share=1.0), zones)
         self._node = root = problem.root  # after the cuts of the last trial
-        self._surface = Surface.of(root.remainder, problem.terms, root.seam_weights)
+        self._surface = Forecast.of(root.remainder, problem.terms, root.seam_weights)
         self._keys: list[Key] = []  # of the planes of these cuts as they were asked for
 
     def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
@@ -97,11 +96,11 @@ class Trials:
         if refused is None and done < len(order):
             refused = self._look(order[done])
         if refused is not None:
-            parts, _ = forecast_parts(self._surface, self._named(order[:done]))
+            parts, _ = self._surface.parts(self._named(order[:done]))
             obstacle = find_refused(self._problem, refused, order[done])
             unknown = [None] * (len(order) - done)
             return Trial((*unknown, *parts[::-1]), len(order) + 1 - done, refused.text, obstacle=obstacle)
-        parts, left_mm2 = forecast_parts(self._surface, self._named(order))
+        parts, left_mm2 = self._surface.parts(self._named(order))
         support_mm2, seam_mm = left_mm2 + sum(part.support_mm2 for part in parts), sum(part.rim_mm for part in parts)
         return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=max(len(order) - 1 - done, 0))
 

@@ -23,55 +23,66 @@ END = 1e-7  # share of an edge that is its end
 MOST_STEPS = 1000  # over faces, about a vertex or down; never reached by a sound mesh
 DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
 UNSEEN = -1  # no vertex
+Pool = tuple[Ints, Ints]  # from which bottom, one with a way out, each vertex was seen, UNSEEN else, and room (n,)
 Vector = tuple[float, float, float]
 
 
-class View(NamedTuple):
-    """A surface along a direction (3,): the heights of its vertices (n,), the cosines of its faces' normals with the direction
-    (m,), the number of the patch that each face belongs to (m,), and the height up to which it rests on something.
-    point: (3,) mm, where the way down has come to; written by it."""
+class Underside(NamedTuple):
+    """What of a surface overhangs along a direction (3,), seen in a frame across it (2, 3): the heights of the vertices (n,), the
+    cosines of the faces' normals with the direction (m,), and the height up to which the surface rests on something.
+
+    Overhanging faces that hang together are a patch, numbered from 1: number (m,) is that of each face, the faces of patch p are
+    faces[starts[p] : starts[p + 1]]; held (k,): whether an anchor holds it, UNKNOWN until it is asked for; waiting (k,): room for
+    patches to look at. point: (3,) mm, where the way down has come to; written by it."""
 
     surface: LinkedFaces
     direction: Floats
+    frame: Floats
     heights: Floats
     cosines: Floats
-    number: Ints
     base_mm: float
+    number: Ints
+    faces: Ints
+    starts: Ints
+    held: Ints
+    waiting: Ints
     point: Floats
 
 
 @helper
-def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
+def descend(under: Underside, f: int, corner: int, share: float, own: int) -> int:
     """The way down a face from a place on its edge: ANCHORED where it goes ANCHOR_MM deep, to the base or to what has solid
     beneath it; the number of the patch on which it ends before, LOOSE where that is the own one or none."""
-    surface, heights = view.surface, view.heights
-    height = _put(view, f, corner, share)
-    deep = max(height - ANCHOR_MM + ROUNDING_MM, view.base_mm)
+    surface, heights = under.surface, under.heights
+    height = _put(under, f, corner, share)
+    deep = max(height - ANCHOR_MM + ROUNDING_MM, under.base_mm)
     for _ in range(MOST_STEPS):
         if height <= deep:
             return ANCHORED
-        if view.cosines[f] ** 2 >= 1.0 - LEVEL**2:
-            return _end_on_face(view, f, own)
-        corner, share = _leave(surface, view.direction, view.point, f)
+        if under.cosines[f] ** 2 >= 1.0 - LEVEL**2:
+            if under.cosines[f] > 0.0:
+                return ANCHORED
+            return int(under.number[f]) if _is_others(under, f, own) else LOOSE
+        corner, share = _leave(surface, under.direction, under.point, f)
         if corner >= 0 and END < share < 1.0 - END:
-            height = _put(view, f, corner, share)
+            height = _put(under, f, corner, share)
             g = surface.neighbours[f, corner]
-            if g >= 0 and outflow(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3])) <= ASIDE:
+            if g >= 0 and outflow(under, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3])) <= ASIDE:
                 f = g
                 continue
-        v = _lower_end(view, f, corner, share)
+        v = _lower_end(under, f, corner, share)
         g = f
         while g >= 0 and heights[v] > deep:  # from vertex to vertex, as far as edges are steeper than faces
             f = g
-            g, w = _steepest(view, f, v)
+            g, w = _steepest(under, f, v)
             if g < 0:
-                return _end_at_vertex(view, f, v, own)
+                return _end_at_vertex(under, f, v, own)
             if w == v:
                 break
             v = w
         f, height = g, heights[v]
         for axis in range(3):
-            view.point[axis] = surface.vertices[axis, v]
+            under.point[axis] = surface.vertices[axis, v]
     return LOOSE
 
 
@@ -82,9 +93,9 @@ def corner_of(surface: LinkedFaces, f: int, v: int) -> int:
 
 
 @helper
-def outflow(view: View, f: int, corner: int) -> float:
+def outflow(under: Underside, f: int, corner: int) -> float:
     """How fast water on a face runs out over the edge that begins at a corner; below 0: away from it."""
-    vertices, faces, normals, d = view.surface.vertices, view.surface.faces, view.surface.normals, view.direction
+    vertices, faces, normals, d = under.surface.vertices, under.surface.faces, under.surface.normals, under.direction
     a, b = faces[f, corner], faces[f, (corner + 1) % 3]
     x, y, z = vertices[0, b] - vertices[0, a], vertices[1, b] - vertices[1, a], vertices[2, b] - vertices[2, a]
     p, q, r = _across((x, y, z), (normals[0, f], normals[1, f], normals[2, f]))
@@ -101,13 +112,13 @@ def _across(edge: Vector, normal: Vector) -> Vector:
 
 
 @no_nrt
-def _put(view: View, f: int, corner: int, share: float) -> float:
+def _put(under: Underside, f: int, corner: int, share: float) -> float:
     """Go to a place on the edge that begins at a corner; its height."""
-    a, b = view.surface.faces[f, corner], view.surface.faces[f, (corner + 1) % 3]
+    a, b = under.surface.faces[f, corner], under.surface.faces[f, (corner + 1) % 3]
     for axis in range(3):
-        begin = view.surface.vertices[axis, a]
-        view.point[axis] = begin + share * (view.surface.vertices[axis, b] - begin)
-    return float(view.heights[a] + share * (view.heights[b] - view.heights[a]))
+        begin = under.surface.vertices[axis, a]
+        under.point[axis] = begin + share * (under.surface.vertices[axis, b] - begin)
+    return float(under.heights[a] + share * (under.heights[b] - under.heights[a]))
 
 
 @helper
@@ -133,10 +144,10 @@ def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int,
 
 
 @no_nrt
-def _lower_end(view: View, f: int, corner: int, share: float) -> int:
+def _lower_end(under: Underside, f: int, corner: int, share: float) -> int:
     """The vertex where water goes on: the end of an edge at which it is, or else the lower one; of a face with no way out its
     lowest corner."""
-    faces, heights = view.surface.faces, view.heights
+    faces, heights = under.surface.faces, under.heights
     if corner < 0:
         v = faces[f, 0]
         for k in range(1, 3):
@@ -161,19 +172,20 @@ def _turn(surface: LinkedFaces, first: int, f: int, v: int, forward: bool) -> tu
 
 
 @helper
-def _steepest(view: View, first: int, v: int) -> tuple[int, int]:
+def _steepest(under: Underside, first: int, v: int) -> tuple[int, int]:
     """Where water leaves a vertex: a face and the vertex itself, or a face and the other end of its edge; -1: nowhere."""
-    surface, best, way, end = view.surface, LEVEL, -1, v
+    surface, best, way, end = under.surface, LEVEL, -1, v
     f, forward = first, True
     for _ in range(MOST_STEPS):
         corner = corner_of(surface, f, v)
         for k in range(1, 3):
             w = surface.faces[f, (corner + k) % 3]
-            slope = _slope(view, v, w)
+            slope = _slope(under, v, w)
             if slope > best:
                 best, way, end = slope, f, w
-        slope = np.sqrt(max(1.0 - view.cosines[f] ** 2, 0.0))
-        if slope >= best and _begins_within(view, f, corner):
+        slope = np.sqrt(max(1.0 - under.cosines[f] ** 2, 0.0))
+        within = outflow(under, f, corner) <= ASIDE and outflow(under, f, (corner + 2) % 3) <= ASIDE
+        if slope >= best and within and surface.areas_mm2[f] > 0.0:
             best, way, end = slope, f, v
         f, forward = _turn(surface, first, f, v, forward)
         if f < 0:
@@ -182,54 +194,32 @@ def _steepest(view: View, first: int, v: int) -> tuple[int, int]:
 
 
 @no_nrt
-def _slope(view: View, v: int, w: int) -> float:
+def _slope(under: Underside, v: int, w: int) -> float:
     """How steep it goes down from one vertex to another."""
     length = 0.0
     for axis in range(3):
-        length += (view.surface.vertices[axis, w] - view.surface.vertices[axis, v]) ** 2
-    return float((view.heights[v] - view.heights[w]) / np.sqrt(length)) if length > 0.0 else 0.0
-
-
-@helper
-def _begins_within(view: View, f: int, corner: int) -> bool:
-    """Whether water at a corner of a face runs into it: out over neither of the edges there."""
-    before = (corner + 2) % 3
-    return outflow(view, f, corner) <= ASIDE and outflow(view, f, before) <= ASIDE and view.surface.areas_mm2[f] > 0.0
+        length += (under.surface.vertices[axis, w] - under.surface.vertices[axis, v]) ** 2
+    return float((under.heights[v] - under.heights[w]) / np.sqrt(length)) if length > 0.0 else 0.0
 
 
 @no_nrt
-def _end_on_face(view: View, f: int, own: int) -> int:
-    """What a way comes to that ends on a level face."""
-    if view.cosines[f] > 0.0:
-        return ANCHORED
-    return int(view.number[f]) if _is_others(view, f, own) else LOOSE
-
-
-@no_nrt
-def _is_others(view: View, f: int, own: int) -> bool:
+def _is_others(under: Underside, f: int, own: int) -> bool:
     """Whether a face belongs to another patch."""
-    return bool(view.number[f] != SAFE and view.number[f] != own)
+    return bool(under.number[f] != SAFE and under.number[f] != own)
 
 
 @no_nrt
-def _end_at_vertex(view: View, first: int, v: int, own: int) -> int:
+def _end_at_vertex(under: Underside, first: int, v: int, own: int) -> int:
     """What a way comes to that ends at a vertex: a patch about it, or else the solid beneath a pit."""
     f, forward, pit = first, True, False
     for _ in range(MOST_STEPS):
-        if _is_others(view, f, own):
-            return int(view.number[f])
-        pit = pit or view.cosines[f] > 0.0
-        f, forward = _turn(view.surface, first, f, v, forward)
+        if _is_others(under, f, own):
+            return int(under.number[f])
+        pit = pit or under.cosines[f] > 0.0
+        f, forward = _turn(under.surface, first, f, v, forward)
         if f < 0:
             break
     return ANCHORED if pit else LOOSE
-
-
-class Pool(NamedTuple):
-    """seen (n,): from which bottom, one with a way out, a vertex was seen, UNSEEN else; queue (n,): room."""
-
-    seen: Ints
-    queue: Ints
 
 
 @no_nrt
@@ -238,7 +228,7 @@ def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool
     for f in patch:
         for k in range(3):
             v = surface.faces[f, k]
-            candidate = pool.seen[v] == UNSEEN and heights[v] > base_mm and _is_bottom(surface, heights, v)
+            candidate = pool[0][v] == UNSEEN and heights[v] > base_mm and _is_bottom(surface, heights, v)
             if candidate and not _has_way_out(surface, heights, v, pool, base_mm):
                 return True
     return False
@@ -257,7 +247,7 @@ def _is_bottom(surface: LinkedFaces, heights: Floats, v: int) -> bool:
 def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool, base_mm: float) -> bool:
     """Whether what hangs together with a bottom and lies no higher than DIP_MM above it goes on below it or to the base. If so,
     it has been seen, as far as one had to look."""
-    seen, queue = pool.seen, pool.queue
+    seen, queue = pool
     low = heights[bottom] - ROUNDING_MM
     seen[bottom], queue[0] = bottom, bottom
     at, count = 0, 1
@@ -265,7 +255,9 @@ def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool,
         v = queue[at]
         for k in range(surface.starts[v], surface.starts[v + 1]):
             w = surface.around[k]
-            if heights[w] < low or heights[w] <= base_mm or _leads_out(seen[w], bottom, heights):
+            other = seen[w]  # another bottom as low, which has a way out
+            known = other != UNSEEN and other != bottom and abs(heights[other] - heights[bottom]) <= ROUNDING_MM
+            if known or heights[w] < low or heights[w] <= base_mm:
                 return True
             if seen[w] != bottom and heights[w] <= heights[bottom] + DIP_MM:
                 seen[w], queue[count] = bottom, w
@@ -274,9 +266,3 @@ def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool,
     for k in range(count):
         seen[queue[k]] = UNSEEN
     return False
-
-
-@no_nrt
-def _leads_out(seen_bottom: int, bottom: int, heights: Floats) -> bool:
-    """Whether another bottom as low, which has a way out, has been found."""
-    return bool(seen_bottom != UNSEEN and seen_bottom != bottom and abs(heights[seen_bottom] - heights[bottom]) <= ROUNDING_MM)

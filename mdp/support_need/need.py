@@ -5,9 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mdp.directions.frame import AXES, framed
 from mdp.directions.orientation import azimuth_rad
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import AXES, framed, spread
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, threshold
@@ -15,8 +14,11 @@ from mdp.pose import about
 from mdp.support_need.over_air import find_over_air
 from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Limits, classify
 from mdp.topology.edges import LinkedFaces, flat_places, link
+from mdp.zone import NOWHERE, UNMARKED, Marked, ZonesOnModel
 from profiles.process import Process
 
+MADE_BY_A_CUT = -1  # the source of a face that a cut laid open
+NO_SUPPORT_WEIGHT = 100.0  # of an area that needs support where a person wants none
 MOST_CACHED = 256  # single directions whose classes are cached; a polished plane comes back to the same few again and again
 LEVEL_LAYERS = 2.0  # a patch no higher than this is printed as one bridge
 NO_BASE_MM = -np.inf
@@ -49,7 +51,8 @@ class SupportNeed:
     """The faces of a whole model that need support, for all directions a search asks for.
 
     weight: how many times an area over air counts, which support can only be given by leaning or from support of other parts;
-    enforced: (m,) faces that a person wants supported where they overhang, also where they carry themselves.
+    enforced: (m,) faces that a person wants supported where they overhang, also where they carry themselves; no_support: where an
+    area that needs it counts NO_SUPPORT_WEIGHT times, for it would hang.
     """
 
     surface: LinkedFaces
@@ -57,14 +60,24 @@ class SupportNeed:
     weight: float
     axes: Floats
     enforced: Mask
-    _cached: dict[bytes, Classes] = field(default_factory=dict)
+    no_support: Marked = UNMARKED
+    _rows: dict[bytes, Classes] = field(default_factory=dict)
     _tables: dict[bytes, Classes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, mesh: Mesh, process: Process, weight: float, enforced: Mask | None = None) -> "SupportNeed":
-        """The need of a model that stands on the platform; enforced: None: no face is."""
-        enforced = np.zeros(len(mesh.faces), dtype=np.bool_) if enforced is None else enforced
-        return cls(link(mesh), process, weight, about(UP, azimuth_rad(mesh)).T, enforced)
+    def of(cls, mesh: Mesh, process: Process, weight: float, zones: ZonesOnModel = NOWHERE) -> "SupportNeed":
+        """The need of a model that stands on the platform."""
+        axes = about(UP, azimuth_rad(mesh)).T
+        return cls(link(mesh), process, weight, axes, zones.support.touched(mesh), zones.no_support)
+
+    def pieces(self, mesh: Mesh, sources: Ints) -> "ModelPieces":
+        """The faces of what was cut from the model, and of which of its own they are pieces. manifold3d may number a few more
+        than the model has: they count as made by a cut."""
+        sources = np.where(sources < len(self.surface.faces), sources, np.int32(MADE_BY_A_CUT))
+        if not self.no_support.anywhere:
+            return ModelPieces(self, sources)
+        barred = self.no_support.among(sources).touched(mesh)
+        return ModelPieces(self, sources, np.where(barred, NO_SUPPORT_WEIGHT, 1.0))
 
     @cached_property
     def upright(self) -> Mask:
@@ -76,25 +89,22 @@ class SupportNeed:
         """(k, m) for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, meant for the faces that are
         risky along it. Planes of later cuts are not looked at: what a face needs depends on nothing but face and direction."""
         if len(directions) > FEW:
-            key = directions.tobytes()
-            table = self._tables.get(key)
-            return table if table is not None else self._tables.setdefault(key, self._classes(directions))
-        rows = [self._row(direction) for direction in directions]
-        return np.stack(rows) if rows else np.zeros((0, len(self.surface.faces)), np.uint8)
+            return self._looked_up(self._tables, directions)
+        rows = [self._looked_up(self._rows, direction[None]) for direction in directions]
+        return np.concatenate(rows) if rows else np.zeros((0, len(self.surface.faces)), np.uint8)
 
-    def _row(self, direction: Floats) -> Classes:
-        """(m,) for one direction; cached for a while."""
-        key = direction.tobytes()
-        row = self._cached.get(key)
-        if row is None:
-            row = self._classes(direction[None])[0]
-            if len(self._cached) >= MOST_CACHED:
-                self._cached.clear()
-            self._cached[key] = row
-        return row
+    def _looked_up(self, known: dict[bytes, Classes], directions: Floats) -> Classes:
+        key = directions.tobytes()
+        classes = known.get(key)
+        if classes is None:
+            classes = self._classes(directions)
+            if len(known) >= MOST_CACHED:
+                known.clear()
+            known[key] = classes
+        return classes
 
     def _classes(self, directions: Floats) -> Classes:
-        nearest = np.argsort(-(directions @ self._coarse.T), axis=1, kind="stable")[:, :LEANS].T
+        nearest = np.argsort(-(directions @ (COARSE @ self.axes).T), axis=1, kind="stable")[:, :LEANS].T
         over_air = self._over_air[nearest[0]]
         for lean in nearest[1:]:
             over_air &= self._over_air[lean]
@@ -105,16 +115,12 @@ class SupportNeed:
         return classes
 
     @cached_property
-    def _coarse(self) -> Floats:
-        """(37, 3) the coarse directions, turned with the model."""
-        return COARSE @ self.axes
-
-    @cached_property
     def _over_air(self) -> Classes:
-        """(37, m) which faces are over air along each of the coarse directions, flat places as a whole: of their faces what
-        cuts leave remembers but one."""
+        """(37, m) which faces are over air along each of the coarse directions, turned with the model, flat places as a whole: of
+        their faces what cuts leave remembers but one."""
         over_air = np.zeros((len(COARSE), len(self.surface.faces)), np.uint8)
-        in_threads(find_over_air, len(COARSE), self.surface, flat_places(self.surface), framed(self._coarse, self.axes), over_air)
+        surface = self.surface, flat_places(self.surface)
+        in_threads(find_over_air, len(COARSE), surface, framed(COARSE @ self.axes, self.axes), over_air)
         return over_air
 
 

@@ -7,7 +7,6 @@ places of a raster, and look up as a whole, so that it does not matter how they 
 
 import numpy as np
 
-from mdp.directions.frame import FramedDirections
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints
@@ -30,16 +29,17 @@ LOW, HIGH, SAMPLED, AIRY, AREA, AIRY_AREA = range(6)
 
 @kernel
 def find_over_air(
-    begin_row: int, end_row: int, surface: LinkedFaces, places: Ints, along: FramedDirections, out: Classes
+    begin_row: int, end_row: int, flat: tuple[LinkedFaces, Ints], framed: tuple[Floats, Floats], out: Classes
 ) -> None:
-    """Which faces that look down are over air, 0 or 1, for each direction (k, m). places: (m,) from flat_places; each is one or
-    the other as a whole."""
+    """Which faces that look down are over air, 0 or 1, for each direction, with the frames across them (k, m). flat: a surface
+    and its flat_places (m,); each is one or the other as a whole."""
+    (surface, places), (directions, frames) = flat, framed
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     seen, count = table(vertices.shape[1], 3), len(faces)
     facing = floats(count, 0.0)
     for row in range(begin_row, end_row):
-        d = along.directions[row]
-        cell = _see(vertices, d, along.frames[row], seen)
+        d = directions[row]
+        cell = _see(vertices, d, frames[row], seen)
         counts = table(6, count)
         _find_extents(seen, faces, places, counts)
         lowest = floats((CELLS + 2) * (CELLS + 2), np.inf)
@@ -49,15 +49,17 @@ def find_over_air(
                 _lay(seen, faces[f], counts[LOW, places[f]], counts[HIGH, places[f]], lowest)
         for f in range(count):
             if facing[f] < 0.0:
-                _sample(seen, faces[f], lowest, 1e-3 * cell, places[f], counts)
+                sampled, airy = _sample(seen, faces[f], lowest, 1e-3 * cell)
+                counts[SAMPLED, places[f]] += sampled
+                counts[AIRY, places[f]] += airy
         for f in range(count):
             if facing[f] < 0.0 and counts[SAMPLED, places[f]] < FEW_SAMPLES:
                 counts[AREA, places[f]] += surface.areas_mm2[f]
                 counts[AIRY_AREA, places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
         for f in range(count):
             p = places[f]
-            airy, of = (AIRY_AREA, AREA) if counts[SAMPLED, p] < FEW_SAMPLES else (AIRY, SAMPLED)
-            out[row, f] = int(counts[airy, p] > MOST * counts[of, p])
+            part, of = (AIRY_AREA, AREA) if counts[SAMPLED, p] < FEW_SAMPLES else (AIRY, SAMPLED)
+            out[row, f] = int(counts[part, p] > MOST * counts[of, p])
 
 
 @no_nrt
@@ -79,14 +81,14 @@ def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
 
 
 @no_nrt
-def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: int, counts: Floats) -> None:
-    """Look down from those places of a raster that lie on a face, one row after the other."""
-    a, b, c = face[0], face[1], face[2]
+def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> tuple[int, int]:
+    """How many places of a raster lie on a face, and how many of them over air."""
+    a, b, c, sampled, airy = face[0], face[1], face[2], 0, 0
     ux, uy, uz = seen[b, 0] - seen[a, 0], seen[b, 1] - seen[a, 1], seen[b, 2] - seen[a, 2]
     vx, vy, vz = seen[c, 0] - seen[a, 0], seen[c, 1] - seen[a, 1], seen[c, 2] - seen[a, 2]
     twice = ux * vy - uy * vx
     if abs(twice) < TINY:
-        return
+        return 0, 0
     slope_x, slope_y = (uz * vy - vz * uy) / twice, (vz * ux - uz * vx) / twice
     low, high = min(seen[a, 1], seen[b, 1], seen[c, 1]), max(seen[a, 1], seen[b, 1], seen[c, 1])
     for j in range(int(low / RASTER), int(high / RASTER) + 1):
@@ -100,8 +102,9 @@ def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, patch: in
             for i in range(int(np.ceil(begin / RASTER - ASIDE)), int(np.ceil(end / RASTER - ASIDE))):
                 x = (i + ASIDE) * RASTER
                 z = seen[a, 2] + slope_x * (x - seen[a, 0]) + slope_y * (y - seen[a, 1])
-                counts[SAMPLED, patch] += 1.0
-                counts[AIRY, patch] += int(_is_airy(lowest, x, y, z - slack_mm))
+                sampled += 1
+                airy += int(_is_airy(lowest, x, y, z - slack_mm))
+    return sampled, airy
 
 
 @no_nrt

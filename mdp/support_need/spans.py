@@ -18,7 +18,7 @@ TURNS = 8  # directions tried over half a turn, besides those of the place's own
 BINS = 36  # of directions of the sides, over half a turn
 BESIDE = 0.37  # of a bin: where in the first one the direction 0 lies; usual angles lie at no end of a bin
 LINES = 24  # over a place at most; else one every line width
-HOPELESS = 0.2  # share of the ends of lines that lie on no anchor, beyond which lines need not be drawn
+MOST_LOOSE = 0.2  # share of the ends of lines that lie on no anchor, beyond which lines need not be drawn
 TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place
 ROUNDING_MM = 0.05  # a span may seem longer by this than it was drawn
 FINE_MM = 0.1  # between two places that are looked at, neither of them too far from an anchor
@@ -44,7 +44,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
         across_mm, loose_mm = _across(sides, cos, sin)
         if (
             area_mm2 <= 0.5 * (longest_mm + ROUNDING_MM) * across_mm  # else the mean line is too long
-            and loose_mm <= HOPELESS * across_mm
+            and loose_mm <= MOST_LOOSE * across_mm
             and _spans_along(sides, cos, sin, longest_mm, width_mm)
         ):
             return True
@@ -142,7 +142,7 @@ def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Float
         count -= 1
         t = todo[count]
         for k in range(3):
-            nearest = _near_anchor(sides, t[2 * k], t[2 * k + 1], reach_mm, nearest)
+            nearest = _anchor_near(sides, t[2 * k : 2 * k + 2], reach_mm, nearest)
             if nearest < 0:
                 return -1
         longest, split = 0.0, 0
@@ -151,7 +151,7 @@ def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Float
             length = (t[2 * n] - t[2 * k]) ** 2 + (t[2 * n + 1] - t[2 * k + 1]) ** 2
             if length > longest:
                 longest, split = length, k
-        if longest > FINE_MM * FINE_MM and not _all_near_one(sides, t, reach_mm, nearest) and count + 2 <= DEEP:
+        if longest > FINE_MM * FINE_MM and _anchor_near(sides, t, reach_mm, nearest) < 0 and count + 2 <= DEEP:
             _halve(todo, count, split)
             count += 2
     return nearest
@@ -168,28 +168,17 @@ def _halve(todo: Floats, at: int, split: int) -> None:
 
 
 @no_nrt
-def _all_near_one(sides: Sides, t: Floats, reach_mm: float, first: int) -> bool:
-    """Whether one anchor lies near all corners of a triangle, and so near all of it."""
-    ends, anchored, count = sides.ends, sides.anchored, len(sides.anchored)
-    for k in range(count):
-        e = (first + k) % count
-        if anchored[e] > 0:
-            near = 0
-            while near < 3 and _is_near(ends, e, t[2 * near], t[2 * near + 1], reach_mm):
-                near += 1
-            if near == 3:
-                return True
-    return False
-
-
-@no_nrt
-def _near_anchor(sides: Sides, x: float, y: float, reach_mm: float, first: int) -> int:
-    """A anchored side within reach of a place, looked for from a side on; -1: none."""
+def _anchor_near(sides: Sides, places: Floats, reach_mm: float, first: int) -> int:
+    """An anchored side within reach of places, x, y, x, y, and so of all between them, looked for from a side on; -1: none."""
     count = len(sides.anchored)
     for k in range(count):
         e = (first + k) % count
-        if sides.anchored[e] > 0 and _is_near(sides.ends, e, x, y, reach_mm):
-            return e
+        if sides.anchored[e] > 0:
+            near = 0
+            while near < len(places) and _is_near(sides.ends, e, places[near], places[near + 1], reach_mm):
+                near += 2
+            if near == len(places):
+                return e
     return -1
 
 

@@ -8,11 +8,9 @@ The surface above the plane falls into shells. One that bounds solid from outsid
 the plane, the wall of a void or of a hole from below a negative one: it belongs to the piece in whose section its own lies.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints, Mesh
@@ -24,24 +22,21 @@ from mdp.topology.components import join, root
 MOMENTS = AREA, X, Y, XX, YY, XY = 0, 1, 2, 3, 4, 5
 
 
-class Section(NamedTuple):
-    """The segments in which k faces cross the plane, x, y, x, y, the solid on the left of each seen from above (k, 4), and the
-    shell that each belongs to (k,)."""
-
-    segments: Floats
-    shells: Ints
+# The segments in which k faces cross the plane, x, y, x, y, the solid on the left of each seen from above (k, 4), and the shell
+# that each belongs to (k,).
+Section = tuple[Floats, Ints]
 
 
-def stress_per_newton(mesh: Mesh, plane: Plane, crumb_mm: float, limb: Mask | None = None) -> float:
+def stress_per_newton(mesh: Mesh, plane: Plane, fragment_mm: float, limb: Mask | None = None) -> float:
     """The greatest stress at a plane, MPa for every newton that pushes the top of a piece above it sideways; infinite where a
-    piece hangs on nothing. Pieces lower than crumb_mm are crumbs. limb: (n,) the vertices of the only pieces that count."""
+    piece hangs on nothing. Pieces lower than fragment_mm are fragments. limb: (n,) the vertices of the only pieces that count."""
     across = (mesh.vertices - mesh.vertices[0]) @ frame_across(plane.normal).T
     counted = np.zeros(0, np.bool_) if limb is None else limb
-    return _most_stress(mesh.faces, plane.heights_mm(mesh.vertices), np.ascontiguousarray(across), crumb_mm, counted)
+    return _most_stress(mesh.faces, plane.heights_mm(mesh.vertices), np.ascontiguousarray(across), fragment_mm, counted)
 
 
 @kernel
-def _most_stress(faces: Ints, heights: Floats, across: Floats, crumb: float, counted: Mask) -> float:
+def _most_stress(faces: Ints, heights: Floats, across: Floats, fragment: float, counted: Mask) -> float:
     shells = _find_shells(faces, heights)
     volumes, section = _measure(faces, heights, across, shells)
     moments, tops, stressed = table(len(heights), len(MOMENTS)), floats(len(heights), -1.0), floats(len(heights), 0.0)
@@ -59,7 +54,7 @@ def _most_stress(faces: Ints, heights: Floats, across: Floats, crumb: float, cou
             stressed[pieces[k]] = max(stressed[pieces[k]], stress)
     most = 0.0
     for v in range(len(heights)):
-        if tops[v] > 0.0 and tops[v] >= crumb:
+        if tops[v] > 0.0 and tops[v] >= fragment:
             most = max(most, tops[v] * stressed[v] if stressed[v] > 0.0 else np.inf)
     return most
 
@@ -94,10 +89,18 @@ def _measure(faces: Ints, heights: Floats, across: Floats, shells: Ints) -> tupl
         if shell >= 0:
             volumes[shell] += _volume(faces, f, heights, across)
             count += int(crosses)
-    section, count = Section(table(count, 4), ints(count, -1)), 0
+    segments, owners, count = table(count, 4), ints(count, -1), 0
     for f in range(len(faces)):
-        count += _cross(faces, f, heights, across, shells, section, count)
-    return volumes, section
+        for k in range(3):
+            v, w = faces[f, k], faces[f, k - 2]
+            if (heights[v] > 0.0) != (heights[w] > 0.0):
+                rising, share = heights[w] > 0.0, heights[v] / (heights[v] - heights[w])
+                owners[count] = shells[w] if rising else shells[v]
+                for axis in range(2):
+                    end = across[v, axis] + share * (across[w, axis] - across[v, axis])
+                    segments[count, 2 * int(rising) + axis] = end
+        count += int(count < len(owners) and owners[count] >= 0)
+    return volumes, (segments, owners)
 
 
 @no_nrt
@@ -113,21 +116,6 @@ def _volume(faces: Ints, f: int, heights: Floats, across: Floats) -> float:
     a, b, c = across[faces[f, 0]], across[faces[f, 1]], across[faces[f, 2]]
     twice = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
     return float(twice * (alone if above == 1 else total - alone) / 6.0)
-
-
-@helper
-def _cross(faces: Ints, f: int, heights: Floats, across: Floats, shells: Ints, section: Section, at: int) -> int:
-    """Put the segment in which a face crosses height 0 at a place of the section; 1 where it does, else 0."""
-    crosses = 0
-    for k in range(3):
-        v, w = faces[f, k], faces[f, k - 2]
-        if (heights[v] > 0.0) != (heights[w] > 0.0):
-            crosses, rising = 1, heights[w] > 0.0
-            share = heights[v] / (heights[v] - heights[w])
-            section.shells[at] = shells[w] if rising else shells[v]
-            for axis in range(2):
-                section.segments[at, 2 * int(rising) + axis] = across[v, axis] + share * (across[w, axis] - across[v, axis])
-    return crosses
 
 
 @helper

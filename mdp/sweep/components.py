@@ -1,4 +1,5 @@
-"""Components: whether the solid below each offset of a direction hangs together with the platform.
+"""Components: whether the solid below each offset of a direction hangs together with the platform, and on what area each piece of
+the solid above it stands (kernels of the sweep).
 
 The surface below a rising plane gains a component at a vertex without a lower neighbour and components join only at a vertex
 whose lower neighbours form several runs around it (PL Morse theory, ties of height broken by number); all other vertices are
@@ -6,37 +7,37 @@ regular and need no look. So the components form a merge tree: its leaves are th
 leaf that walking down from it leads to. A lowest vertex around which solid lies beneath is the floor of a void or bowl, not a
 floating piece: it is joined to its anchor, the surface that a ray into the solid meets, which lies lower. Solids join only where
 surfaces join, so the count of pieces is exact for the solid, closed voids and handles included.
+
+From the top the leaves are the highest vertices, and of two components that join at a saddle on the way down the one of the
+higher leaf goes on. So every leaf is a piece of its own in one run of columns, and the sections of all pieces take one number for
+each column of each run. Only wanted columns with several pieces are looked at: a single piece stands on the whole section.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import floats, int_table, ints
+from mdp.kernels.arrays import floats, int_table, ints, table
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from mdp.overhang import PLATFORM_TOLERANCE_MM
-from mdp.sweep.facets import UNKNOWN, Layout, Rings
-from mdp.sweep.integrals import OffsetGrid, column_over
+from mdp.sweep.crossing import OffsetGrid, column_over
+from mdp.sweep.facets import UNKNOWN, Layout
 from mdp.sweep.rays import ANY_FACE, first_hit
 from mdp.topology.components import root, singletons
 
-
-class View(NamedTuple):
-    """A solid seen along one direction: offsets, (n,) cosines of the vertex normals, and the vertices that are not regular."""
-
-    grid: OffsetGrid
-    cosines: Floats
-    critical: Ints
+LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
 
 
 class MergeTree(NamedTuple):
-    """A merge tree under construction, from below or from above (up): heights of the vertices and the rings around them, the
-    vertices that are not regular, (n,) the leaf that each vertex belongs to (-1: not known), and (n,) room for a path."""
+    """A merge tree of a surface along one direction under construction, from below or from above (up): cosines (n,) of the vertex
+    normals, the vertices that are not regular, (n,) the leaf that each vertex belongs to (-1: not known), and (n,) room for a
+    path."""
 
-    heights: Floats
-    rings: Rings
+    layout: Layout
+    grid: OffsetGrid
+    cosines: Floats
     critical: Ints
     leaf: Ints
     path: Ints
@@ -44,10 +45,9 @@ class MergeTree(NamedTuple):
 
 
 @no_nrt
-def find_critical(cosines: Floats, flatness: Floats, heights: Floats, rings: Rings, critical: Ints) -> int:
+def find_critical(layout: Layout, heights: Floats, cosines: Floats, critical: Ints) -> int:
     """Vertices that are not regular, or have no single ring of neighbours; returns how many. cosines: of vertex normals and d."""
-    starts, neighbours = rings.starts, rings.neighbours
-    many = 0
+    starts, neighbours, flatness, many = layout.starts, layout.neighbours, layout.flatness, 0
     for v in range(len(heights)):
         if abs(cosines[v]) >= flatness[v]:
             turns = 0
@@ -70,16 +70,15 @@ def before(heights: Floats, a: int, b: int, up: bool) -> bool:
 
 
 @helper
-def grow_tree(view: View, rings: Rings, up: bool) -> MergeTree:
+def plant_tree(layout: Layout, grid: OffsetGrid, cosines: Floats, critical: Ints, up: bool) -> MergeTree:
     """A merge tree of which nothing is known yet."""
-    heights = view.grid.heights
-    return MergeTree(heights, rings, view.critical, ints(len(heights), -1), ints(len(heights), 0), up)
+    return MergeTree(layout, grid, cosines, critical, ints(len(cosines), -1), ints(len(cosines), 0), up)
 
 
 @no_nrt
 def find_leaf(tree: MergeTree, v: int) -> int:
     """The leaf of a vertex; labels all vertices on the way. The vertices that are leaves are labelled already."""
-    heights, starts, neighbours = tree.heights, tree.rings.starts, tree.rings.neighbours
+    heights, starts, neighbours = tree.grid.heights, tree.layout.starts, tree.layout.neighbours
     leaf, path, up = tree.leaf, tree.path, tree.up
     length = 0
     while leaf[v] < 0:
@@ -97,13 +96,12 @@ def find_leaf(tree: MergeTree, v: int) -> int:
 @helper
 def number_leaves(tree: MergeTree) -> Ints:
     """Number the vertices at which components begin; returns them."""
-    starts, neighbours = tree.rings.starts, tree.rings.neighbours
-    leaves = ints(len(tree.critical), 0)
-    size = 0
+    starts, neighbours = tree.layout.starts, tree.layout.neighbours
+    leaves, size = ints(len(tree.critical), 0), 0
     for v in tree.critical:
         first = starts[v] < starts[v + 1]
         for at in range(starts[v], starts[v + 1]):
-            first = first and not before(tree.heights, neighbours[at], v, tree.up)
+            first = first and not before(tree.grid.heights, neighbours[at], v, tree.up)
         if first:
             tree.leaf[v], leaves[size] = size, v
             size += 1
@@ -115,18 +113,18 @@ def anchor_of(layout: Layout, v: int) -> int:
     """The face that a ray from a vertex into the solid meets; below 0: none."""
     if layout.anchors[v] == UNKNOWN:
         # Threads may look up the same vertex twice; the answer does not depend on the direction.
-        triangles, inward = layout.triangles, floats(3, 0.0)
+        triangles, inward = layout.triangles, table(2, 3)
         for axis in range(3):
-            inward[axis] = -layout.vertex_normals[axis, v]
-        layout.anchors[v] = first_hit(triangles, triangles.vertices[v], inward, np.inf, v, ANY_FACE)
+            inward[0, axis], inward[1, axis] = triangles.vertices[v, axis], -layout.vertex_normals[axis, v]
+        layout.anchors[v] = first_hit(triangles, inward, np.inf, v, ANY_FACE)
     return int(layout.anchors[v])
 
 
 @helper
-def _anchor_beyond(tree: MergeTree, layout: Layout, v: int, cosine: float) -> int:
+def _anchor_beyond(tree: MergeTree, v: int) -> int:
     """A vertex, passed before, of the face that a ray from the first one of a void into the solid meets; below 0: none."""
-    faces, heights = layout.triangles.faces, tree.heights
-    face = anchor_of(layout, v) if cosine != 0.0 and (cosine < 0.0) == tree.up else -1
+    faces, heights, cosine = tree.layout.triangles.faces, tree.grid.heights, tree.cosines[v]
+    face = anchor_of(tree.layout, v) if cosine != 0.0 and (cosine < 0.0) == tree.up else -1
     if face < 0:
         return -1
     w = faces[face, 0]
@@ -137,26 +135,24 @@ def _anchor_beyond(tree: MergeTree, layout: Layout, v: int, cosine: float) -> in
 
 
 @helper
-def join_leaves(tree: MergeTree, leaves: Ints, layout: Layout, cosines: Floats) -> Ints:
-    """(j, 3): two leaves whose components join, and the vertex at which they do: a saddle, or through solid the first of a void.
-
-    cosines: of vertex normals and the direction.
-    """
-    starts, neighbours, most, size = tree.rings.starts, tree.rings.neighbours, len(leaves), 0
+def join_leaves(tree: MergeTree, leaves: Ints) -> Ints:
+    """(j, 3): two leaves whose components join, and the vertex at which they do: a saddle, or through solid the first of a
+    void."""
+    starts, neighbours, most, size = tree.layout.starts, tree.layout.neighbours, len(leaves), 0
     for v in tree.critical:
         most += starts[v + 1] - starts[v]
     joins = int_table(most, 3)
     for v in tree.critical:
         last = -1
         for at in range(starts[v], starts[v + 1]):
-            if before(tree.heights, neighbours[at], v, tree.up):
+            if before(tree.grid.heights, neighbours[at], v, tree.up):
                 leaf = find_leaf(tree, int(neighbours[at]))
                 if last >= 0 and leaf != last:
                     joins[size, 0], joins[size, 1], joins[size, 2] = last, leaf, v
                     size += 1
                 last = leaf
     for leaf in range(len(leaves)):
-        w = _anchor_beyond(tree, layout, int(leaves[leaf]), cosines[leaves[leaf]])
+        w = _anchor_beyond(tree, int(leaves[leaf]))
         if w >= 0:
             joins[size, 0], joins[size, 1], joins[size, 2] = leaf, find_leaf(tree, w), leaves[leaf]
             size += 1
@@ -173,33 +169,31 @@ def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
 
 
 @no_nrt
-def _stands_on(tree: MergeTree, v: int, vertices: Floats) -> bool:
+def _stands_on(tree: MergeTree, v: int) -> bool:
     """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
-    starts, neighbours = tree.rings.starts, tree.rings.neighbours
-    for at in range(starts[v], starts[v + 1]):
-        w = neighbours[at]
-        if vertices[w, 2] <= PLATFORM_TOLERANCE_MM and before(tree.heights, w, v, False):
+    layout = tree.layout
+    for at in range(layout.starts[v], layout.starts[v + 1]):
+        w = layout.neighbours[at]
+        if layout.triangles.vertices[w, 2] <= PLATFORM_TOLERANCE_MM and before(tree.grid.heights, w, v, False):
             return True
     return False
 
 
 @helper
-def count_pieces(layout: Layout, view: View, pieces: Ints) -> None:
-    """Components below each offset that do not reach the platform."""
-    heights, n = view.grid.heights, view.grid.columns
-    tree = grow_tree(view, layout.rings, n < 0)  # a constant would have all these functions compiled once for every value of it
+def count_pieces(tree: MergeTree, pieces: Ints) -> None:
+    """Components below each offset that do not reach the platform, by a tree from below."""
+    heights, n, standing = tree.grid.heights, tree.grid.columns, tree.layout.standing
     leaves = number_leaves(tree)
-    joins = join_leaves(tree, leaves, layout, view.cosines)
-    size = len(leaves)
+    joins, size = join_leaves(tree, leaves), len(leaves)
     begun, standing_from = ints(size, 0), ints(size, n + 1)
     for leaf in range(size):
         begun[leaf] = min(column_over(heights[leaves[leaf]]), n)
-    for k in range(len(layout.standing)):
-        v = int(layout.standing[k])
-        if not _stands_on(tree, v, layout.triangles.vertices):
+    for k in range(len(standing)):
+        v = int(standing[k])
+        if not _stands_on(tree, v):
             leaf = find_leaf(tree, v)
             standing_from[leaf] = min(standing_from[leaf], min(column_over(heights[v]), n))
-    _count(begun, standing_from, joins, join_columns(joins, view.grid), pieces[:n])
+    _count(begun, standing_from, joins, join_columns(joins, tree.grid), pieces[:n])
 
 
 @helper
@@ -227,3 +221,98 @@ def _count(begun: Ints, standing_from: Ints, joins: Ints, columns: Ints, pieces:
                 stands[here] = 1
                 floating -= 1
         pieces[b] = floating
+
+
+@helper
+def find_contact_areas(tree: MergeTree, fragment: float, wanted: Ints, contact_area: Floats) -> None:
+    """Lower each offset's contact area, given as its section, to the least section of a piece above it that is at least
+    `fragment` steps high, by a tree from above.
+
+    Only at the wanted (n,) offsets.
+    """
+    grid, corners = tree.grid, tree.layout.faces.corners
+    heights, n, points = grid.heights, grid.columns, tree.layout.faces.points
+    leaves = number_leaves(tree)
+    if len(leaves) == 1:
+        return
+    joins = join_leaves(tree, leaves)
+    begun, ended, elder = _find_lifetimes(leaves, joins, grid)
+    several = _count_several(begun, ended, wanted)
+    if several[n] == 0:
+        return
+    starts = ints(len(leaves) + 1, 0)
+    for leaf in range(len(leaves)):
+        starts[leaf + 1] = starts[leaf] + max(begun[leaf] - ended[leaf], 0)
+    areas, ends = floats(starts[len(leaves)], 0.0), table(2, 3)
+    for f in range(corners.shape[1]):
+        i, j, k = corners[0, f], corners[1, f], corners[2, f]
+        p, q, r = heights[i], heights[j], heights[k]
+        first, last = column_over(min(p, q, r)), column_over(max(p, q, r))
+        if several[min(first, n)] == several[last]:
+            continue
+        top = i if p >= max(q, r) else (j if q >= r else k)
+        leaf = int(tree.leaf[top])
+        if leaf < 0:
+            leaf = find_leaf(tree, int(np.int64(top)))  # of the type that other calls have: one compilation serves all
+        for column in range(first, last):
+            if several[column] < several[column + 1]:
+                piece = leaf
+                while ended[piece] > column:
+                    piece = elder[piece]
+                areas[starts[piece] + column - ended[piece]] += _section(points, (i, j, k), grid, column, ends)
+    for piece in range(len(leaves)):
+        for column in range(ended[piece], min(begun[piece], int(heights[leaves[piece]] - fragment) + 1)):
+            if several[column] < several[column + 1]:
+                contact_area[column] = min(contact_area[column], areas[starts[piece] + column - ended[piece]])
+
+
+@helper
+def _find_lifetimes(leaves: Ints, joins: Ints, grid: OffsetGrid) -> tuple[Ints, Ints, Ints]:
+    """For every leaf: the column below which it begins, the one below which it has gone, and the leaf it goes into."""
+    heights, n, size = grid.heights, grid.columns, len(leaves)
+    begun, ended, elder, parent = ints(size, 0), ints(size, 0), singletons(size), singletons(size)
+    for leaf in range(size):
+        begun[leaf] = min(column_over(heights[leaves[leaf]]), n)
+    columns = join_columns(joins, grid)
+    _, sequence = counting_sort(columns, n + 1)
+    for at in range(len(sequence) - 1, -1, -1):
+        k = sequence[at]
+        a, b = root(parent, joins[k, 0]), root(parent, joins[k, 1])
+        if a != b:
+            if before(heights, leaves[a], leaves[b], n >= 0):
+                a, b = b, a
+            parent[a], elder[a], ended[a] = b, b, columns[k]
+    return begun, ended, elder
+
+
+@helper
+def _count_several(begun: Ints, ended: Ints, wanted: Ints) -> Ints:
+    """(n + 1,) how many of the wanted columns before each have several pieces above them."""
+    n = len(wanted)
+    pieces, several = ints(n + 1, 0), ints(n + 1, 0)
+    for leaf in range(len(begun)):
+        if begun[leaf] > ended[leaf]:
+            pieces[ended[leaf]] += 1
+            pieces[begun[leaf]] -= 1
+    here = 0
+    for column in range(n):
+        here += pieces[column]
+        several[column + 1] = several[column] + int(here > 1 and wanted[column])
+    return several
+
+
+@no_nrt
+def _section(points: Floats, face: tuple[int, int, int], grid: OffsetGrid, column: int, ends: Floats) -> float:
+    """A face's share of the area within the section's outline: half the triangle of its crossing segment and the origin."""
+    (i, j, k), heights, d = face, grid.heights, grid.direction
+    for v, w in ((i, j), (j, k), (k, i)):
+        if (heights[v] > column) != (heights[w] > column):
+            share = (column - heights[v]) / (heights[w] - heights[v])
+            end = int(heights[w] > column)
+            for axis in range(3):
+                ends[end, axis] = points[axis, v] + share * (points[axis, w] - points[axis, v])
+    x = ends[0, 1] * ends[1, 2] - ends[0, 2] * ends[1, 1]
+    y = ends[0, 2] * ends[1, 0] - ends[0, 0] * ends[1, 2]
+    z = ends[0, 0] * ends[1, 1] - ends[0, 1] * ends[1, 0]
+    area: float = 0.5 * (x * d[0] + y * d[1] + z * d[2])
+    return area

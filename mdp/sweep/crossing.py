@@ -1,31 +1,43 @@
-"""Crossing: what a plane leaves of a triangle above it, from the heights of the triangle's corners over the plane.
+"""Crossing: what a plane leaves of a triangle above it, from the heights of the triangle's corners over the plane, the rim of a
+cut, which consists of the chords of the triangles that it crosses, and what all faces add up to above each offset plane of a
+direction.
 
 The share of the area above a plane at height c is quadratic in c on either side of the middle corner; its chord in the plane is
-linear. A `Ramp` has the heights and the factors of a triangle on either side, which a sweep works out once for a direction.
+linear. A `Ramp` has the heights and the factors of a triangle on either side, which a sweep works out once for a direction. The
+integral of the chord over the extent across the planes is the area times the sine of the angle between face and plane.
+
+Along a direction heights are in steps above its first offset: offset column c lies at height c, column c is below a vertex at
+height t when c < t.
 """
 
-from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel, no_nrt
-from mdp.mesh import Floats, Ints
+from math import cos, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, table
+from mdp.kernels.kernel import helper, kernel, no_nrt
+from mdp.mesh import Floats, Ints, Mesh, dot
+from mdp.overhang import step_share
+from mdp.plane import Plane
+from mdp.sweep.facets import Indices, Layout, Scars, class_along
 
 THIRD = 1.0 / 3.0
+COT_30 = 3.0**0.5
+FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is so thin that it is reported
+ROUNDING_MM = 1e-9  # a corner that a cut has made lies in its plane
+KINDS = 8  # of faces, see _kind_of; the first is none
+SUMS = STAIRS_UP, STAIRS, RIM = KINDS, KINDS + 1, KINDS + 2  # sums besides those of each kind
 Ramp = tuple[float, float, float, float, float]  # heights of the corners, lowest first, and the two factors
 
 
 @no_nrt
-def slopes(low: float, middle: float, high: float) -> tuple[float, float]:
-    """The factors of a triangle's share below its middle corner and above it; 0 where that side of the triangle is flat."""
+def ramp_of(p: float, q: float, r: float) -> Ramp:
+    """The ramp of a triangle with corners at three heights; a factor is 0 where that side of the triangle is flat."""
+    low, middle, high = min(p, q, r), max(min(p, q), min(max(p, q), r)), max(p, q, r)
     extent = high - low
     lower, upper = (middle - low) * extent, (high - middle) * extent
-    return 1.0 / lower if lower > 0.0 else 0.0, 1.0 / upper if upper > 0.0 else 0.0
-
-
-@no_nrt
-def ramp_of(p: float, q: float, r: float) -> Ramp:
-    """The ramp of a triangle with corners at three heights."""
-    low, middle, high = min(p, q, r), max(min(p, q), min(max(p, q), r)), max(p, q, r)
-    rise, fall = slopes(low, middle, high)
-    return low, middle, high, rise, fall
+    return low, middle, high, 1.0 / lower if lower > 0.0 else 0.0, 1.0 / upper if upper > 0.0 else 0.0
 
 
 @no_nrt
@@ -61,3 +73,176 @@ def areas_above(faces: Ints, heights: Floats, areas_mm2: Floats) -> Floats:
         elif ramp[2] > 0.0:
             above[f] = areas_mm2[f] * share_above(0.0, ramp)
     return above
+
+
+@no_nrt
+def weigh_chord(cosine: float, feather: float) -> float:
+    """How much a chord counts where a face's normal has that cosine with the plane's, times the sine of the angle between.
+
+    A feather edge, where face and plane meet at less than 30 degrees, counts 1 + feather (cot angle - cot 30) times.
+    """
+    facing = abs(cosine)
+    sine: float = np.sqrt(max(1.0 - facing * facing, 0.0))
+    return sine + feather * max(facing - COT_30 * sine, 0.0)
+
+
+class Rim(NamedTuple):
+    """The rim of one plane on faces that count: its length, that with their weights, and that of feather edges of less than 20
+    degrees, mm."""
+
+    length_mm: float
+    weighted_mm: float
+    feathered_mm: float
+
+    @property
+    def feather_share(self) -> float:
+        """Share of the rim that is a feather edge; 0 where nothing of it is seen."""
+        return self.feathered_mm / self.length_mm if self.length_mm > 0.0 else 0.0
+
+
+NO_RIM = Rim(0.0, 0.0, 0.0)  # of what stands on the platform
+
+
+def measure_rim(mesh: Mesh, weights: Floats, plane: Plane, feather: float) -> Rim:
+    """The rim of a cut through a mesh on whose (m,) faces a mm of rim counts so much. The same as the sweep's rim, for one
+    plane."""
+    corners_mm = plane.heights_mm(mesh.vertices)[mesh.faces]
+    return sum_chords(corners_mm, dot(mesh.normals, plane.normal), mesh.areas_mm2, weights, feather)
+
+
+@kernel
+def sum_chords(corners_mm: Floats, cosines: Floats, areas_mm2: Floats, weights: Floats, feather: float) -> Rim:
+    """The rim at height 0 of faces whose corners lie at (m, 3) heights; cosines (m,) of face and plane."""
+    length, weighted, feathered = 0.0, 0.0, 0.0
+    for f in range(len(corners_mm)):
+        p, q, r = corners_mm[f, 0], corners_mm[f, 1], corners_mm[f, 2]
+        if weights[f] <= 0.0 or min(p, q, r) >= -ROUNDING_MM or max(p, q, r) <= ROUNDING_MM:
+            continue
+        chord = 2.0 * areas_mm2[f] * chord_at(0.0, ramp_of(p, q, r))
+        length += chord * weigh_chord(cosines[f], 0.0)
+        weighted += chord * weights[f] * weigh_chord(cosines[f], feather)
+        if abs(cosines[f]) > FEATHER_COSINE:
+            feathered += chord * weigh_chord(cosines[f], 0.0)
+    return Rim(length, weighted, feathered)
+
+
+class OffsetGrid(NamedTuple):
+    """The offset planes of one direction: (3,) direction, (n,) heights of all vertices in steps above the first plane, how many
+    planes (columns) there are, and the step between them."""
+
+    direction: Floats
+    heights: Floats
+    columns: int
+    step_mm: float
+
+
+@no_nrt
+def find_heights(points: Floats, d: Floats, step: float, heights: Floats) -> tuple[int, int]:
+    """Fill the heights of all vertices; returns the first offset's number and the count of offsets in between."""
+    (x, y, z), d0, d1, d2 = (points[0], points[1], points[2]), d[0], d[1], d[2]
+    least, most = 1e300, -1e300
+    for v in range(len(heights)):
+        heights[v] = (x[v] * d0 + y[v] * d1 + z[v] * d2) / step
+        least, most = min(least, heights[v]), max(most, heights[v])
+    begin = int(np.floor(least)) + 1
+    shift = float(begin)
+    for v in range(len(heights)):
+        heights[v] -= shift
+    return begin, max(int(np.ceil(most)) - begin, 0)
+
+
+@no_nrt
+def column_over(height: float) -> int:
+    """The number of offsets strictly below a height: the first column that is not below it."""
+    return max(int(np.ceil(height)), 0)
+
+
+@helper
+def integrate_volume(layout: Layout, grid: OffsetGrid, section: Floats, volume: Floats) -> None:
+    """Cross-section at (mm2) and volume above (mm3) each offset, by the divergence theorem."""
+    corners, vectors, heights, d, n = layout.faces.corners, layout.vectors_mm2, grid.heights, grid.direction, grid.columns
+    sums = table(n + 1, 4)  # areas and moments of the faces wholly above, and of the shares of those that cross
+    for f in range(corners.shape[1]):
+        p, q, r = heights[corners[0, f]], heights[corners[1, f]], heights[corners[2, f]]
+        first, end = column_over(min(p, q, r)), column_over(max(p, q, r))
+        weight, ramp = vectors[0, f] * d[0] + vectors[1, f] * d[1] + vectors[2, f] * d[2], ramp_of(p, q, r)
+        sums[first, 0] += weight
+        sums[first, 2] += weight * ((ramp[0] + ramp[1] + ramp[2]) * THIRD)
+        for column in range(first, end):
+            sums[column, 1] += weight * share_above(float(column), ramp)
+            sums[column, 3] += weight * moment_above(float(column), ramp)
+    area, first_moment = 0.0, 0.0
+    for column in range(n - 1, -1, -1):
+        area += sums[column + 1, 0]
+        first_moment += sums[column + 1, 2]
+        section[column] = sums[column, 1] + area
+        volume[column] = (sums[column, 3] + first_moment - column * area) * grid.step_mm
+
+
+@no_nrt
+def _kind_of(scars: Scars, row: int, f: int, cosine: float) -> int:
+    """What a face needs: 0: no support, 1: support printed upright only, 2: along the direction only, 3: both; 4 and 5: as 2 and
+    3, and along the direction it is unsupportable; 6 and 7: as 3 and 5, and no cut can save it."""
+    kind = int(scars.faces.risky[f]) + 2 * (class_along(scars, row, f) if cosine < scars.risky_below else 0)
+    if len(scars.unavoidable) > 0 and scars.unavoidable[f]:
+        kind = 6 if kind == 3 else 7 if kind == 5 else kind
+    return kind
+
+
+@helper
+def integrate_scars(scars: Scars, row: int, grid: OffsetGrid) -> Floats:
+    """(n + 1, KINDS + 3) what the faces have above each offset, the last row without use: area by their kind, see _kind_of, what
+    their stairs count printed straight up and along the direction, and at it their weighted rim times the step."""
+    faces, heights, d = scars.faces, grid.heights, grid.direction
+    corners, normals, areas = faces.corners, faces.normals, faces.areas_mm2
+    n, wholes, shares = grid.columns, table(grid.columns + 1, KINDS + 3), table(grid.columns + 1, KINDS + 3)
+    seams, stairs = len(faces.seam_weights) > 0, len(faces.seam_weights) > 0 and len(faces.stair_weights) > 0
+    for f in range(corners.shape[1]):
+        cosine = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
+        kind = _kind_of(scars, row, f, cosine)
+        if kind == 0 and not seams:
+            continue
+        p, q, r = heights[corners[0, f]], heights[corners[1, f]], heights[corners[2, f]]
+        first, end = column_over(min(p, q, r)), column_over(max(p, q, r))
+        counted, upright, leaning = areas[f] * faces.counts[f], 0.0, 0.0
+        if stairs:
+            upright = areas[f] * faces.stair_weights[f] * step_share(normals[2, f])
+            leaning = areas[f] * faces.stair_weights[f] * step_share(cosine)
+        wholes[first, kind] += counted
+        wholes[first, STAIRS_UP] += upright
+        wholes[first, STAIRS] += leaning
+        if first < end:
+            ramp = ramp_of(p, q, r)
+            chord = 2.0 * areas[f] * faces.seam_weights[f] * weigh_chord(cosine, scars.feather) if seams else 0.0
+            for column in range(first, end):
+                share = share_above(float(column), ramp)
+                shares[column, kind] += counted * share
+                shares[column, STAIRS_UP] += upright * share
+                shares[column, STAIRS] += leaning * share
+                shares[column, RIM] += chord * chord_at(float(column), ramp)
+    for which in range(KINDS + 3):
+        above = 0.0
+        for column in range(n - 1, -1, -1):
+            above += wholes[column + 1, which]
+            shares[column, which] += above
+    return shares
+
+
+@helper
+def find_lowest(z: Floats, edges: Indices, grid: OffsetGrid, watched: float, lowest: Floats) -> None:
+    """Least z above each offset, among vertices and crossings of edges, lowest first, below the watched height."""
+    heights, n = grid.heights, grid.columns
+    known = 0  # columns before it have their least z: that of a vertex above them met earlier
+    for e in range(edges.shape[1]):
+        v, w = edges[0, e], edges[1, e]
+        if known >= n or z[v] >= watched:
+            break
+        if heights[v] > known:
+            known = column_over(heights[v])
+            lowest[known - 1] = min(lowest[known - 1], z[v])
+        if heights[w] > known:
+            rise = (z[w] - z[v]) / (heights[w] - heights[v])
+            for column in range(known, column_over(heights[w])):
+                lowest[column] = min(lowest[column], z[v] + rise * (column - heights[v]))
+    for column in range(n - 2, -1, -1):
+        lowest[column] = min(lowest[column], lowest[column + 1])

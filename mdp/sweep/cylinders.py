@@ -16,8 +16,8 @@ from math import cos, radians
 
 import numpy as np
 
-from mdp.directions.frame import frame_across
 from mdp.directions.revolution import find_revolution
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats, Indices, Ints, Mesh
 from mdp.plane import Plane
 from mdp.topology.components import connected_components
@@ -54,7 +54,7 @@ class Cylinder:
 
     def is_crossed(self, plane: Plane) -> bool:
         """Whether a plane cuts it more askew than a layer would show."""
-        return float(crossings([self], plane.normal[None], np.array([[plane.offset_mm]]))[0, 0]) > LEAST_ASKEW
+        return crossed_by([self], plane) > LEAST_ASKEW
 
     def reaches_below(self, plane: Plane) -> bool:
         """Whether something of it lies below a plane."""
@@ -101,6 +101,11 @@ def crossings(cylinders: Sequence[Cylinder], directions: Floats, offsets_mm: Flo
         cut = np.abs(offsets_mm - (directions @ cylinder.middle)[:, None]) < reach_mm[:, None]
         total += cut * (cylinder.weight * sines[:, None])
     return total
+
+
+def crossed_by(cylinders: Sequence[Cylinder], plane: Plane) -> float:
+    """The same for one plane."""
+    return float(crossings(cylinders, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])
 
 
 def spoiled_by_cuts(mesh: Mesh) -> tuple[Cylinder, ...]:

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import flags, floats, ints, longs, table
+from mdp.kernels.arrays import flags, ints, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.sorting import counting_sort
-from mdp.mesh import Floats, Ints, Mesh
+from mdp.mesh import Floats, Ints, Mesh, crosses_of
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
 from mdp.sweep.rays import TriangleTree, triangle_tree
@@ -68,7 +68,7 @@ class Scars(NamedTuple):
     classes: Classes
     weight: float
     feather: float
-    hopeless: Mask
+    unavoidable: Mask
 
 
 @no_nrt
@@ -85,28 +85,23 @@ def times_along(scars: Scars, row: int, f: int) -> float:
     return scars.weight if needed == UNSUPPORTABLE else 1.0 if needed == NEEDS_SUPPORT else 0.0
 
 
-class Rings(NamedTuple):
-    """Neighbours around every vertex in cyclic order: those of v are neighbours[starts[v] : starts[v + 1]]; (n + 1,), (3 m,)."""
-
-    starts: Ints
-    neighbours: Ints
-
-
 class Layout(NamedTuple):
     """A solid laid out for sweeps along any direction: its faces and boxes over them; vectors_mm2 (3, m), their normals times
     areas; rising_edges (2, e), each with its lower end first, those with the lowest lower end first.
 
-    For the vertices: the rings around them; unit angle-weighted normals (3, n), whose sign tells on which side the solid lies
-    (Baerentzen, Aanaes); flatness (n,), see _flatness; sharp: numbers 3 f + k of the face corners where the normal of the vertex
-    does not tell where the surface looks; those standing on the platform; anchors (n,): the face that a ray into the solid meets,
-    -1: none, UNKNOWN: not looked up, which the sweep does when needed.
+    For the vertices: those next to v in cyclic order are neighbours[starts[v] : starts[v + 1]]; unit angle-weighted normals
+    (3, n), whose sign tells on which side the solid lies (Baerentzen, Aanaes); flatness (n,), see _flatness; sharp: numbers
+    3 f + k of the face corners where the normal of the vertex does not tell where the surface looks; those standing on the
+    platform; anchors (n,): the face that a ray into the solid meets, -1: none, UNKNOWN: not looked up, which the sweep does when
+    needed.
     """
 
     faces: FaceTable
     triangles: TriangleTree
     vectors_mm2: Floats
     rising_edges: Indices
-    rings: Rings
+    starts: Ints
+    neighbours: Ints
     vertex_normals: Floats
     flatness: Floats
     sharp: Ints
@@ -141,13 +136,14 @@ class Facets:
         starts, neighbours, single = _link(mesh.faces.flatten(), len(mesh.vertices))
         normals = _vertex_normals(mesh.vertices, mesh.faces, mesh.normals)
         least_mm = LEAST_ALTITUDE * float(np.abs(mesh.bounds_mm).max())
-        flatness = np.where(single, _flatness(mesh.vertices, mesh.faces, mesh.normals, normals, least_mm), -1.0)
+        flatness = np.where(single, _flatness(mesh, normals, least_mm), -1.0)
         return Layout(
             faces=self.faces,
             triangles=triangle_tree(mesh),
             vectors_mm2=np.ascontiguousarray((mesh.normals * mesh.areas_mm2[:, None]).T),
             rising_edges=_rising_edges(mesh.faces, z),
-            rings=Rings(starts.astype(np.int32), neighbours),
+            starts=starts.astype(np.int32),
+            neighbours=neighbours,
             vertex_normals=np.ascontiguousarray(normals.T),
             flatness=flatness,
             sharp=np.flatnonzero(flatness[mesh.faces] <= cosine).astype(np.int32),
@@ -201,35 +197,26 @@ def _link(corners: Ints, size: int) -> tuple[NDArray[np.int64], Ints, Mask]:
     return starts, first, single
 
 
-@kernel
-def _flatness(vertices: Floats, faces: Ints, normals: Floats, vertex_normals: Floats, least: float) -> Floats:
+def _flatness(mesh: Mesh, vertex_normals: Floats, least_mm: float) -> Floats:
     """(n,) least cosine between a vertex' normal m and those of its faces, 0 if rounding decides; to be -1 without a single ring.
 
     A vertex with |d . m| below it is regular for the direction d: around it the surface is a graph over the plane across m
     whose slope cannot outweigh d's part in that plane.
     """
-    flat = floats(len(vertices), 1.0)
-    for f in range(len(faces)):
-        altitude = _altitude(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]])
-        for k in range(3):
-            v = faces[f, k]
-            cosine = 0.0
-            for axis in range(3):
-                cosine += normals[f, axis] * vertex_normals[v, axis]
-            flat[v] = min(flat[v], max(cosine - COSINE_MARGIN, 0.0) if altitude > least else 0.0)
+    corners = mesh.vertices[mesh.faces]
+    longest = np.max([_squares(corners[:, k] - corners[:, k - 1]) for k in range(3)], axis=0)
+    altitudes_mm = np.sqrt(_squares(crosses_of(mesh.vertices, mesh.faces)) / np.where(longest > 0.0, longest, 1.0))
+    products = mesh.normals[:, None] * vertex_normals[mesh.faces]
+    cosines = products[..., 0] + products[..., 1] + products[..., 2]
+    flat = np.ones(len(mesh.vertices))
+    np.minimum.at(flat, mesh.faces, np.where(altitudes_mm[:, None] > least_mm, np.maximum(cosines - COSINE_MARGIN, 0.0), 0.0))
     return flat
 
 
-@no_nrt
-def _altitude(p: Floats, q: Floats, r: Floats) -> float:
-    """Least altitude of a triangle."""
-    ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    cx, cy, cz = bx - ax, by - ay, bz - az
-    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    longest = max(ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, cx * cx + cy * cy + cz * cz)
-    altitude: float = np.sqrt((x * x + y * y + z * z) / longest) if longest > 0.0 else 0.0
-    return altitude
+def _squares(vectors: Floats) -> Floats:
+    x, y, z = vectors.T
+    squares: Floats = x * x + y * y + z * z
+    return squares
 
 
 @kernel

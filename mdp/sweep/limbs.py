@@ -4,22 +4,20 @@ have. The pieces themselves are followed by mdp.sweep.pieces (numba kernels)."""
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import dot, flags, ints
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.kernels.threads import in_threads
-from mdp.mesh import Floats, Ints, Mesh
+from mdp.mesh import Floats, Indices, Ints, Mesh
 from mdp.overhang import Mask
-from mdp.plane import Plane
-from mdp.sweep.components import before
-from mdp.sweep.contact_area import LEAST_CONTACT_AREA_MM2
-from mdp.sweep.cylinders import Cylinder, crossings
-from mdp.sweep.facets import Layout, Rings, Scars
-from mdp.sweep.integrals import OffsetGrid, find_heights
+from mdp.plane import Plane, normals_and_offsets
+from mdp.sweep.components import LEAST_CONTACT_AREA_MM2, before
+from mdp.sweep.crossing import find_heights
+from mdp.sweep.cylinders import Cylinder, crossed_by
+from mdp.sweep.facets import Layout, Scars
 from mdp.sweep.pieces import (
     AREAS,
     MOMENT,
@@ -47,13 +45,19 @@ SPAN = 8  # the best of this many adjacent offsets is kept per limb: at the best
 TRADE_OFF = 2.0  # weight of the area left for ever against the area made safe when a limb's planes are compared
 SAME_MM2 = 1e-6  # squared distance up to which a point of a plane is a vertex
 KEPT = 8  # marked vertices of the last planes: one check of a plane asks for them several times
+# For planes: (k,) offsets, the points of their limbs (k, MOST_JOINED, 3), infinite for fewer, and how high a limb must be that
+# needs a contact area.
+PointedPlanes = tuple[Floats, Floats, float]
+# The best candidates of k directions: the numbers of their offsets and their keys, lower is better, infinite: not in use (k,
+# MOST_ROWS), and the highest vertex of each limb that the plane cuts off (k, MOST_ROWS, MOST_JOINED), NONE for fewer.
+LimbRows = tuple[Ints, Floats, Ints]
 CONTACT, LOWEST, EXISTS, ALONE = range(len(SUMS), len(SUMS) + 4)  # further columns beside the SUMS
 
 
 class LimbGrid(NamedTuple):
     """Where to look for limbs and what they must respect. directions (k, 3); step_mm of their offsets. For each direction:
     least_height_mm (k,) least z of what is cut off; keep_mm (k, s, 2) offsets that planes must avoid. seam_mm, cut_mm2: see
-    CostTerms. least_interface_mm2: the smallest contact area of a limb that is at least `crumb` steps high."""
+    CostTerms. least_interface_mm2: the smallest contact area of a limb that is at least `fragment` steps high."""
 
     directions: Floats
     step_mm: float
@@ -64,36 +68,12 @@ class LimbGrid(NamedTuple):
     least_gain_mm2: float
     least_volume_mm3: float
     least_interface_mm2: float
-    crumb: float
+    fragment: float
 
 
-class PointedPlanes(NamedTuple):
-    """Planes with the points of their limbs: normals (k, 3), offsets_mm (k,), points (k, MOST_JOINED, 3), infinite for fewer.
-    crumb_mm: lower limbs may have any contact area; farthest_mm2: squared distance within which a vertex is searched."""
-
-    normals: Floats
-    offsets_mm: Floats
-    points: Floats
-    crumb_mm: float
-    farthest_mm2: float
-
-
-class LimbRows(NamedTuple):
-    """The best candidates of k directions. first (k,): number of the first offset; filled (k,): how many rows are used; column
-    and key (k, MOST_ROWS): offset, and rank, lower is better; tops (k, MOST_ROWS, MOST_JOINED): the highest vertex of each limb
-    that the plane cuts off, NONE for fewer."""
-
-    first: Ints
-    filled: Ints
-    column: Ints
-    key: Floats
-    tops: Ints
-
-
-@dataclass(frozen=True, eq=False)
-class LimbCandidates:
+class LimbCandidates(NamedTuple):
     """Limbs that may be worth a cut, best first: (r,) row of the direction, (r,) offset, and (r, MOST_JOINED) the highest vertex
-    of each limb in the order of the facets, NONE for fewer."""
+    of each limb that the plane cuts off, in the order of the facets, NONE for fewer."""
 
     direction: Ints
     offset_mm: Floats
@@ -104,34 +84,30 @@ def find_limbs(remainder: Remainder, grid: LimbGrid, risky_below: float) -> Limb
     """The limbs that would save something if they alone were cut off. Planes with a single piece above them are whole cuts and
     left out."""
     count = len(grid.directions)
-    rows = LimbRows(
-        first=np.zeros(count, np.int32),
-        filled=np.zeros(count, np.int32),
-        column=np.zeros((count, MOST_ROWS), np.int32),
-        key=np.zeros((count, MOST_ROWS)),
-        tops=np.full((count, MOST_ROWS, MOST_JOINED), NONE, np.int32),
-    )
-    in_threads(_find_limbs, count, scars_of(remainder, grid.directions, risky_below), remainder.layout, grid, rows)
-    used = np.arange(MOST_ROWS) < rows.filled[:, None]
-    direction, place = np.nonzero(used)
-    order = np.lexsort((place, direction, rows.key[used]))
+    column, keys = np.zeros((count, MOST_ROWS), np.int32), np.full((count, MOST_ROWS), np.inf)
+    tops = np.full((count, MOST_ROWS, MOST_JOINED), NONE, np.int32)
+    surface = scars_of(remainder, grid.directions, risky_below), remainder.layout
+    in_threads(_find_limbs, count, surface, grid, (column, keys, tops))
+    direction, place = np.nonzero(np.isfinite(keys))
+    order = np.lexsort((place, direction, keys[direction, place]))
     direction, place = direction[order], place[order]
-    offset: Floats = (rows.first[direction] + rows.column[direction, place]) * np.float64(grid.step_mm)
-    return LimbCandidates(direction.astype(np.int32), offset, rows.tops[direction, place])
+    offset: Floats = column[direction, place] * np.float64(grid.step_mm)
+    return LimbCandidates(direction.astype(np.int32), offset, tops[direction, place])
 
 
 @dataclass(frozen=True, eq=False)
 class LimbSums:
     """What cutting off limbs would do, (r,) each, named as in sweep.Gains and sweep.Sweep. contact_mm2: the smallest contact area
-    of a limb that is not a crumb; exists: whether every limb still has something above its plane; alone: whether nothing else
+    of a limb that is no fragment; exists: whether every limb still has something above its plane; alone: whether nothing else
     has."""
 
     up_mm2: Floats
     residual_mm2: Floats
     stairs_up_mm2: Floats
     stairs_mm2: Floats
-    rim_mm: Floats
+    section_mm2: Floats
     volume_mm3: Floats
+    rim_mm: Floats
     contact_mm2: Floats
     lowest_mm: Floats
     exists: Mask
@@ -139,41 +115,23 @@ class LimbSums:
     crossed: Floats
 
 
-def sum_limbs(remainder: Remainder, planes: Sequence[Plane], risky_below: float, crumb_mm: float) -> LimbSums:
-    """What cutting off the limbs of planes would do; nothing is cut. The points of the limbs must be vertices of them."""
-    pointed = _pointed(planes, crumb_mm, SAME_MM2)
+def sum_limbs(remainder: Remainder, planes: Sequence[Plane], risky_below: float, fragment_mm: float) -> LimbSums:
+    """What cutting off the limbs of planes would do; nothing is cut. The points of the limbs must be vertices of them; limbs
+    lower than fragment_mm may have any contact area."""
     sums = np.zeros((len(planes), ALONE + 1))
-    scars = scars_of(remainder, pointed.normals, risky_below)
-    in_threads(_sum_limbs, len(planes), scars, remainder.layout, pointed, sums)
-    return LimbSums(
-        up_mm2=sums[:, UP],
-        residual_mm2=sums[:, RESIDUAL],
-        stairs_up_mm2=sums[:, STAIRS_UP],
-        stairs_mm2=sums[:, STAIRS],
-        rim_mm=sums[:, RIM],
-        volume_mm3=sums[:, MOMENT],
-        contact_mm2=sums[:, CONTACT],
-        lowest_mm=sums[:, LOWEST],
-        exists=sums[:, EXISTS] > 0.0,
-        alone=sums[:, ALONE] > 0.0,
-        crossed=np.array([_count_crossed(remainder, plane) for plane in planes]),
-    )
+    surface = scars_of(remainder, normals_and_offsets(planes)[0], risky_below), remainder.layout
+    in_threads(_sum_limbs, len(planes), surface, _pointed(planes, fragment_mm), sums)
+    crossed = [crossed_by(cylinders_cut(remainder, remainder.cylinders, plane), plane) for plane in planes]
+    columns: list[Any] = [*sums.T[:EXISTS], sums[:, EXISTS] > 0.0, sums[:, ALONE] > 0.0, np.array(crossed)]
+    return LimbSums(*columns)
 
 
-def _count_crossed(remainder: Remainder, plane: Plane) -> float:
-    """How much of the rims of bores a plane cuts askew."""
-    cut = cylinders_cut(remainder, remainder.cylinders, plane)
-    return float(crossings(cut, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0]) if cut else 0.0
-
-
-def _pointed(planes: Sequence[Plane], crumb_mm: float, farthest_mm2: float) -> PointedPlanes:
+def _pointed(planes: Sequence[Plane], fragment_mm: float) -> PointedPlanes:
     points = np.full((len(planes), MOST_JOINED, 3), np.inf)
     for row, plane in enumerate(planes):
         if plane.limbs_mm is not None:
             points[row, : len(plane.limbs_mm)] = plane.limbs_mm
-    normals = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
-    offsets_mm = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
-    return PointedPlanes(normals, offsets_mm, points, crumb_mm, farthest_mm2)
+    return normals_and_offsets(planes)[1], points, fragment_mm
 
 
 @lru_cache(KEPT)
@@ -184,7 +142,7 @@ def limb_vertices(remainder: Remainder, plane: Plane) -> Mask:
         marked: Mask = plane.heights_mm(remainder.facets.mesh.vertices) > 0.0
     else:
         scars = scars_of(remainder, plane.normal[None], 0.0)
-        marked = _mark_limbs(scars, remainder.layout, _pointed([plane], 0.0, np.inf))
+        marked = _mark_limbs(scars, remainder.layout, _pointed([plane], 0.0))
     marked.setflags(write=False)
     return marked
 
@@ -207,7 +165,7 @@ def limb_reach(remainder: Remainder, plane: Plane) -> Mask:
         return np.ones(len(remainder.mesh.faces), np.bool_)
     facets = remainder.facets
     heights, marked = plane.heights_mm(facets.mesh.vertices), limb_vertices(remainder, plane).copy()
-    _spread_down(np.argsort(-heights, kind="stable"), heights, remainder.layout.rings, marked)
+    _spread_down(np.argsort(-heights, kind="stable"), heights, remainder.layout, marked)
     return _faces_with(remainder, marked)
 
 
@@ -220,14 +178,14 @@ def _faces_with(remainder: Remainder, marked: Mask) -> Mask:
 
 
 @kernel
-def _spread_down(highest_first: NDArray[np.int64], heights: Floats, rings: Rings, marked: Mask) -> None:
+def _spread_down(highest_first: Indices, heights: Floats, layout: Layout, marked: Mask) -> None:
     """Mark each vertex below the plane like the highest of its neighbours."""
     for v in highest_first:
         if heights[v] <= 0.0:
             highest = v
-            for at in range(rings.starts[v], rings.starts[v + 1]):
-                if before(heights, rings.neighbours[at], highest, True):
-                    highest = np.int64(rings.neighbours[at])
+            for at in range(layout.starts[v], layout.starts[v + 1]):
+                if before(heights, layout.neighbours[at], highest, True):
+                    highest = np.int64(layout.neighbours[at])
             marked[v] = highest != v and marked[highest]
 
 
@@ -249,38 +207,22 @@ def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
 
 
 @no_nrt
-def _keep_row(rows: LimbRows, row: int, key: float, column: int, tops: Ints) -> None:
+def _keep_row(out: LimbRows, row: int, key: float, column: int, tops: Ints) -> None:
     """Keep a candidate if it is the best of its limbs within a span of offsets; in a full table the worst one makes room. One of
     infinite key is left out."""
-    if key == np.inf:
-        return
-    place = _same_limbs(rows, row, column, tops)
-    if place == NONE and rows.filled[row] < MOST_ROWS:
-        place = rows.filled[row]
-        rows.filled[row] += 1
-        rows.key[row, place] = np.inf
-    elif place == NONE:
-        place = 0
-        for k in range(MOST_ROWS):
-            if rows.key[row, k] > rows.key[row, place]:
-                place = k
-    if key < rows.key[row, place]:
-        rows.key[row, place], rows.column[row, place] = key, column
+    columns, keys, kept_tops = out[0][row], out[1][row], out[2][row]
+    same, worst = NONE, 0
+    for k in range(MOST_ROWS):
+        alike = columns[k] // SPAN == column // SPAN
         for limb in range(len(tops)):
-            rows.tops[row, place, limb] = tops[limb]
-
-
-@no_nrt
-def _same_limbs(rows: LimbRows, row: int, column: int, tops: Ints) -> int:
-    """The place of the candidate with the same limbs in the same span of offsets; NONE: there is none."""
-    place = NONE
-    for k in range(rows.filled[row]):
-        same = rows.column[row, k] // SPAN == column // SPAN
+            alike = alike and kept_tops[k, limb] == tops[limb]
+        same = k if alike else same
+        worst = k if keys[k] > keys[worst] else worst
+    place = worst if same == NONE else same
+    if key < keys[place]:
+        keys[place], columns[place] = key, column
         for limb in range(len(tops)):
-            same = same and rows.tops[row, k, limb] == tops[limb]
-        if same:
-            place = k
-    return place
+            kept_tops[place, limb] = tops[limb]
 
 
 @no_nrt
@@ -297,7 +239,7 @@ def _may_be_cut(pieces: Pieces, piece: int, column: int, grid: LimbGrid, least_m
     """Whether the head clears the table under a piece, and its contact area is large enough."""
     if min(pieces.low[piece, 0], pieces.low[piece, 1]) < least_mm:
         pieces.low[piece, 0] = -np.inf  # below this column it never clears the table again
-    high = pieces.heights[pieces.top[piece]] - column >= grid.crumb
+    high = pieces.heights[pieces.top[piece]] - column >= grid.fragment
     stands = value(pieces, piece, SECTION) >= (grid.least_interface_mm2 if high else LEAST_CONTACT_AREA_MM2)
     return bool(stands and pieces.low[piece, 0] > -np.inf)
 
@@ -340,29 +282,29 @@ def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: L
 
 
 @kernel
-def _find_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, grid: LimbGrid, out: LimbRows) -> None:
+def _find_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], grid: LimbGrid, out: LimbRows) -> None:
     """Fill the candidates of some directions."""
-    points, corners, step_mm = layout.faces.points, layout.faces.corners, grid.step_mm
-    pieces, tops = make_pieces(points.shape[1], corners.shape[1]), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE))
+    scars, layout = surface
+    pieces, tops, step_mm = make_pieces(scars, layout), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE)), grid.step_mm
     for row in range(begin_row, end_row):
-        direction, heights = grid.directions[row], pieces.heights
-        first, n = find_heights(points, direction, step_mm, heights)
-        out.first[row] = first
+        first, n = find_heights(layout.faces.points, grid.directions[row], step_mm, pieces.heights)
         if n == 0 or not np.isfinite(grid.least_height_mm[row]):
             continue
-        order = begin(pieces, scars, row, OffsetGrid(direction, heights, n, step_mm), layout)
+        order = begin(pieces, row, n)
         for column in range(n - 1, -1, -1):
-            descend(pieces, column, order, layout)
+            descend(pieces, column, order)
             if pieces.counts[0] > 1 and _is_allowed(grid, row, (first + column) * step_mm):
                 _offer_pieces(out, (row, column), pieces, grid, tops)
+        for place in range(MOST_ROWS):
+            out[0][row, place] += first
 
 
 @kernel
-def _sum_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, planes: PointedPlanes, out: Floats) -> None:
+def _sum_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], planes: PointedPlanes, out: Floats) -> None:
     """Fill the rows of some planes with the SUMS over their limbs and what else LimbSums has."""
-    pieces = make_pieces(layout.faces.points.shape[1], layout.faces.corners.shape[1])
+    pieces = make_pieces(surface[0], surface[1])
     for row in range(begin_row, end_row):
-        chosen = _find_chosen(scars, row, layout, planes, pieces)
+        chosen = _find_chosen(pieces, row, planes, SAME_MM2)
         contact, lowest = np.inf, np.inf
         for piece in chosen:
             for which in range(AREAS):
@@ -370,7 +312,7 @@ def _sum_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, plane
             out[row, RIM] += value(pieces, piece, RIM)
             out[row, MOMENT] += volume(pieces, piece, 0)
             lowest = min(lowest, pieces.low[piece, 0], pieces.low[piece, 1])
-            if pieces.heights[pieces.top[piece]] >= planes.crumb_mm:
+            if pieces.heights[pieces.top[piece]] >= planes[2]:
                 contact = min(contact, value(pieces, piece, SECTION))
         out[row, CONTACT], out[row, LOWEST] = contact, lowest
         out[row, EXISTS] = 1.0 if len(chosen) > 0 else 0.0
@@ -380,10 +322,9 @@ def _sum_limbs(begin_row: int, end_row: int, scars: Scars, layout: Layout, plane
 @kernel
 def _mark_limbs(scars: Scars, layout: Layout, planes: PointedPlanes) -> Mask:
     """(n,) the vertices of the limbs of one plane."""
-    size = layout.faces.points.shape[1]
-    pieces, marked = make_pieces(size, layout.faces.corners.shape[1]), flags(size)
-    chosen = _find_chosen(scars, 0, layout, planes, pieces)
-    for v in range(size):
+    pieces = make_pieces(scars, layout)
+    marked, chosen = flags(len(pieces.heights)), _find_chosen(pieces, 0, planes, np.inf)
+    for v in range(len(marked)):
         if pieces.parent[v] >= 0:
             own = root(pieces.parent, v)
             for piece in chosen:
@@ -392,18 +333,20 @@ def _mark_limbs(scars: Scars, layout: Layout, planes: PointedPlanes) -> Mask:
 
 
 @helper
-def _find_chosen(scars: Scars, row: int, layout: Layout, planes: PointedPlanes, pieces: Pieces) -> Ints:
-    """The pieces that the points of a plane lie on, lowered to its offset; none where any of the points lies on none."""
-    d, points, heights = planes.normals[row], layout.faces.points, pieces.heights
+def _find_chosen(pieces: Pieces, row: int, planes: PointedPlanes, farthest_mm2: float) -> Ints:
+    """The pieces that the points of a plane lie on, lowered to its offset; none where any of the points lies on none within that
+    squared distance."""
+    d, points, heights = pieces.scars.directions[row], pieces.layout.faces.points, pieces.heights
+    offsets_mm, limb_points, _ = planes
     dot(points[0], points[1], points[2], d, heights)
     for v in range(len(heights)):
-        heights[v] -= planes.offsets_mm[row]
-    descend(pieces, 0, begin(pieces, scars, row, OffsetGrid(d, heights, 1, 1.0), layout), layout)
+        heights[v] -= offsets_mm[row]
+    descend(pieces, 0, begin(pieces, row, 1))
     chosen, count = ints(MOST_JOINED, NONE), 0
-    for limb in range(planes.points.shape[1]):
-        if not np.isfinite(planes.points[row, limb, 0]):
+    for limb in range(limb_points.shape[1]):
+        if not np.isfinite(limb_points[row, limb, 0]):
             continue
-        v = _nearest(planes.points[row, limb], points, pieces.parent, planes.farthest_mm2)
+        v = _nearest(limb_points[row, limb], points, pieces.parent, farthest_mm2)
         if v < 0:
             return chosen[:0]
         own, known = root(pieces.parent, v), False

@@ -9,40 +9,39 @@ vertices, faces and crossings, as in the sweep.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
-from mdp.mesh import Floats, Ints
-from mdp.stairs import step_share
+from mdp.mesh import Floats, Indices, Ints
+from mdp.overhang import step_share
 from mdp.sweep.components import anchor_of, before
-from mdp.sweep.crossing import Ramp, chord_at, moment_above, ramp_of, share_above
+from mdp.sweep.crossing import Ramp, chord_at, column_over, moment_above, ramp_of, share_above, weigh_chord
 from mdp.sweep.facets import Layout, Scars, times_along
-from mdp.sweep.integrals import OffsetGrid, column_over
-from mdp.sweep.rims import weigh_chord
 from mdp.topology.components import root
 
 NONE = -1
 SUMS = UP, RESIDUAL, STAIRS_UP, STAIRS, SECTION, MOMENT, RIM = 0, 1, 2, 3, 4, 5, 6
+Sorted = tuple[Indices, Indices]  # where those of each column start, and all of them, column by column
+Order = tuple[Sorted, Sorted]  # vertices and faces in the order in which the plane passes them
 AREAS = 5  # the first five sums are areas: a face that crosses the plane adds the share above it
 
 
 class Pieces(NamedTuple):
-    """The pieces above a plane. For each vertex: heights (n,) along the direction in steps; over (n,) the last column that it
-    lies above; cosines (n,) of its normal with the direction; parent (n,) by union-find, NONE while it lies below the plane.
+    """The pieces of a solid above a plane, and what blemishes it. For each vertex: heights (n,) along the direction in steps;
+    cosines (n,) of its normal with the direction; parent (n,) by union-find, NONE while it lies below the plane.
 
-    For each face: face_over (m,) the last column that it reaches above; weights (m, 7) what it adds to the SUMS.
-    For the vertex that stands for a piece: whole (n, 7) the SUMS of its faces wholly above; crossing (n, 7) those of the shares
-    of faces that cross the plane; top (n,) its highest vertex; low (n, 2) its least z, among vertices and on the plane.
-    live: vertices that stand for a piece, or did once; active: the faces that cross the plane; counts (2,): of live and active.
+    weights (m, 7): what each face adds to the SUMS. For the vertex that stands for a piece: whole (n, 7) the SUMS of its faces
+    wholly above; crossing (n, 7) those of the shares of faces that cross the plane; top (n,) its highest vertex; low (n, 2) its
+    least z, among vertices and on the plane. live: vertices that stand for a piece, or did once; active: the faces that cross the
+    plane; counts (2,): of live and active.
     """
 
+    scars: Scars
+    layout: Layout
     heights: Floats
-    over: Ints
     cosines: Floats
     parent: Ints
-    face_over: Ints
     weights: Floats
     whole: Floats
     crossing: Floats
@@ -53,60 +52,41 @@ class Pieces(NamedTuple):
     counts: Ints
 
 
-class Order(NamedTuple):
-    """Vertices and faces in the order in which the plane passes them, and where those of each column start."""
-
-    starts: NDArray[np.int64]
-    vertices: NDArray[np.int64]
-    face_starts: NDArray[np.int64]
-    faces: NDArray[np.int64]
+@helper
+def make_pieces(scars: Scars, layout: Layout) -> Pieces:
+    """Room for the pieces of a solid."""
+    size, faces = layout.faces.points.shape[1], layout.faces.corners.shape[1]
+    heights, cosines, parent, top, low = floats(size, 0.0), floats(size, 0.0), ints(size, NONE), ints(size, 0), table(size, 2)
+    weights, whole, crossing = table(faces, len(SUMS)), table(size, len(SUMS)), table(size, len(SUMS))
+    live, active, counts = ints(size, 0), ints(faces, 0), ints(2, 0)
+    return Pieces(scars, layout, heights, cosines, parent, weights, whole, crossing, top, low, live, active, counts)
 
 
 @helper
-def make_pieces(size: int, faces: int) -> Pieces:
-    """Room for the pieces of a solid with that many vertices and faces."""
-    return Pieces(
-        floats(size, 0.0),
-        ints(size, 0),
-        floats(size, 0.0),
-        ints(size, NONE),
-        ints(faces, 0),
-        table(faces, len(SUMS)),
-        table(size, len(SUMS)),
-        table(size, len(SUMS)),
-        ints(size, 0),
-        table(size, 2),
-        ints(size, 0),
-        ints(faces, 0),
-        ints(2, 0),
-    )
-
-
-@helper
-def begin(pieces: Pieces, scars: Scars, row: int, grid: OffsetGrid, layout: Layout) -> Order:
-    """Lay out vertices and faces along a direction, the plane above all of them. grid.heights are those of the pieces."""
-    normals, corners, d = layout.vertex_normals, layout.faces.corners, grid.direction
-    for v in range(len(pieces.over)):
-        pieces.over[v] = min(column_over(grid.heights[v]), grid.columns)
+def begin(pieces: Pieces, row: int, columns: int) -> Order:
+    """Lay out vertices and faces along a direction of the scars, the plane above all of them. pieces.heights are set already."""
+    normals, corners, d = pieces.layout.vertex_normals, pieces.layout.faces.corners, pieces.scars.directions[row]
+    over, face_over = ints(len(pieces.heights), 0), ints(corners.shape[1], 0)
+    for v in range(len(over)):
+        over[v] = min(column_over(pieces.heights[v]), columns)
         pieces.cosines[v] = normals[0, v] * d[0] + normals[1, v] * d[1] + normals[2, v] * d[2]
         pieces.parent[v] = NONE
-    for f in range(len(pieces.face_over)):
-        pieces.face_over[f] = max(pieces.over[corners[0, f]], pieces.over[corners[1, f]], pieces.over[corners[2, f]])
+    for f in range(len(face_over)):
+        face_over[f] = max(over[corners[0, f]], over[corners[1, f]], over[corners[2, f]])
     pieces.counts[0] = pieces.counts[1] = 0
-    _weigh_faces(scars, row, d, pieces.weights)
-    starts, vertices = counting_sort(pieces.over, grid.columns + 1)
-    face_starts, faces = counting_sort(pieces.face_over, grid.columns + 1)
-    return Order(starts, vertices, face_starts, faces)
+    _weigh_faces(pieces.scars, row, d, pieces.weights)
+    return counting_sort(over, columns + 1), counting_sort(face_over, columns + 1)
 
 
 @helper
-def descend(pieces: Pieces, column: int, order: Order, layout: Layout) -> None:
+def descend(pieces: Pieces, column: int, order: Order) -> None:
     """Move the plane down to a column from the one above it."""
-    _enter(pieces, order.vertices[order.starts[column + 1] : order.starts[column + 2]], layout)
-    for at in range(order.face_starts[column + 1], order.face_starts[column + 2]):
-        pieces.active[pieces.counts[1]] = order.faces[at]
+    (starts, vertices), (face_starts, faces) = order
+    _enter(pieces, vertices[starts[column + 1] : starts[column + 2]])
+    for at in range(face_starts[column + 1], face_starts[column + 2]):
+        pieces.active[pieces.counts[1]] = faces[at]
         pieces.counts[1] += 1
-    _cross(pieces, column, layout)
+    _cross(pieces, column)
 
 
 @no_nrt
@@ -144,9 +124,10 @@ def _join(pieces: Pieces, a: int, b: int) -> None:
 
 
 @helper
-def _enter(pieces: Pieces, vertices: NDArray[np.int64], layout: Layout) -> None:
+def _enter(pieces: Pieces, vertices: Indices) -> None:
     """Begin a piece at each vertex that comes to lie above the plane, and join it to its neighbours there."""
-    starts, neighbours = layout.rings.starts, layout.rings.neighbours
+    layout = pieces.layout
+    starts, neighbours = layout.starts, layout.neighbours
     for v in vertices:
         pieces.parent[v], pieces.top[v] = v, v
         pieces.low[v, 0] = layout.triangles.vertices[v, 2]
@@ -189,9 +170,10 @@ def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
 
 
 @no_nrt
-def _cross(pieces: Pieces, column: int, layout: Layout) -> None:
+def _cross(pieces: Pieces, column: int) -> None:
     """Add the faces that have come to lie wholly above a column to their pieces, and the shares of those that cross it."""
-    faces, points, heights, c = layout.triangles.faces, layout.triangles.vertices, pieces.heights, float(column)
+    surface, heights, c = pieces.layout.triangles, pieces.heights, float(column)
+    faces, points = surface.faces, surface.vertices
     _forget_crossing(pieces)
     still = 0
     for at in range(pieces.counts[1]):

@@ -68,8 +68,7 @@ def _enters(tree: TriangleTree, node: int, origin: Floats, inverse: Floats, reac
         b = (high[node, axis] - origin[axis]) * inverse[axis]
         near = max(near, min(a, b))
         far = min(far, max(a, b))
-    meets: bool = near <= far * (1.0 + 1e-9)
-    return meets
+    return near <= far * (1.0 + 1e-9)
 
 
 @no_nrt
@@ -92,12 +91,13 @@ def _distance(p: Floats, q: Floats, r: Floats, origin: Floats, ray: Floats) -> f
 
 
 @helper
-def first_hit(tree: TriangleTree, origin: Floats, ray: Floats, reach: float, own_vertex: int, facing: float) -> int:
-    """The first face met along `ray` within reach whose normal has at least the cosine `facing` with it; -1: none.
+def first_hit(tree: TriangleTree, placed_ray: Floats, reach: float, own_vertex: int, facing: float) -> int:
+    """The first face that a ray, its origin and unit direction (2, 3), meets within reach and whose normal has at least the
+    cosine `facing` with it; -1: none.
 
     The faces around own_vertex are left out (-1: around none).
     """
-    vertices, faces, normals = tree.vertices, tree.faces, tree.normals
+    vertices, faces, normals, origin, ray = tree.vertices, tree.faces, tree.normals, placed_ray[0], placed_ray[1]
     leaves = len(tree.low) // 2
     inverse = floats(3, 0.0)
     for axis in range(3):
@@ -126,27 +126,40 @@ def first_hit(tree: TriangleTree, origin: Floats, ray: Floats, reach: float, own
     return hit
 
 
-@kernel
-def faces_met(tree: TriangleTree, places: Floats, rays: Floats, reach: float) -> Ints:
-    """(n,) the first face that each place's ray, a unit vector, meets within reach; -1: none."""
-    out = ints(len(places), -1)
-    for k in range(len(out)):
-        out[k] = first_hit(tree, places[k], rays[k], reach, -1, ANY_FACE)
-    return out
-
-
-def blocked_shares(
-    tree: TriangleTree, places: Floats, frames: Floats, rays: Floats, reach_mm: float, in_turn: bool = False
-) -> Floats:
-    """(n,) the share of rays, given in each place's frame (n, 3, 3), whose rows are its axes, that meet the surface within reach.
+def faces_met(tree: TriangleTree, rays: Floats, reach: float, facing: float = ANY_FACE, in_turn: bool = False) -> Ints:
+    """(n,) the first face that each ray, its origin and unit direction (n, 2, 3), meets within reach and whose normal has at
+    least the cosine `facing` with it; -1: none.
 
     in_turn: on one core, for a process that has no threads.
     """
-    out = np.zeros(len(places))
+    met = np.empty(len(rays), np.int32)
     if in_turn:
-        _block(0, len(places), tree, places, frames, rays, reach_mm, out)
+        _find_met(0, len(met), tree, (rays, reach, facing), met)
     else:
-        in_threads(_block, len(places), tree, places, frames, rays, reach_mm, out)
+        in_threads(_find_met, len(met), tree, (rays, reach, facing), met)
+    return met
+
+
+@kernel
+def _find_met(begin: int, end: int, tree: TriangleTree, rays: tuple[Floats, float, float], met: Ints) -> None:
+    placed, reach, facing = rays
+    for k in range(begin, end):
+        met[k] = first_hit(tree, placed[k], reach, -1, facing)
+
+
+def blocked_shares(
+    tree: TriangleTree, framed_places: tuple[Floats, Floats], rays: Floats, reach_mm: float, in_turn: bool = False
+) -> Floats:
+    """(n,) the share of rays that meet the surface within reach, given in the frame of each place: (n, 3) places and (n, 3, 3)
+    frames, whose rows are their axes.
+
+    in_turn: on one core, for a process that has no threads.
+    """
+    bundles, out = (*framed_places, rays, reach_mm), np.zeros(len(framed_places[0]))
+    if in_turn:
+        _find_blocked(0, len(out), tree, bundles, out)
+    else:
+        in_threads(_find_blocked, len(out), tree, bundles, out)
     return out
 
 
@@ -161,34 +174,33 @@ def frames_about(normals: Floats) -> Floats:
 
 
 @kernel
-def _block(
-    begin: int, end: int, tree: TriangleTree, places: Floats, frames: Floats, rays: Floats, reach: float, out: Floats
-) -> None:
-    origin, ray = floats(3, 0.0), floats(3, 0.0)
+def _find_blocked(begin: int, end: int, tree: TriangleTree, bundles: tuple[Floats, Floats, Floats, float], out: Floats) -> None:
+    (places, frames, rays, reach), ray = bundles, table(2, 3)
     for f in range(begin, end):
-        blocked = 0
+        blocked, x, y, z = 0, frames[f, 0], frames[f, 1], frames[f, 2]
         for k in range(len(rays)):
             for axis in range(3):
-                origin[axis] = places[f, axis]
-                ray[axis] = rays[k, 0] * frames[f, 0, axis] + rays[k, 1] * frames[f, 1, axis] + rays[k, 2] * frames[f, 2, axis]
-            blocked += int(first_hit(tree, origin, ray, reach, -1, ANY_FACE) >= 0)
+                ray[0, axis] = places[f, axis]
+                ray[1, axis] = rays[k, 0] * x[axis] + rays[k, 1] * y[axis] + rays[k, 2] * z[axis]
+            blocked += int(first_hit(tree, ray, reach, -1, ANY_FACE) >= 0)
         out[f] = blocked / len(rays)
 
 
 def distances_mm(surface: Mesh, places: Floats, reach_mm: float) -> Floats:
     """(n,) how far places (n, 3) lie from a mesh whose faces are in spatial order, reach_mm for those that lie farther, mm."""
-    found = np.empty(len(places))
-    in_threads(_nearest, len(places), triangle_tree(surface), places, reach_mm * reach_mm, found)
-    return np.sqrt(found)
+    squares = np.full(len(places), reach_mm * reach_mm)
+    in_threads(_find_nearest, len(places), triangle_tree(surface), places, squares)
+    distances: Floats = np.sqrt(squares)
+    return distances
 
 
 @kernel
-def _nearest(begin: int, end: int, tree: TriangleTree, places: Floats, reach_2: float, out: Floats) -> None:
-    """The squared distance of each place from the surface, at most reach_2."""
+def _find_nearest(begin: int, end: int, tree: TriangleTree, places: Floats, squares: Floats) -> None:
+    """Lower the squares to those of the distances of the places from the surface."""
     vertices, faces, leaves = tree.vertices, tree.faces, len(tree.low) // 2
     stack = ints(DEPTH, 1)
     for k in range(begin, end):
-        place, least = places[k], reach_2
+        place, least = places[k], squares[k]
         stack[0], top = 1, 1
         while top > 0:
             top -= 1
@@ -204,7 +216,7 @@ def _nearest(begin: int, end: int, tree: TriangleTree, places: Floats, reach_2: 
             first = (node - leaves) * LEAF_FACES
             for f in range(first, min(first + LEAF_FACES, len(faces))):
                 least = min(least, _from_face(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], place))
-        out[k] = least
+        squares[k] = least
 
 
 @no_nrt

@@ -7,14 +7,14 @@ that looks the other way; near an acute edge the other face looks aside, that is
 
 import numpy as np
 
-from mdp.kernels.arrays import flags, floats
-from mdp.kernels.kernel import helper, kernel, no_nrt
+from mdp.kernels.arrays import floats
+from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats
 from mdp.overhang import Mask
 from mdp.plane import Plane
+from mdp.sweep.crossing import OffsetGrid, column_over
 from mdp.sweep.facets import Facets, Layout
-from mdp.sweep.integrals import OffsetGrid, column_over
-from mdp.sweep.rays import TriangleTree, first_hit
+from mdp.sweep.rays import TriangleTree, faces_met
 
 THIN_MM = 1.0  # walls and rods of two lines or less are fragile where a plane crosses them
 SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a sliver when the plane comes too near
@@ -58,17 +58,10 @@ def find_slivers(layout: Layout, grid: OffsetGrid, cosines: Floats, fragile: Flo
         fragile[column] = min(fragile[column], (column - nearest) * step)
 
 
-@kernel
 def thin_faces(tree: TriangleTree, thickness_mm: float) -> Mask:
     """(m,) whether the solid is thinner than that under the middle of a face."""
-    vertices, faces, normals = tree.vertices, tree.faces, tree.normals
-    thin, middle, ray = flags(len(faces)), floats(3, 0.0), floats(3, 0.0)
-    for f in range(len(faces)):
-        for axis in range(3):
-            total = vertices[faces[f, 0], axis] + vertices[faces[f, 1], axis] + vertices[faces[f, 2], axis]
-            middle[axis], ray[axis] = total / 3.0, -normals[f, axis]
-        thin[f] = first_hit(tree, middle, ray, thickness_mm, -1, OPPOSITE_COSINE) >= 0
-    return thin
+    a, b, c = (tree.vertices[tree.faces[:, k]] for k in range(3))
+    return faces_met(tree, np.stack([(a + b + c) / 3.0, -tree.normals], axis=1), thickness_mm, OPPOSITE_COSINE) >= 0
 
 
 def least_distance_mm(corners: Floats, plane: Plane) -> float:

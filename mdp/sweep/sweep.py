@@ -20,7 +20,7 @@ its first moment about c the volume above c.
     area above[column] = shares[column] + wholes[column + 1] + wholes[column + 2] + ...
 
 So one way down through the columns adds up all faces: vertices + faces + crossings is what a direction costs. Heights are counted
-in steps above its first offset, which makes column c lie at the height c (sweep.integrals).
+in steps above its first offset, which makes column c lie at the height c (sweep.crossing).
 
 There are two passes: `gains` touches only the faces that are risky one way or the other and says what a cut would make safe;
 `sweep` says whether it can be made, and runs only for the directions of candidates that come up.
@@ -32,21 +32,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import dot, floats, int_table, ints
+from mdp.kernels.arrays import dot, floats, ints
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import Mask
+from mdp.overhang import Mask, step_shares
 from mdp.plane import Plane
-from mdp.stairs import step_shares
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import Classes
-from mdp.sweep.components import View, count_pieces, find_critical
-from mdp.sweep.contact_area import find_contact_areas
+from mdp.sweep.components import count_pieces, find_contact_areas, find_critical, plant_tree
+from mdp.sweep.crossing import RIM, STAIRS, STAIRS_UP, OffsetGrid, find_heights, find_lowest, integrate_scars, integrate_volume
 from mdp.sweep.cylinders import Cylinder, crossings
 from mdp.sweep.facets import FaceTable, Facets, Layout, Scars
-from mdp.sweep.integrals import OffsetGrid, find_heights, find_lowest, integrate_risky_area, integrate_volume
-from mdp.sweep.rims import integrate_scars
 from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
 
 
@@ -55,7 +52,7 @@ class Gains(NamedTuple):
 
     up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
     direction, weighted by what support each face needs; rim_mm: weighted length of the rim that a cut leaves, 0 where the
-    remainder counts no seams; hopeless_mm2: risky area above it that no cut can save, 0 where that was not asked for;
+    remainder counts no seams; unavoidable_mm2: risky area above it that no cut can save, 0 where that was not asked for;
     stairs_up_mm2, stairs_mm2: what the stairs above it count printed straight up and along the direction, crossed: how many
     cylinders it cuts askew; 0 where the remainder counts none.
     """
@@ -65,7 +62,7 @@ class Gains(NamedTuple):
     up_mm2: Floats
     residual_mm2: Floats
     rim_mm: Floats
-    hopeless_mm2: Floats
+    unavoidable_mm2: Floats
     stairs_up_mm2: Floats
     stairs_mm2: Floats
     crossed: Floats
@@ -73,13 +70,11 @@ class Gains(NamedTuple):
     @property
     def used(self) -> Mask:
         """(k, n) which values are of offsets."""
-        used: Mask = np.arange(self.up_mm2.shape[1]) < self.columns[:, None]
-        return used
+        return np.arange(self.up_mm2.shape[1]) < self.columns[:, None]
 
     def offsets_mm(self, step_mm: float) -> Floats:
         """(k, n) the offsets."""
-        offsets: Floats = (self.first[:, None] + np.arange(self.up_mm2.shape[1])) * np.float64(step_mm)
-        return offsets
+        return (self.first[:, None] + np.arange(self.up_mm2.shape[1])) * np.float64(step_mm)
 
 
 class Sweep(NamedTuple):
@@ -88,7 +83,7 @@ class Sweep(NamedTuple):
     section_mm2: cross-section; volume_mm3: volume above; lowest_mm: least z of what lies above, exact where it is below the
     direction's watched height, some greater number elsewhere; fragile_mm: distance to the nearest surface that the plane
     would cut into a sliver; pieces: components of the solid below that do not reach the platform; contact_area_mm2: least
-    cross-section of a component of the solid above, crumbs left out, where there are no such pieces and what lies above is
+    cross-section of a component of the solid above, fragments left out, where there are no such pieces and what lies above is
     nowhere below the watched height.
     """
 
@@ -156,11 +151,9 @@ class Remainder:
     @cached_property
     def stairs_mm2(self) -> float:
         """What its stairs count printed straight up."""
-        return (
-            0.0
-            if self.stair_weights is None
-            else float((self.mesh.areas_mm2 * self.stair_weights) @ step_shares(self.mesh.normals[:, 2]))
-        )
+        if self.stair_weights is None:
+            return 0.0
+        return float((self.mesh.areas_mm2 * self.stair_weights) @ step_shares(self.mesh.normals[:, 2]))
 
     @cached_property
     def layout(self) -> Layout:
@@ -171,8 +164,7 @@ class Remainder:
     def thin(self) -> Floats:
         """(k, 3, 3) corners of the faces under whose middle the solid is a thin wall or rod: a ray for every face."""
         mesh = self.facets.mesh
-        corners: Floats = mesh.vertices[mesh.faces[thin_faces(self.layout.triangles, THIN_MM)]]
-        return corners
+        return mesh.vertices[mesh.faces[thin_faces(self.layout.triangles, THIN_MM)]]
 
     def thin_mm(self, plane: Plane) -> float:
         """Distance of a plane to the nearest thin wall or rod on either side, 0 where it goes through one; infinite: no such."""
@@ -183,20 +175,9 @@ class Remainder:
         return int(float(np.linalg.norm(self.mesh.bounds_mm[1] - self.mesh.bounds_mm[0])) / step_mm) + 3
 
 
-class Sampling(NamedTuple):
-    """Directions (k, 3), the step of their offsets, for each (k,) the height below which the least z of a part matters and the
-    one that it must reach for the contact area to be of use, and how many steps a piece must be high to need one."""
-
-    directions: Floats
-    step_mm: float
-    watched_mm: Floats
-    needed_mm: Floats
-    crumb: float
-
-
-def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float, hopeless: Mask | None = None) -> Gains:
-    """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle; hopeless: (m,)
-    the faces, as remainder.facets orders them, that no cut can save.
+def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float, unavoidable: Mask | None = None) -> Gains:
+    """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle; unavoidable:
+    (m,) the faces, as remainder.facets orders them, that no cut can save.
 
     >>> from mdp.cut import convex_hull
     >>> from mdp.overhang import risky_upright, threshold
@@ -208,16 +189,16 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     shape = (len(directions), remainder.most_columns(step_mm))
     columns = np.zeros((2, shape[0]), np.int32)
     swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(7)))
-    scars = scars_of(remainder, directions, risky_below, hopeless)
+    scars = scars_of(remainder, directions, risky_below, unavoidable)
     in_threads(_gains, shape[0], scars, step_mm, swept)
     if remainder.cylinders:
         swept.crossed[:] = crossings(remainder.cylinders, directions, swept.offsets_mm(step_mm))
     return swept
 
 
-def scars_of(remainder: Remainder, directions: Floats, risky_below: float, hopeless: Mask | None = None) -> Scars:
-    """What blemishes a solid's surface along each of some directions; risky_below, hopeless: see gains."""
-    lost, faces = np.zeros(0, np.bool_) if hopeless is None else hopeless, remainder.facets.faces
+def scars_of(remainder: Remainder, directions: Floats, risky_below: float, unavoidable: Mask | None = None) -> Scars:
+    """What blemishes a solid's surface along each of some directions; risky_below, unavoidable: see gains."""
+    lost, faces = np.zeros(0, np.bool_) if unavoidable is None else unavoidable, remainder.facets.faces
     directions, classes = np.ascontiguousarray(directions), remainder.classes(directions)
     return Scars(directions, faces, risky_below, classes, remainder.weight, remainder.feather, lost)
 
@@ -227,66 +208,101 @@ def sweep(
     directions: Floats,
     step_mm: float,
     watched_mm: Floats | None = None,
-    crumb_mm: float = 2.0,
+    fragment_mm: float = 2.0,
 ) -> Sweep:
     """Whether a cut can be made at all offsets of (k, 3) unit directions.
 
-    watched_mm (k,): the height below which the least z of a part matters; absent: all heights. crumb_mm: a
-    piece above the plane that is lower than this may stand on any area.
+    watched_mm (k,): the height below which the least z of a part matters, and that it must reach for the contact area to be of
+    use; absent: all heights matter. fragment_mm: a piece above the plane that is lower than this may stand on any area.
     """
     watched = np.full(len(directions), np.inf) if watched_mm is None else np.ascontiguousarray(watched_mm)
     needed = np.full(len(directions), -np.inf) if watched_mm is None else watched
-    sampling = Sampling(np.ascontiguousarray(directions), step_mm, watched, needed, crumb_mm / step_mm)
+    sampling = np.ascontiguousarray(directions), step_mm, watched, needed, fragment_mm / step_mm
     shape = (len(directions), remainder.most_columns(step_mm))
-    swept = Sweep(
-        first=np.zeros(shape[0], np.int32),
-        columns=np.zeros(shape[0], np.int32),
-        section_mm2=np.zeros(shape),
-        volume_mm3=np.zeros(shape),
-        lowest_mm=np.full(shape, np.inf),
-        fragile_mm=np.full(shape, np.inf),
-        pieces=np.zeros(shape, np.int32),
-        contact_area_mm2=np.zeros(shape),
-    )
+    first, columns = np.zeros((2, shape[0]), np.int32)
+    (section, volume, contact_area), (lowest, fragile) = np.zeros((3, *shape)), np.full((2, *shape), np.inf)
+    swept = Sweep(first, columns, section, volume, lowest, fragile, np.zeros(shape, np.int32), contact_area)
     in_threads(_sweep, shape[0], remainder.layout, sampling, swept)
     return swept
 
 
 @kernel
 def _gains(begin_row: int, end_row: int, scars: Scars, step_mm: float, out: Gains) -> None:
-    points = scars.faces.points
-    heights, scratch = floats(points.shape[1], 0.0), int_table(2, len(scars.faces.areas_mm2) + 1)
+    heights = floats(scars.faces.points.shape[1], 0.0)
     for row in range(begin_row, end_row):
-        d = scars.directions[row]
-        first, n = find_heights(points, d, step_mm, heights)
+        first, n = find_heights(scars.faces.points, scars.directions[row], step_mm, heights)
         out.first[row], out.columns[row] = first, n
         if n > 0:
-            grid = OffsetGrid(d, heights, n, step_mm)
-            integrate_risky_area(scars, row, grid, scratch, (out.up_mm2[row], out.residual_mm2[row], out.hopeless_mm2[row]))
-            if len(scars.faces.seam_weights) > 0:
-                integrate_scars(scars, grid, (out.rim_mm[row], out.stairs_up_mm2[row], out.stairs_mm2[row]))
+            above = integrate_scars(scars, row, OffsetGrid(scars.directions[row], heights, n, step_mm))
+            for k in range(n):
+                sums = above[k]  # by the kinds of faces, see crossing
+                airy_both = sums[5] + sums[7]
+                both = sums[3] + sums[6]
+                out.up_mm2[row, k] = sums[1] + both + airy_both
+                out.residual_mm2[row, k] = sums[2] + both + scars.weight * (sums[4] + airy_both)
+                out.unavoidable_mm2[row, k] = sums[6] + sums[7]
+                out.stairs_up_mm2[row, k], out.stairs_mm2[row, k] = sums[STAIRS_UP], sums[STAIRS]
+                out.rim_mm[row, k] = sums[RIM] / step_mm
 
 
 @kernel
-def _sweep(begin_row: int, end_row: int, layout: Layout, sampling: Sampling, out: Sweep) -> None:
-    points, normals, step_mm = layout.faces.points, layout.vertex_normals, sampling.step_mm
+def _sweep(
+    begin_row: int, end_row: int, layout: Layout, sampling: tuple[Floats, float, Floats, Floats, float], out: Sweep
+) -> None:
+    """sampling: directions (k, 3), the step of their offsets, for each (k,) the height below which the least z of a part matters
+    and the one that it must reach for the contact area to be of use, and how many steps a piece must be high to need one."""
+    points, normals, (directions, step_mm, watched_mm, needed_mm, fragment) = layout.faces.points, layout.vertex_normals, sampling
     section, contact_area, lowest, pieces = out.section_mm2, out.contact_area_mm2, out.lowest_mm, out.pieces
     size = points.shape[1]
     heights, cosines, scratch = floats(size, 0.0), floats(size, 0.0), ints(size, 0)
     for row in range(begin_row, end_row):
-        d = sampling.directions[row]
-        first, n = find_heights(points, d, step_mm, heights)
+        first, n = find_heights(points, directions[row], step_mm, heights)
         out.first[row], out.columns[row] = first, n
         if n > 0:
-            grid = OffsetGrid(d, heights, n, step_mm)
+            grid = OffsetGrid(directions[row], heights, n, step_mm)
             integrate_volume(layout, grid, section[row], out.volume_mm3[row])
-            find_lowest(points[2], layout.rising_edges, grid, sampling.watched_mm[row], lowest[row])
-            dot(normals[0], normals[1], normals[2], d, cosines)
+            find_lowest(points[2], layout.rising_edges, grid, watched_mm[row], lowest[row])
+            dot(normals[0], normals[1], normals[2], directions[row], cosines)
             find_slivers(layout, grid, cosines, out.fragile_mm[row])
-            view = View(grid, cosines, scratch[: find_critical(cosines, layout.flatness, heights, layout.rings, scratch)])
-            count_pieces(layout, view, pieces[row])
+            critical = scratch[: find_critical(layout, heights, cosines, scratch)]
+            # Whether a tree grows from above is no constant: these functions would be compiled once for every value of it.
+            count_pieces(plant_tree(layout, grid, cosines, critical, n < 0), pieces[row])
             wanted = ints(n, 0)
             for column in range(n):
                 contact_area[row, column] = section[row, column]
-                wanted[column] = int(pieces[row, column] == 0 and lowest[row, column] >= sampling.needed_mm[row])
-            find_contact_areas(layout, view, sampling.crumb, wanted, contact_area[row])
+                wanted[column] = int(pieces[row, column] == 0 and lowest[row, column] >= needed_mm[row])
+            find_contact_areas(plant_tree(layout, grid, cosines, critical, n > 0), fragment, wanted, contact_area[row])
+
+
+def unavoidable_faces(remainder: Remainder, directions: Floats, least_offset_mm: Floats, risky_below: float) -> Mask:
+    """(m,) the risky faces, as remainder.facets orders them, that no cut can save: every one of (k, 3) directions along which
+    they would carry themselves needs a plane that lies too low, by (k,) least offsets, infinite: the direction is out of reach.
+
+    A face is saved by a direction along which it does not overhang, where a plane across it may lie below the face's middle. What
+    a search has lost for ever is at least their area: a lower bound that it knows before it cuts anything.
+    """
+    faces, bounds = remainder.facets.faces, (np.ascontiguousarray(directions), least_offset_mm, risky_below)
+    lost: Mask = faces.risky.copy()
+    in_threads(_find_unavoidable, len(lost), faces, bounds, lost)
+    return lost
+
+
+@kernel
+def _find_unavoidable(begin: int, end: int, faces: FaceTable, bounds: tuple[Floats, Floats, float], lost: Mask) -> None:
+    points, corners, normals, (directions, least_offset_mm, risky_below) = faces.points, faces.corners, faces.normals, bounds
+    last, count = 0, len(directions)  # neighbours are mostly saved by the same direction
+    for f in range(begin, end):
+        if not lost[f]:
+            continue
+        a, b, c = corners[0, f], corners[1, f], corners[2, f]
+        x = (points[0, a] + points[0, b] + points[0, c]) / 3.0
+        y = (points[1, a] + points[1, b] + points[1, c]) / 3.0
+        z = (points[2, a] + points[2, b] + points[2, c]) / 3.0
+        for number in range(count):
+            row = (last + number) % count
+            p, q, r = directions[row, 0], directions[row, 1], directions[row, 2]
+            carried = normals[0, f] * p + normals[1, f] * q + normals[2, f] * r >= risky_below
+            if carried and x * p + y * q + z * r > least_offset_mm[row]:
+                lost[f] = False
+                last = row
+                break

@@ -74,8 +74,7 @@ def opposites(faces: Ints | Indices) -> Ints:
     """
     starts, ends = faces.ravel().astype(np.int64), faces[:, [1, 2, 0]].ravel().astype(np.int64)
     keys = np.minimum(starts, ends) * (int(starts.max(initial=0)) + 1) + np.maximum(starts, ends)
-    paired: Ints = _paired(np.argsort(keys, kind="stable"), keys, starts < ends)
-    return paired
+    return _paired(np.argsort(keys, kind="stable"), keys, starts < ends)
 
 
 @kernel

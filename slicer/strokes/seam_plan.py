@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.directions.spread import spread_like_light
+from mdp.directions.unit_vectors import spread_like_light
 from mdp.kernels.arrays import flags, floats, longs, table
 from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats, Indices, Mesh, together
@@ -114,11 +114,11 @@ def light_samples(sections: Sections, outlines: Sequence[Sequence[Floats]]) -> t
     bodies = _bodies(mesh)
     own, blocked = np.full(len(lifted), bodies[sum(len(part.mesh.faces) for part in sections.earlier)]), np.zeros(len(lifted))
     if (bodies != bodies[0]).any():
-        met = faces_met(triangle_tree(mesh), lifted, np.ascontiguousarray(-frames[:, 2]), INWARD_MM)
+        met = faces_met(triangle_tree(mesh), np.stack([lifted, -frames[:, 2]], axis=1), INWARD_MM, in_turn=True)
         own = np.where(met >= 0, bodies[met], own)
     for body in np.unique(own):
         tree, rows = triangle_tree(Mesh(mesh.vertices, mesh.faces[bodies == body])), np.flatnonzero(own == body)
-        blocked[rows] = blocked_shares(tree, lifted[rows], frames[rows], spread_like_light(RAYS), FAR_MM, in_turn=True)
+        blocked[rows] = blocked_shares(tree, (lifted[rows], frames[rows]), spread_like_light(RAYS), FAR_MM, in_turn=True)
     seen = np.column_stack([places, outward, 1.0 - blocked])
     return levels, np.split(seen, np.cumsum(counts)[:-1])
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.cut import above, below, solid_of
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.plane import Plane
 from mdp.pose import poses
 from profiles.errors import PlanError

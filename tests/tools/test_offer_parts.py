@@ -7,9 +7,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mdp.directions.turns import turned_by
 from mdp.mesh import Floats
 from mdp.plane import Plane
+from mdp.pose import turned_by
 from profiles.profile import load
 from tests.shapes import branch
 

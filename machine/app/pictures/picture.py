@@ -10,7 +10,7 @@ from PIL import ImageDraw, ImageFont
 
 from machine.app.pictures.raster import Image, View, draw, seen_from
 from machine.view.parts import part_colours, residual_faces
-from mdp.cost.model_need import needing_upright
+from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
 from mdp.pose import UP, unit

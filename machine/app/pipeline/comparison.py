@@ -14,14 +14,13 @@ from machine.dryrun.dryrun import DryRun
 from machine.planning.fit import standing_at
 from machine.program import Alternative, Program, joints_of_print
 from machine.quantities import duration, filament_g
-from mdp.cost.cost import weight_of_stairs
-from mdp.cost.model_need import needing_upright
+from mdp.cost.cost import needing_upright, weight_of_stairs
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
 from mdp.mesh import Mesh
+from mdp.overhang import step_shares
 from mdp.save import joint_values
 from mdp.search.parts import one_piece
-from mdp.stairs import step_shares
 from profiles.errors import UserError
 from profiles.profile import Profile
 from slicer.paths import Kind

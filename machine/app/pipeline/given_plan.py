@@ -9,9 +9,9 @@ import numpy as np
 from machine.app.requests import MOST_COPIES, ModelRequest
 from machine.planning.stops import parts_in_words
 from mdp.directions.orientation import motion_between
-from mdp.directions.turns import turned_further
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import plan_beside
+from mdp.pose import turned_further
 from mdp.search.plan_file import PlanFile
 from mdp.search.plan_reading import read_plan
 from mdp.search.search import check_part_count

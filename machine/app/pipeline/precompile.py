@@ -20,10 +20,9 @@ from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
 from mdp.clearance import passes_clear
-from mdp.cost.cost import CostTerms, measure_seam
-from mdp.cost.forecast import Surface
+from mdp.cost.cost import CostTerms
+from mdp.cost.forecast import Forecast
 from mdp.cost.hidden import hidden_shares
-from mdp.cost.part_forecast import forecast_parts
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.kernels.cache import trouble
@@ -34,9 +33,9 @@ from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
 from mdp.search.search import SearchRequest, decompose
 from mdp.support_need.need import SupportNeed
-from mdp.sweep.hopeless import Savers, hopeless_faces
+from mdp.sweep.crossing import measure_rim
 from mdp.sweep.limbs import LimbGrid, find_limbs, limb_reach, sum_limbs
-from mdp.sweep.sweep import Remainder, gains, sweep
+from mdp.sweep.sweep import Remainder, gains, sweep, unavoidable_faces
 from profiles.profile import Profile, load
 from slicer.slice import slice_part
 
@@ -86,12 +85,12 @@ def _search() -> None:
     """The other kernels of the search."""
     remainder = _remainder()
     gains(remainder, LEANING[None], 1.0, threshold(45.0))
-    hopeless_faces(remainder.facets, Savers(LEANING[None], np.zeros(1), threshold(45.0)))
+    unavoidable_faces(remainder, LEANING[None], np.zeros(1), threshold(45.0))
     remainder.thin_mm(PLANE)
-    measure_seam(remainder.mesh, remainder.mesh.areas_mm2, PLANE, 0.0)
+    measure_rim(remainder.mesh, remainder.mesh.areas_mm2, PLANE, 0.0)
     terms = CostTerms(45.0, False)
-    Surface.of(remainder, terms).left_mm2([PLANE])
-    forecast_parts(Surface.of(remainder, terms, remainder.mesh.areas_mm2), [PLANE])
+    Forecast.of(remainder, terms).left_mm2([PLANE])
+    Forecast.of(remainder, terms, remainder.mesh.areas_mm2).parts([PLANE])
     _limbs(remainder)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from machine.app.terminal.report import estimates, table
 from machine.quantities import minutes
-from mdp.cost.footing import Plate
+from mdp.cost.footing import BuildPlate
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words, side_in_words
 from mdp.mesh import Mesh
@@ -46,7 +46,7 @@ def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
 
 def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
     """A warning where the plate hardly holds a model as it stands."""
-    return () if Plate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
+    return () if BuildPlate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
 
 
 def _with_scars(row: FrontRow) -> str:

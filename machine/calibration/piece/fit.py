@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from machine.calibration.piece.pads import PADS, WAYS, Piece
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats
 from mdp.pose import unit
 from profiles.errors import ProfileError

@@ -7,7 +7,7 @@ from pathlib import Path
 from machine.calibration.piece.fit import BIAS_MM, READ_MM, USUAL, slope_of
 from machine.calibration.piece.pads import Piece
 from machine.calibration.piece.readings import HEIGHT_MM, MARK_MM
-from mdp.directions.frame import frame_across
+from mdp.directions.unit_vectors import frame_across
 from mdp.pose import unit
 
 TEMPLATE = Path(__file__).parent / "page.html"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from machine.dryrun import dry_run
 from machine.kinematics.collision import hull, refined_gap, sweep_gaps, table_reach
 from machine.kinematics.table import machine_points
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.head import Block, Ring, bodies, directions
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Box, Head, Machine

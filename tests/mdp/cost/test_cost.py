@@ -6,16 +6,15 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.cost import CostTerms, SeamPlaces, measure_seam
-from mdp.cost.forecast import Surface
-from mdp.cost.model_need import ModelSurface
+from mdp.cost.cost import CostTerms, SeamPlaces
+from mdp.cost.forecast import Forecast
 from mdp.cut import Solid, below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import Plane
 from mdp.search.search import decompose
-from mdp.sweep.rims import Rim
+from mdp.sweep.crossing import Rim, measure_rim
 from mdp.sweep.sweep import Gains, Remainder, gains
 from profiles.profile import load
 from tests import shapes
@@ -41,11 +40,12 @@ def _swept(mesh: Mesh, direction: Floats, feather: float = 0.0) -> Gains:
 def _places(mesh: Mesh, hidden_share: float = 1.0) -> tuple[SeamPlaces, Solid]:
     """Where seams cost how much on a model, and its solid."""
     solid = solid_of(mesh)
-    return SeamPlaces.of(ModelSurface.of(mesh, solid), solid, hidden_share), solid
+    sets = (f"search.hidden_seam_share={hidden_share}", "search.feature_mm2=0", "search.feature_weight=1")
+    return SeamPlaces.of(mesh, solid, load(settings=sets).search), solid
 
 
 def _seam(places: SeamPlaces, solid: Solid, plane: Plane, feather: float = 0.0) -> Rim:
-    return measure_seam(mesh_of(solid), places.weights(places.surface.piece(solid)), plane, feather)
+    return measure_rim(mesh_of(solid), places.weights(places.piece(solid)), plane, feather)
 
 
 def _section_mm(mesh: Mesh, plane: Plane) -> float:
@@ -100,7 +100,7 @@ def test_a_seam_along_a_crease_counts_less_than_beside_it() -> None:
 def test_the_seam_of_one_plane_is_the_sweep_s_rim(seed: int, lean: tuple[float, float], offset_mm: float) -> None:
     mesh, plane = random_solid(seed), Plane(_direction(lean), offset_mm)
     places, solid = _places(mesh, hidden_share=0.4)
-    remainder = _remainder(mesh_of(solid), places.weights(places.surface.piece(solid)), 0.5)
+    remainder = _remainder(mesh_of(solid), places.weights(places.piece(solid)), 0.5)
     swept = gains(remainder, plane.normal[None], offset_mm, threshold(ANGLE_DEG))
     column = 1 - int(swept.first[0])
     if 0 <= column < swept.columns[0]:
@@ -113,8 +113,8 @@ def test_the_forecast_counts_every_seam_as_it_is_after_cutting(leans: list[tuple
     places, rest = _places(shapes.branch(), hidden_share=0.4)
     mesh, terms = mesh_of(rest), CostTerms(ANGLE_DEG, False, seam_mm=0.6, feather=0.5)
     planes = [Plane(_direction(lean), offset_mm) for lean, offset_mm in leans]
-    with_seams = Surface.of(_remainder(mesh, places.weights(places.surface.piece(rest)), 0.5), terms).left_mm2(planes)
-    without = Surface.of(Remainder(mesh, risky_upright(mesh, ANGLE_DEG)), CostTerms(ANGLE_DEG, False)).left_mm2(planes)
+    with_seams = Forecast.of(_remainder(mesh, places.weights(places.piece(rest)), 0.5), terms).left_mm2(planes)
+    without = Forecast.of(Remainder(mesh, risky_upright(mesh, ANGLE_DEG)), CostTerms(ANGLE_DEG, False)).left_mm2(planes)
     seams_mm = 0.0
     for plane in planes:
         seams_mm += _seam(places, rest, plane, 0.5).weighted_mm

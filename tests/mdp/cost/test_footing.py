@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.footing import BLUNT, Footing, Plate
+from mdp.cost.footing import BLUNT, BuildPlate, Footing
 from mdp.cut import mesh_of
 from mdp.mesh import Floats
 from mdp.overhang import PLATFORM_TOLERANCE_MM
@@ -22,7 +22,7 @@ def rod(radius_mm: float, height_mm: float) -> m3.Manifold:
 
 
 def footing_of(solid: m3.Manifold, rotation: Floats = UPRIGHT, **changes: object) -> Footing:
-    return replace(Plate.under(mesh_of(solid), load()), **changes).footing(rotation)
+    return replace(BuildPlate.under(mesh_of(solid), load()), **changes).footing(rotation)
 
 
 def test_the_tension_under_a_rod_is_that_of_a_push_at_its_top_less_its_weight() -> None:
@@ -134,7 +134,7 @@ def test_bases_are_the_sections_that_manifold3d_cuts(seed: int) -> None:
     turn *= np.sign(np.linalg.det(turn))
     mesh, turned = mesh_of(ring), ring.transform(np.column_stack([turn, np.zeros(3)]))
     low, shadow_mm2 = turned.bounding_box()[2], 0.5 * np.abs(mesh.normals @ turn[2]) @ mesh.areas_mm2
-    heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * Plate.under(mesh, load()).diameter_mm)
+    heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * BuildPlate.under(mesh, load()).diameter_mm)
     touching_mm2, base_mm2 = (turned.slice(low + above_mm).area() for above_mm in heights_mm)
     footing = footing_of(ring, turn)
     assert footing.touching_share * shadow_mm2 == pytest.approx(touching_mm2, abs=1e-6)
@@ -145,7 +145,7 @@ def test_bases_are_the_sections_that_manifold3d_cuts(seed: int) -> None:
 @given(st.integers(0, 10**6))
 def test_the_hull_bounds_what_touches_and_how_far_a_model_may_lean(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    plate = Plate.under(mesh_of(rod(20.0, 6.0) + rod(4.0, 40.0).translate((12.0, 0.0, 0.0))), load())
+    plate = BuildPlate.under(mesh_of(rod(20.0, 6.0) + rod(4.0, 40.0).translate((12.0, 0.0, 0.0))), load())
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] if rng.random() < 0.8 else UPRIGHT
     turn = turn * np.sign(np.linalg.det(turn))
     footing, shadow_mm2 = plate.footing(turn), 0.5 * np.abs(plate.mesh.normals @ turn[2]) @ plate.mesh.areas_mm2
@@ -158,5 +158,5 @@ def test_the_hull_bounds_what_touches_and_how_far_a_model_may_lean(seed: int) ->
 @pytest.mark.parametrize("setting", ["process.raft_layers=3", "search.pedestal_mm=5"])
 def test_no_brim_holds_what_stands_on_a_raft_or_a_pedestal(setting: str) -> None:
     mesh = mesh_of(rod(5.0, 60.0))
-    footing = Plate.under(mesh, load(settings=[setting, "process.brim_mm=10"])).footing(UPRIGHT)
+    footing = BuildPlate.under(mesh, load(settings=[setting, "process.brim_mm=10"])).footing(UPRIGHT)
     assert footing.brimmed_mpa == pytest.approx(footing.tension_mpa)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.cost.cost import CostTerms
-from mdp.cost.forecast import Surface
+from mdp.cost.forecast import Forecast
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.mesh import Mesh
 from mdp.overhang import Mask, facing_down, risky_upright
@@ -17,8 +17,8 @@ from tests import shapes
 ANGLE_DEG = 45.0
 
 
-def _surface(mesh: Mesh) -> Surface:
-    return Surface.of(Remainder(mesh, risky_upright(mesh, ANGLE_DEG)), CostTerms(ANGLE_DEG, False))
+def _surface(mesh: Mesh) -> Forecast:
+    return Forecast.of(Remainder(mesh, risky_upright(mesh, ANGLE_DEG)), CostTerms(ANGLE_DEG, False))
 
 
 def _cut_and_summed(mesh: Mesh, planes: list[Plane]) -> float:

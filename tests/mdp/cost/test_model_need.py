@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.forecast import Surface
-from mdp.cost.model_need import needing_upright
+from mdp.cost.cost import needing_upright
+from mdp.cost.forecast import Forecast
 from mdp.cut import above
 from mdp.mesh import Mesh
 from mdp.overhang import facing_down, risky_upright, threshold
@@ -58,7 +58,7 @@ def test_forecast_front_and_parts_agree_on_what_a_cut_leaves(lean: float) -> Non
     assert row.support_area_mm2 == pytest.approx(sum(part.risky_area_mm2 for part in parts), rel=1e-6)
     upright_mm2 = sum(part.mesh.areas_mm2[part.needing_upright].sum() for part in parts if part.needing_upright is not None)
     assert upright_mm2 == pytest.approx(problem.root.risky_mm2, rel=1e-6)
-    assert Surface.of(problem.root.remainder, problem.terms).left_mm2([plane]) == pytest.approx(node.cost_mm2, rel=1e-6)
+    assert Forecast.of(problem.root.remainder, problem.terms).left_mm2([plane]) == pytest.approx(node.cost_mm2, rel=1e-6)
 
 
 def test_what_is_over_air_costs_so_many_times_its_area_and_counts_once_in_what_needs_support() -> None:
@@ -70,8 +70,8 @@ def test_what_is_over_air_costs_so_many_times_its_area_and_counts_once_in_what_n
         assert node is not None
         assert problem.terms.need is not None
         rows.append(front_row(node))
-    part = node.places.surface.piece(above(problem.root.solid, plane))
-    classes = problem.terms.need.pieces(part).along(plane.normal)
+    part = node.places.piece(above(problem.root.solid, plane))
+    classes = problem.terms.need.pieces(part.mesh, part.sources).along(plane.normal)
     over_air_mm2 = part.mesh.areas_mm2[facing_down(part.mesh, plane.normal, 45.0) & (classes == UNSUPPORTABLE)].sum()
     assert over_air_mm2 > 50.0
     assert rows[1].cost_mm2 - rows[0].cost_mm2 == pytest.approx(4.0 * over_air_mm2)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdp.directions.spread import spread, spread_like_light
+from mdp.directions.unit_vectors import spread, spread_like_light
 
 
 @pytest.mark.parametrize(("count", "least_z"), [(1000, -1.0), (600, 0.17), (400, 0.0)])

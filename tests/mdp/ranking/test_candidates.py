@@ -7,7 +7,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.ranking.candidates import bounds_of, footprint
 from profiles.profile import load
 from tests.shapes import box, from_manifold

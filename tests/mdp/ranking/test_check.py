@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from mdp.cost.cost import CostTerms
 from mdp.cut import cut, mesh_of, solid_of
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.plane import Plane

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
 from mdp.ranking.candidates import Bounds, Feasibility, Reason, ScoredCandidates
@@ -93,7 +93,7 @@ def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
 
     n = len(own.gain)
     costs = {"gain_mm2": own.gain, "residual_mm2": own.residual, "lost_mm2": own.lost}
-    unused = dict.fromkeys(("above_mm2", "stairs_mm2", "seam_mm2", "hopeless_mm2"), np.zeros(n))
+    unused = dict.fromkeys(("above_mm2", "stairs_mm2", "seam_mm2", "unavoidable_mm2"), np.zeros(n))
     limits = Bounds(DIRECTIONS, np.zeros(40), np.zeros(40), 0.0, 0.0, np.zeros((40, 0, 2)), 0.0, 0.0, 1.0)
     scored = ScoredCandidates(
         None, limits, own.direction, own.offset, **costs, **unused, first=own.direction, columns=own.direction

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.mesh import Floats, Mesh, dot
+from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.pose import about, unit
 from mdp.search.neck import find_neck
-from mdp.sweep.rims import measure_rim
+from mdp.sweep.crossing import measure_rim
 from tests import shapes
 
 WAIST_MM, LENGTH_MM, ROUND = 4.0, 30.0, 40
@@ -44,9 +44,7 @@ def hourglass(wide: float = 1.0) -> Mesh:
 
 
 def rim_mm(mesh: Mesh, plane: Plane) -> float:
-    heights = plane.heights_mm(mesh.vertices) + 1e-7
-    seen = np.ones(len(mesh.faces))
-    return measure_rim(mesh.faces, heights, dot(mesh.normals, plane.normal), mesh.areas_mm2, seen, 0.0).length_mm
+    return measure_rim(mesh, np.ones(len(mesh.faces)), Plane(plane.normal, plane.offset_mm - 1e-7), 0.0).length_mm
 
 
 def neck(mesh: Mesh, plane: Plane, reach_mm: float = 12.0) -> Plane | None:

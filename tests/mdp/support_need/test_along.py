@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.model_need import ModelSurface
+from mdp.cost.cost import origin_of, piece_of
 from mdp.cut import below, solid_of
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.mesh import Mesh
 from mdp.overhang import UP, facing_down
 from mdp.plane import Plane
@@ -70,8 +70,8 @@ def test_upright_a_face_that_a_cut_laid_open_needs_support_where_a_bridge_beside
 
 def test_a_face_that_a_cut_laid_open_needs_support_along_every_direction() -> None:
     mesh = tee()
-    surface, rest = ModelSurface.of(mesh, solid_of(mesh)), below(solid_of(mesh), Plane(UP, 12.0))
-    piece = surface.piece(rest)
+    rest = below(solid_of(mesh), Plane(UP, 12.0))
+    piece = piece_of(rest, origin_of(solid_of(mesh)))
     pieces = ModelPieces(SupportNeed.of(mesh, PROCESS, 5.0), piece.sources)
     opened = piece.mesh.normals[:, 2] > 0.999
     assert piece.mesh.areas_mm2[opened].sum() == pytest.approx(100.0)

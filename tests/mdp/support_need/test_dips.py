@@ -12,7 +12,7 @@ from numba import njit
 from mdp.kernels.arrays import ints
 from mdp.mesh import Floats, Ints
 from mdp.support_need import descent
-from mdp.support_need.descent import DIP_MM, UNSEEN, Pool
+from mdp.support_need.descent import DIP_MM, UNSEEN
 from mdp.topology.edges import LinkedFaces, link
 from tests.mdp.solids import random_solid
 from tests.shapes import box
@@ -22,7 +22,7 @@ NO_BASE = -np.inf
 
 @njit
 def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, base_mm: float) -> bool:
-    pool = Pool(ints(len(heights), UNSEEN), ints(len(heights), 0))
+    pool = ints(len(heights), UNSEEN), ints(len(heights), 0)
     return descent.begins_in_air(surface, heights, patch, pool, base_mm)
 
 

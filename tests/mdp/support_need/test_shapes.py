@@ -6,8 +6,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mdp.directions.frame import frame_across, framed
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import frame_across, framed, spread
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask, facing_down, risky_upright
 from mdp.pose import about, unit
@@ -96,7 +95,7 @@ def test_faces_over_air_are_those_below_which_no_face_looks_up(seed: int) -> Non
     mesh, directions = random_solid(seed), spread(37, 0.0)[[2, 14, 30]]
     surface, over_air = link(mesh), np.zeros((3, len(mesh.faces)), np.uint8)
     places = flat_places(surface)
-    find_over_air(0, 3, surface, places, framed(directions), over_air)
+    find_over_air(0, 3, (surface, places), framed(directions), over_air)
     for direction, row in zip(directions, over_air, strict=True):
         down = mesh.normals @ direction < -0.05
         airy = by_place(airy_share(mesh, direction), places, mesh.areas_mm2)

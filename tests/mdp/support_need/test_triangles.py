@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.model_need import excess_mm2, needing_upright
+from mdp.cost.cost import excess_mm2, needing_upright
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import facing_down, risky_upright, threshold
 from mdp.plane import Plane

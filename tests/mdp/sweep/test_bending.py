@@ -53,7 +53,7 @@ def test_an_arch_is_one_piece_on_two_feet() -> None:
     assert _stress(arch) < _stress(legs[0]) * 24.0 / 19.0 / 1.5
 
 
-def test_a_crumb_may_stand_on_anything() -> None:
+def test_a_fragment_may_stand_on_anything() -> None:
     assert _stress(m3.Manifold.cube((1.0, 1.0, 6.9))) == 0.0
 
 
@@ -109,12 +109,12 @@ def test_random_solids_are_stressed_as_their_exact_pieces(seed: int, height: int
     assert stress_per_newton(mesh, plane, 2.0) == pytest.approx(_greatest_stress(mesh, plane, 2.0), rel=1e-4)
 
 
-def _greatest_stress(mesh: Mesh, plane: Plane, crumb_mm: float) -> float:
+def _greatest_stress(mesh: Mesh, plane: Plane, fragment_mm: float) -> float:
     """Every piece cut off exactly, the moments of its base face by face, pushed in 720 directions."""
     pieces = [mesh_of(piece) for piece in above(solid_of(mesh), plane).decompose() if piece.volume() > 0.0]
     tops = [float(plane.heights_mm(piece.vertices).max()) for piece in pieces]
     return max(
-        (top * _base_stress(piece, plane) for piece, top in zip(pieces, tops, strict=True) if top >= crumb_mm), default=0.0
+        (top * _base_stress(piece, plane) for piece, top in zip(pieces, tops, strict=True) if top >= fragment_mm), default=0.0
     )
 
 

@@ -15,9 +15,9 @@ def _remainder(mesh: Mesh) -> Remainder:
     return Remainder(mesh, np.zeros(len(mesh.faces), bool))
 
 
-def _contact_areas(mesh: Mesh, crumb_mm: float = 2.0) -> Floats:
+def _contact_areas(mesh: Mesh, fragment_mm: float = 2.0) -> Floats:
     """By offset, 1 mm apart, the first at 1 mm."""
-    areas: Floats = sweep(_remainder(mesh), UP, 1.0, crumb_mm=crumb_mm).contact_area_mm2[0]
+    areas: Floats = sweep(_remainder(mesh), UP, 1.0, fragment_mm=fragment_mm).contact_area_mm2[0]
     return areas
 
 
@@ -32,7 +32,7 @@ def test_the_thinnest_tower_counts_and_not_the_sum_of_the_sections() -> None:
     assert _contact_areas(_two_towers(1.5, 15))[[4, 14, 26]] == pytest.approx([800.0, 1.5 * 1.5, 100.0])
 
 
-def test_a_crumb_may_stand_on_little() -> None:
+def test_a_fragment_may_stand_on_little() -> None:
     mesh = _two_towers(1.5, 5.5)
     assert _contact_areas(mesh)[[11, 13]] == pytest.approx([2.25, 100.0])
     assert _contact_areas(mesh, 0.0)[13] == pytest.approx(2.25)

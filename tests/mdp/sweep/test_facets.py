@@ -20,7 +20,7 @@ def _layout(mesh: Mesh) -> Layout:
 
 def _turns(layout: Layout, heights: Floats) -> list[int]:
     """How often the neighbours around each vertex change from higher to lower and back."""
-    starts, neighbours = layout.rings
+    starts, neighbours = layout.starts, layout.neighbours
     rings = [neighbours[starts[v] : starts[v + 1]] for v in range(len(heights))]
     lower = [heights[ring] < heights[v] for v, ring in enumerate(rings)]
     return [int((side != np.roll(side, 1)).sum()) for side in lower]
@@ -38,7 +38,7 @@ def test_a_vertex_leaning_more_than_its_flatness_is_regular() -> None:
 
 def test_neighbours_lie_in_a_ring_each_joined_to_the_next_by_a_face() -> None:
     layout = _layout(shapes.branch())
-    starts, neighbours = layout.rings
+    starts, neighbours = layout.starts, layout.neighbours
     corners = {frozenset(face) for face in layout.triangles.faces.tolist()}
     for v in range(len(layout.triangles.vertices)):
         ring = neighbours[starts[v] : starts[v + 1]].tolist()

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.directions.spread import spread
+from mdp.directions.unit_vectors import spread
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask, facing_down, risky_upright, threshold
 from mdp.plane import Plane
@@ -56,15 +56,15 @@ def test_what_no_cut_can_save_is_counted_where_it_needs_support_upright_and_alon
     mesh, direction = random_solid(seed), random_direction(*place)
     pieces, upright = pieces_of(mesh, seed), risky_upright(mesh, 45.0)
     remainder = Remainder(mesh, upright, pieces=pieces)
-    hopeless: Mask = upright & (np.random.default_rng(seed).random(len(upright)) < 0.7)
-    swept = gains(remainder, direction[None], STEP_MM, threshold(45.0), hopeless[matching(remainder.facets.mesh, mesh)])
-    lost = hopeless & facing_down(mesh, direction, 45.0) & (pieces.along(direction) != CARRIES_ITSELF)
+    unavoidable: Mask = upright & (np.random.default_rng(seed).random(len(upright)) < 0.7)
+    swept = gains(remainder, direction[None], STEP_MM, threshold(45.0), unavoidable[matching(remainder.facets.mesh, mesh)])
+    lost = unavoidable & facing_down(mesh, direction, 45.0) & (pieces.along(direction) != CARRIES_ITSELF)
     plain = gains(remainder, direction[None], STEP_MM, threshold(45.0))
     assert swept.residual_mm2 == pytest.approx(plain.residual_mm2)
     assert swept.up_mm2 == pytest.approx(plain.up_mm2)
     for column, plane in enumerate(planes_of(swept, direction)):
         areas = np.linalg.norm(area_vectors_above(mesh, plane), axis=1) * pieces.counts
-        assert swept.hopeless_mm2[0, column] == pytest.approx(areas[lost].sum(), abs=1e-8)
+        assert swept.unavoidable_mm2[0, column] == pytest.approx(areas[lost].sum(), abs=1e-8)
 
 
 @settings(max_examples=10)

@@ -34,7 +34,7 @@ def _grid(directions: Floats, least_gain_mm2: float = 1.0, keep_mm: Floats | Non
         least_gain_mm2=least_gain_mm2,
         least_volume_mm3=0.0,
         least_interface_mm2=1e-6,
-        crumb=0.0,
+        fragment=0.0,
     )
 
 

@@ -8,14 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.cost.cost import CostTerms
-from mdp.cost.forecast import Surface
+from mdp.cost.forecast import Forecast
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import risky_upright, threshold
+from mdp.overhang import LEVEL_COSINE, risky_upright, threshold
 from mdp.plane import UP, Plane
 from mdp.search.search import decompose
-from mdp.stairs import LEVEL_COSINE
 from mdp.sweep.sweep import Remainder, gains
 from profiles.profile import load
 from tests import shapes
@@ -78,7 +77,7 @@ def test_the_forecast_counts_the_stairs_that_the_parts_have_after_cutting(
     risky, ones = risky_upright(mesh, 45.0), np.ones(len(mesh.faces))
     plain, stairs = (Remainder(mesh, risky, ones, stair_weights=weights) for weights in (None, WEIGHT * ones))
     terms = CostTerms(45.0, False, seam_mm=0.8, stair_weight=WEIGHT)
-    counted_mm2 = Surface.of(stairs, terms).left_mm2(planes) - Surface.of(plain, terms).left_mm2(planes)
+    counted_mm2 = Forecast.of(stairs, terms).left_mm2(planes) - Forecast.of(plain, terms).left_mm2(planes)
     assert counted_mm2 == pytest.approx(WEIGHT * cut_by_hand(mesh, planes), abs=1e-6)
 
 

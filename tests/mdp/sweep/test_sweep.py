@@ -13,12 +13,12 @@ from tests import shapes
 from tests.mdp.solids import area_vectors_above, random_direction, random_solid
 
 STEP_MM = 1.3
-CRUMB_MM = 1.5
+FRAGMENT_MM = 1.5
 SPHERE = st.tuples(st.integers(1, 999), st.integers(1, 999))  # no nearly level planes: manifold3d snaps them
 
 
 def _sweep_one(mesh: Mesh, direction: Floats) -> Sweep:
-    return sweep(Remainder(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM, crumb_mm=CRUMB_MM)
+    return sweep(Remainder(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM, fragment_mm=FRAGMENT_MM)
 
 
 def _gains_one(mesh: Mesh, direction: Floats) -> Gains:
@@ -69,9 +69,9 @@ def _interface_mm2(part: m3.Manifold, plane: Plane) -> float:
 
 
 def _least_contact_area_mm2(part: m3.Manifold, plane: Plane) -> float:
-    """Least interface of the pieces at least CRUMB_MM high, or the part's when all of them are lower."""
+    """Least interface of the pieces at least FRAGMENT_MM high, or the part's when all of them are lower."""
     pieces = [piece for piece in part.decompose() if piece.volume() > 0]
-    high = [piece for piece in pieces if plane.heights_mm(mesh_of(piece).vertices).max() >= CRUMB_MM]
+    high = [piece for piece in pieces if plane.heights_mm(mesh_of(piece).vertices).max() >= FRAGMENT_MM]
     return min((_interface_mm2(piece, plane) for piece in high), default=_interface_mm2(part, plane))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from machine.app.output import plain_name
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.part_settings import option
-from mdp.directions.turns import turned_further
+from mdp.pose import turned_further
 from profiles.profile import DEFAULTS
 
 

@@ -40,8 +40,8 @@ from machine.app.workbench.work.kept_work import new_folder
 from machine.app.workbench.work.models import Resting, Unscaled
 from machine.app.workbench.work.received import NAMES_KEPT, files_in
 from machine.app.workbench.work.worker_pool import WorkerPools
-from mdp.directions.turns import turned_by
 from mdp.model_file import locate, plan_beside
+from mdp.pose import turned_by
 from mdp.read import MANY_FACES
 from mdp.search.plan_file import PlanFile, planned_parts
 from mdp.search.plan_reading import read_plan

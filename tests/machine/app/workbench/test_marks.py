@@ -16,8 +16,7 @@ from machine.app.workbench.bench.bench import (
 )
 from machine.app.workbench.bench.marks import named_faces, workpiece_mesh
 from mdp.directions.orientation import standing_still
-from mdp.directions.turns import turned_by
-from mdp.pose import about, unit
+from mdp.pose import about, turned_by, unit
 from mdp.search.plan_file import PlannedPart
 from mdp.search.plan_reading import read_plan
 from mdp.search.plan_writing import plan_text

@@ -14,8 +14,7 @@ from machine.app.workbench.bench.changes import reset_part, set_part, stand, tur
 from machine.app.workbench.bench.command_line import export_command, turns_deg
 from machine.app.workbench.bench.settings import settings_list, with_setting
 from machine.planning.stops import parse_stops
-from mdp.directions.turns import turned_by
-from mdp.pose import UP, about
+from mdp.pose import UP, about, turned_by
 from mdp.search.plan_file import PlannedPart
 from profiles.errors import PlanError, ProfileError
 from profiles.part_settings import OF_PARTS_ON_PLASTIC

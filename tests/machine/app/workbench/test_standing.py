@@ -9,8 +9,8 @@ import pytest
 from machine.app.workbench.bench.bench import Bench, with_model
 from machine.app.workbench.work import standing as work
 from machine.app.workbench.work.standing import Standing, stand
-from mdp.directions.turns import turned_by
 from mdp.mesh import Mesh
+from mdp.pose import turned_by
 from mdp.search.plan_file import PlannedPart
 from profiles.errors import MeshError
 from profiles.profile import load

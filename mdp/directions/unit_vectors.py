@@ -1,4 +1,5 @@
-"""Spread: unit directions that stand for all others, on a Fibonacci lattice: each a golden angle on from the one before."""
+"""Unit vectors: directions that stand for all others, on a Fibonacci lattice, each a golden angle on from the one before, and
+frames across a direction, right-handed with it."""
 
 from functools import cache
 from math import pi, sqrt
@@ -6,6 +7,8 @@ from math import pi, sqrt
 import numpy as np
 
 from mdp.mesh import Floats
+
+AXES = np.eye(3)
 
 
 @cache
@@ -27,3 +30,21 @@ def _lattice(z: Floats, place: Floats) -> Floats:
     directions = np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
     directions.setflags(write=False)
     return directions
+
+
+def framed(directions: Floats, axes: Floats = AXES) -> tuple[Floats, Floats]:
+    """(k, 3) unit directions for kernels, and (k, 2, 3) with each of them the vector across it and the one of (3, 3) axes that it
+    leans on least, and the one across both."""
+    aside = np.cross(axes[np.abs(np.round(directions @ axes.T, 9)).argmin(axis=1)], directions)
+    aside /= np.sqrt(np.vecdot(aside, aside))[:, None]
+    return np.array(directions), np.stack([aside, np.cross(directions, aside)], axis=1)
+
+
+def frame_across(direction: Floats) -> Floats:
+    """(2, 3) the vectors across one unit direction.
+
+    >>> frame_across(np.array([0.0, 0.0, 1.0])) @ [2.0, 3.0, 4.0]
+    array([-3.,  2.])
+    """
+    frame: Floats = framed(direction[None])[1][0]
+    return frame

@@ -5,8 +5,7 @@ from mdp.overhang import UP, risky_upright, threshold
 from mdp.ranking.candidates import directions
 from mdp.ranking.features import features
 from mdp.search.problem import Problem
-from mdp.sweep.hopeless import Savers, hopeless_faces
-from mdp.sweep.sweep import Remainder
+from mdp.sweep.sweep import Remainder, unavoidable_faces
 from profiles.profile import load
 from tests import shapes
 
@@ -17,7 +16,7 @@ def _lost(least_offset_mm: float) -> tuple[Remainder, np.ndarray]:
     mesh, chosen = shapes.tee(), directions(load().search)
     remainder = Remainder(mesh, risky_upright(mesh, 45.0))
     least = np.full(len(chosen), least_offset_mm)
-    return remainder, hopeless_faces(remainder.facets, Savers(chosen, least, threshold(45.0)))
+    return remainder, unavoidable_faces(remainder, chosen, least, threshold(45.0))
 
 
 def test_every_overhang_is_saved_where_planes_may_lie_anywhere_and_none_where_they_may_lie_nowhere() -> None:
@@ -29,11 +28,12 @@ def test_every_overhang_is_saved_where_planes_may_lie_anywhere_and_none_where_th
 @pytest.mark.parametrize("shape", ["tee", "branch", "ball"])
 def test_the_faces_that_are_lost_are_those_that_a_plain_search_over_all_directions_finds(shape: str) -> None:
     problem = Problem(getattr(shapes, shape)(), load(settings=SETTINGS))
-    facets, limits = problem.root.remainder.facets, problem.limits
+    remainder, limits = problem.root.remainder, problem.limits
+    facets = remainder.facets
     middles = facets.mesh.vertices[facets.mesh.faces].mean(axis=1)
     carried = facets.mesh.normals @ limits.directions.T >= threshold(45.0)
     saved = (carried & (middles @ limits.directions.T > limits.least_offset_mm)).any(axis=1)
-    lost = hopeless_faces(facets, Savers(limits.directions, limits.least_offset_mm, threshold(45.0)))
+    lost = unavoidable_faces(remainder, limits.directions, limits.least_offset_mm, threshold(45.0))
     assert (lost == (facets.faces.risky & ~saved)).all()
 
 
@@ -43,7 +43,7 @@ def test_what_no_cut_can_save_is_split_by_a_plane_and_bounds_every_cost() -> Non
     rows = np.arange(len(table.reason), dtype=np.int32)
     columns = ("hopeless", "hopeless_left", "wasted", "M6")
     above, below, wasted, residual = features(table, rows, columns).T
-    total = table.scored.hopeless_here_mm2 / table.model.risky_mm2
+    total = table.scored.unavoidable_here_mm2 / table.model.risky_mm2
     assert above + below == pytest.approx(np.full(len(rows), total))
     assert above + wasted == pytest.approx(residual)
     assert (wasted >= -1e-9).all()
@@ -53,5 +53,5 @@ def test_what_no_cut_can_save_is_split_by_a_plane_and_bounds_every_cost() -> Non
 def test_a_direction_straight_up_saves_nothing_that_overhangs() -> None:
     mesh = shapes.tee()
     remainder = Remainder(mesh, risky_upright(mesh, 45.0))
-    lost = hopeless_faces(remainder.facets, Savers(UP[None], np.array([-np.inf]), threshold(45.0)))
+    lost = unavoidable_faces(remainder, UP[None], np.array([-np.inf]), threshold(45.0))
     assert (lost == remainder.facets.faces.risky).all()
