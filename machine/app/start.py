@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+from contextlib import suppress
 
 SELDOM = (100_000, 20, 50)  # what is allocated between two looks for garbage in circles, of which there is little
 
@@ -21,7 +22,8 @@ def main() -> int:
     except KeyboardInterrupt:
         sys.stderr.write("tiltprint: interrupted\n")
         code = 130
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: Ctrl-C would only end in a traceback of Python's own end
+    with suppress(ValueError):  # in a thread
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: Ctrl-C would only end in a traceback of Python's own end
     if code == 130:
         from machine.app.terminal.interrupts import leave
 

@@ -170,7 +170,7 @@ def _along(vectors: Floats, column: int, d: Floats) -> float:
     return product
 
 
-@helper
+@no_nrt
 def _find_heights(polygon: Floats, size: int, d: Floats, offset_mm: float, heights: Floats) -> tuple[float, float]:
     """Put the heights of a polygon's corners above a plane into `heights`; the least and the greatest."""
     lowest, highest = np.inf, -np.inf

@@ -7,10 +7,11 @@ the model's, distances of the radius of its bounding sphere, cut to 0..1. Where 
 count them, M6 stairs only where a cut brings them.
 
 The others come from the same sweep: wasted, what of the residual another cut could have saved; hopeless, what of it none could,
-and hopeless_left, the same of what remains, a part of every later cost; risky_left, the area at risk that remains; seam; tilt and
-turn, the cosines of the direction with upright and with the cut before; section and contact, areas as shares of the sphere's
-great circle; extent of the part along its direction; volume_left; cuts made before, in tens; round of the classic ranking's
-relaxation; risky, the model's risky area in great circles; scale, the radius in decimetres.
+and hopeless_left, the same of what remains, a part of every later cost (unavoidable areas; records and rankers keep these two
+names); risky_left, the area at risk that remains; seam; tilt and turn, the cosines of the direction with upright and with the cut
+before; section and contact, areas as shares of the sphere's great circle; extent of the part along its direction; volume_left;
+cuts made before, in tens; round of the classic ranking's relaxation; risky, the model's risky area in great circles; scale, the
+radius in decimetres.
 """
 
 from collections.abc import Callable

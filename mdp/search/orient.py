@@ -23,10 +23,11 @@ from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Mesh
 from mdp.overhang import UP
+from mdp.search.coarse import coarse_copy
 from mdp.search.front import EQUAL, Price, Pricing, Weights, charge_mm2, front_row, with_price
 from mdp.search.parts import one_piece
 from mdp.search.problem import Problem, with_search
-from mdp.search.search import coarse_copy, decompose
+from mdp.search.search import decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 

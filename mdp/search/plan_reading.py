@@ -1,4 +1,4 @@
-"""Reading: a plan's file, each of its values checked; what is wrong is one sentence with file, key, value and what is allowed."""
+"""Plan reading: a plan's file, each of its values checked; what is wrong is told with file, key, value and what is allowed."""
 
 import os
 from collections.abc import Sequence

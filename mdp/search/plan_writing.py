@@ -1,4 +1,4 @@
-"""Writing: a plan as the text of its file, with remarks for a reader."""
+"""Plan writing: a plan as the text of its file, with remarks for a reader."""
 
 import os
 from collections.abc import Mapping, Sequence

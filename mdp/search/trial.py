@@ -190,7 +190,7 @@ def _key(plane: Plane) -> Key:
 
 
 def find_refused(problem: Problem, refused: Rejection, plane: Plane) -> Obstacle | None:
-    """Where a plane that may not cut a node is in the way; None: nobody knows."""
+    """Where a plane that may not cut a node is in the way; None where that is not known."""
     named = name_limbs(refused.node, plane)
     if isinstance(named, Rejection):
         return None
@@ -201,7 +201,7 @@ def find_refused(problem: Problem, refused: Rejection, plane: Plane) -> Obstacle
 
 
 def _refused_places(problem: Problem, refused: Rejection, plane: Plane) -> Sequence[Floats]:
-    """The places that speak against a plane; none where nobody knows."""
+    """The places that speak against a plane; none where that is not known."""
     node = refused.node
     match refused.reason:
         case Reason.PLATFORM:

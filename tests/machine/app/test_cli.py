@@ -174,7 +174,9 @@ def test_ctrl_c_before_the_command_line_is_loaded_is_an_interrupt(monkeypatch: p
     left: list[int] = []
     monkeypatch.setattr("machine.app.cli.main", interrupted)
     monkeypatch.setattr("machine.app.terminal.interrupts.leave", left.append)
+    before = signal.getsignal(signal.SIGINT)
     start.main()
+    signal.signal(signal.SIGINT, before)
     assert left == [130]
 
 

@@ -10,10 +10,11 @@ from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.search.by_hand import Rejection, cut_near, try_planes
+from mdp.search.coarse import coarse_copy
 from mdp.search.orient import orient_and_decompose
 from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.problem import Problem
-from mdp.search.search import SearchRequest, coarse_copy, decompose
+from mdp.search.search import SearchRequest, decompose
 from mdp.zone import NO_ZONES, Painted, Zone, Zones
 from profiles.profile import Profile, load
 from tests import shapes

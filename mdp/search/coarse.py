@@ -1,0 +1,76 @@
+"""Coarse copy: a model with many faces is searched on a copy with fewer, and the planes that are found cut the model itself.
+
+Whatever the search weighs is many layers wide, and the copy's surface lies within a layer of the model's or, where many faces
+are left, within one and a half, nearly all of it within half of one. What the parts need, weigh and take is worked out on the
+model itself; the rows of the front that are not taken stay those of the copy.
+"""
+
+from dataclasses import replace
+from time import perf_counter
+
+from mdp.cut import simplify
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.mesh import Mesh
+from mdp.ranking.node import Node
+from mdp.search.by_hand import cut_near
+from mdp.search.front import Pricing, front_row, with_price
+from mdp.search.parts import decomposition_of, make_parts, notes_of_search
+from mdp.search.polish import refine_planes
+from mdp.search.problem import Problem
+from mdp.sweep.rays import distances_mm
+from mdp.zone import Volume, Zones
+from profiles.profile import Profile
+
+WORTH = 0.7  # share of the faces above which a copy saves too little
+# How far simplifying may go, and how far the copy's surface may lie from the model's then, in layers: one face after another
+# moves the surface by more than the tolerance. The first goes for copies that keep half as many faces as a model may have.
+COARSEST, *FINER = (0.5, 1.5), (0.25, 1.0), (0.125, 1.0), (0.0625, 1.0)
+
+
+def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
+    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than one layer and a half; None where
+    the mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
+    search, layer_mm = profile.search.effective, profile.process.layer_height_mm
+    fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
+    marked = any(not isinstance(zone, Volume) for zone in (*zones.keep, *zones.no_seam, *zones.no_support, *zones.support))
+    if not fine or marked:
+        return None
+    for tolerance, off in (COARSEST, *FINER):
+        copy = simplify(mesh, tolerance * layer_mm)
+        if len(copy.faces) >= WORTH * len(mesh.faces):
+            break
+        few = tolerance == COARSEST[0] and len(copy.faces) < search.simplify_faces / 2
+        if not few and distances_mm(copy, mesh.vertices, off * layer_mm).max() < off * layer_mm:
+            return copy
+    return None
+
+
+def cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) -> Decomposition | None:
+    """A problem's mesh, from where its search goes on, cut by the planes that were chosen for its coarse copy, or by planes next
+    to those where bumps that the copy has not forbid them, then moved a little as the mesh itself wants them; None where there
+    are none. The mesh as the search found it is measured anew as well."""
+    began, rows, start = perf_counter(), list(copy.front), problem.start
+    place = next(place for place, row in enumerate(rows) if row.chosen)
+    node = start
+    for plane in rows[place].planes[len(start.cuts) :]:
+        child = cut_near(problem, node, plane)
+        if child is None:
+            return None
+        node = child
+    node = refine_planes(problem, node)
+    parts, timed = make_parts(problem, node), rows[place].time_s is not None
+    rows[place] = _measured(rows[place], node)
+    if price is not None and timed:
+        rows[place] = with_price(rows[place], price(parts))
+    if place > 0 and len(rows[0].planes) == len(start.cuts):
+        rows[0] = _measured(rows[0], start)
+    searched_s = copy.search_s + perf_counter() - began
+    fine = decomposition_of(problem, copy.name, parts, rows, notes_of_search(copy))
+    evaluated = copy.candidates_evaluated
+    return replace(fine, ranker=copy.ranker, rounds=copy.rounds, candidates_evaluated=evaluated, search_s=searched_s)
+
+
+def _measured(row: FrontRow, node: Node) -> FrontRow:
+    """A row with the planes and costs of a node, its time as it was."""
+    costs = front_row(node)
+    return replace(costs, chosen=row.chosen, reason=row.reason, time_s=row.time_s, filament_mm=row.filament_mm)
