@@ -20,7 +20,7 @@ import numpy as np
 
 from mdp.cost.cost import CostTerms
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import helper, kernel, no_nrt
+from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices, Ints
 from mdp.overhang import Mask, step_share, threshold
 from mdp.plane import Plane, normals_and_offsets
