@@ -1,12 +1,14 @@
 """Coarse copy: a finely meshed model is searched on a copy near to it, cut itself, and costs about what its own search finds."""
 
+from collections.abc import Sequence
+
 import manifold3d as m3
 import numpy as np
 import pytest
 import trimesh
 
 from mdp.cut import mesh_of, simplify, solid_of
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.search.by_hand import Rejection, cut_near, try_planes
@@ -120,6 +122,15 @@ def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itse
     assert oriented.orientation is not None
     assert [len(mesh.faces) for mesh in searched] == [len(mesh.faces)]
     assert oriented.decomposition.mesh is searched[0]
+
+
+def test_the_row_that_is_chosen_is_priced_by_the_parts_of_the_model_itself(fine: Mesh) -> None:
+    def faces(parts: Sequence[Part]) -> tuple[float, float]:
+        return float(sum(len(part.mesh.faces) for part in parts)), 1000.0
+
+    found = decompose(fine, "shape", _profile(2000), SearchRequest(parts=2, price=faces))
+    assert found.chosen is not None
+    assert found.chosen.time_s == sum(len(part.mesh.faces) for part in found.parts) > len(fine.faces)
 
 
 def test_a_search_that_is_recorded_is_one_of_the_model_itself(fine: Mesh) -> None:

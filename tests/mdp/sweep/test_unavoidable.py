@@ -50,6 +50,15 @@ def test_what_no_cut_can_save_is_split_by_a_plane_and_bounds_every_cost() -> Non
     assert 0.0 < total < 1.0
 
 
+def test_what_a_cut_loses_is_wasted_unavoidable_or_its_seam() -> None:
+    problem = Problem(shapes.branch(), load(settings=(*SETTINGS, "search.seam_mm=0.8", "search.objective=scar")))
+    table = problem.table(problem.root, described=True)
+    rows = np.arange(len(table.reason), dtype=np.int32)
+    wasted, unavoidable, seam, lost = features(table, rows, ("wasted", "hopeless", "seam", "M6")).T
+    assert wasted + unavoidable + seam == pytest.approx(lost)
+    assert seam.min() > 0.0
+
+
 def test_a_direction_straight_up_saves_nothing_that_overhangs() -> None:
     mesh = shapes.tee()
     remainder = Remainder(mesh, risky_upright(mesh, 45.0))
