@@ -68,7 +68,7 @@ def below(solid: Solid, plane: Plane) -> Solid:
 
 
 def corners_above(mesh: Mesh, plane: Plane) -> Floats:
-    """(n, 3) the corners of what of a mesh lies above a plane: its vertices, and where its edges pass. Nothing is cut."""
+    """(n, 3) the corners of the part of a mesh above a plane: its vertices, and where its edges cross it. Nothing is cut."""
     return np.concatenate([mesh.vertices[plane.heights_mm(mesh.vertices) > 0.0], passing_places(mesh, plane)])
 
 

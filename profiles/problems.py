@@ -24,8 +24,8 @@ MOST_INTERFACE_WIDTH = 2.0  # thin beads on plastic: beyond the flat around the 
 def table_problems(
     model: type[BaseModel], prefix: str, table: Any, sound: Mapping[str, Any]
 ) -> tuple[list[str], Any, frozenset[str]]:
-    """All problems of a table whose keys are dotted after the prefix; the table made without what its keys must be together, None
-    for no table; and the dotted keys whose values nobody gave, as those given are wrong.
+    """All problems of a table whose keys are dotted after the prefix; the table built key by key, None where it is no table; and
+    the dotted keys whose wrong values were replaced.
 
     sound: the values of a profile that is fine.
     """
@@ -38,7 +38,7 @@ def table_problems(
 
 
 def not_of_mended(problems: Iterable[str], mended: frozenset[str]) -> list[str]:
-    """The sentences that tell of no value that nobody gave. mended: the keys of such."""
+    """The problems without those that name a replaced value. mended: the keys whose values were replaced."""
     return [sentence for sentence in problems if not _tells_of(sentence, mended)]
 
 

@@ -11,7 +11,7 @@ EVERY_S = 20.0  # where lines stay, in a log: ten hours are 1,800 of them
 
 
 class BatchProgress:
-    """Told of every call that ends, and some times a second that others go on. things: what the calls are, as `searches`."""
+    """Shows the progress of calls: one line, renewed when a call ends and a few times a second. things: their noun."""
 
     def __init__(self, total: int, things: str) -> None:
         self._total, self._things = total, things

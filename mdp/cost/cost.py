@@ -107,9 +107,11 @@ class CostTerms:
 
 
 class CutCost(NamedTuple):
-    """What a cut costs for ever: the area that stays risky on its part, the part's stairs, the scar of its seam, and that it is
-    made; lost_mm2: what of it the cut has made worse, all but the stairs that the part had before, too; stairs_mm2: what of it
-    are stairs, seam_mm2: the scar of its seam, with the bores that it crosses, and that it is made."""
+    """The final cost of a cut: the risky area left on its part, the part's stairs, the scar of its seam, and a charge per cut.
+
+    lost_mm2: the share that the cut has added, all but the stairs that the part had before; stairs_mm2: the share of stairs;
+    seam_mm2: the scar of the seam with the bores that it crosses, and the charge.
+    """
 
     residual_mm2: float
     lost_mm2: float

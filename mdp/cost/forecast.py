@@ -1,5 +1,6 @@
-"""Forecast: what a sequence of planes would cost, and how large its parts would be and what of them would need support, summed
-over a solid's surface without cutting it.
+"""Forecast: the cost of a sequence of planes, the size of its parts and the area of them that needs support.
+
+All are summed over a solid's surface without cutting it.
 
 A piece of the surface belongs to the first part whose plane it lies above, what lies above none to the part on the platform.
 A rim runs over what the planes before its own have left. Faces are convex polygons in space, clipped by one plane after the
@@ -39,8 +40,8 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PartForecast:
-    """A part cut off: what of it needs support, the length of its rim where it is seen, the smallest angle of an edge that the
-    cut makes, and its volume."""
+    """A part cut off: the area that needs support, the length of its rim where it is seen, the smallest angle of an edge that
+    the cut makes, and its volume."""
 
     support_mm2: float
     rim_mm: float
@@ -97,8 +98,8 @@ class Forecast:
         return _sum_left(scars, offsets_mm, self.reach(planes) if reach is None else reach) + cuts_mm2
 
     def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
-        """The parts that planes cut off a whole model, all of whose faces count, in the order of the cuts, and what of the rest
-        needs support printed straight up, mm2."""
+        """The parts that planes cut off a whole model, in the order of the cuts, and the area of the rest that needs support
+        when it is printed straight up, mm2. All faces of the model count."""
         middle, (directions, offsets_mm) = self.remainder.mesh.bounds_mm.mean(axis=0), normals_and_offsets(planes)
         apexes = middle - (directions @ middle - offsets_mm)[:, None] * directions
         scars = self.scars._replace(directions=directions, classes=self.classes(planes))
@@ -182,7 +183,7 @@ def _find_heights(polygon: Floats, size: int, d: Floats, offset_mm: float, heigh
 
 @no_nrt
 def _clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
-    """Put into `below` what of a convex polygon lies below height 0; the number of its corners."""
+    """Clip a convex polygon at height 0 and put the lower piece into `below`; returns the number of its corners."""
     count = 0
     for i in range(size):
         j = i + 1 if i + 1 < size else 0

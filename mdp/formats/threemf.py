@@ -172,7 +172,7 @@ class _Builder:
                 self._leave_out(item.get("objectid", ""), "which stands on none of its plates")
 
     def _plate(self, plates: list[Plate], wanted: int | None) -> Plate | None:
-        """Of plates that hold something that is printed that of a number, or the first; None: there are no plates."""
+        """The plate with a number, or the first one, among plates that hold something to print; None without plates."""
         if wanted is None:
             if len(plates) > 1:
                 first, name, _ = plates[0]

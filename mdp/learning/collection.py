@@ -31,7 +31,7 @@ Key = tuple[str, int, str]  # a model, the number of its orientation, and the te
 @dataclass(frozen=True)
 class Row:
     """What came of a search. settings: what all searches of a collection share; faces, faces_after: of the model as read and as
-    searched; candidates: that were looked at; seconds: of processor time; outcome: least cost as share of the risky area;
+    searched; candidates: the number evaluated; seconds: of processor time; outcome: least cost as share of the risky area;
     late: the time limit ended it; excluded: why there is no record, "" where there is one."""
 
     id: str

@@ -138,7 +138,7 @@ class Schedule:
 SCHEDULES = {"urank": Schedule(), "regret": Schedule("regret", epochs=100, patience=25, batch=64, rate=2e-3, decay=1e-3)}
 
 
-# Told of an epoch: its number from 1, the mean training loss, the figures on the validation lists, and the best epoch so far.
+# Called after an epoch with its number from 1, the mean training loss, the figures on the validation lists, and the best epoch.
 OnEpoch = Callable[[int, float, Figures, int], None]
 
 

@@ -128,11 +128,13 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 
 @dataclass(frozen=True, eq=False)
 class ScoredCandidates:
-    """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be cut is
-    not known yet. direction is a row of limits.directions; above_mm2: what is risky above the plane printed straight up;
-    residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; unavoidable_mm2: what of the first two no cut can save,
-    unavoidable_here_mm2: what of the solid's risky area, both 0 unless requested. first, columns: (k,) the first plane along each
-    direction, in steps of limits.step_mm, and the number of all planes along it."""
+    """The candidates of one solid that gain enough above the platform, one array row each.
+
+    Whether they can be cut is not known yet. direction is a row of limits.directions; above_mm2: the risky area above the plane
+    when it is printed straight up; residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; unavoidable_mm2: the share of the
+    first two that no cut can save, unavoidable_here_mm2: that of the solid's risky area, both 0 unless requested. first, columns:
+    (k,) the first plane along each direction, in steps of limits.step_mm, and the number of all planes along it.
+    """
 
     remainder: Remainder
     limits: Bounds

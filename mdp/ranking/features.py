@@ -6,12 +6,12 @@ walls and rods, on either side of it), M6 accumulated residual risky area. Areas
 the model's, distances of the radius of its bounding sphere, cut to 0..1. Where seams and stairs cost something, M1, M2 and M6
 count them, M6 stairs only where a cut brings them.
 
-The others come from the same sweep: wasted, what of the residual another cut could have saved; hopeless, what of it none could,
-and hopeless_left, the same of what remains, a part of every later cost (unavoidable areas; records and rankers keep these two
-names); risky_left, the area at risk that remains; seam; tilt and turn, the cosines of the direction with upright and with the cut
-before; section and contact, areas as shares of the sphere's great circle; extent of the part along its direction; volume_left;
-cuts made before, in tens; round of the classic ranking's relaxation; risky, the model's risky area in great circles; scale, the
-radius in decimetres.
+The others come from the same sweep: wasted, the part of the residual that another cut could have saved; hopeless, the part that
+no cut could, and hopeless_left, the same of the remainder, a part of every later cost (elsewhere these two are called
+unavoidable; records and rankers keep the old names); risky_left, the area at risk that remains; seam; tilt and turn, the
+cosines of the direction with upright and with the cut before; section and contact, areas as shares of the sphere's great
+circle; extent of the part along its direction; volume_left; cuts made before, in tens; round of the classic ranking's
+relaxation; risky, the model's risky area in great circles; scale, the radius in decimetres.
 """
 
 from collections.abc import Callable

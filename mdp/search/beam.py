@@ -268,7 +268,7 @@ def search_as_published(
 
     It ends as soon as the beam's best does not rise, keeps twins, and stops looking at candidates once one of a good parent
     is useless. A learned ranker chooses among the first 50 candidates; the plain best is followed beside its choice, so the beam
-    holds one node more where it was not chosen. on_stage is told of a stage, its beam and the best node.
+    holds one node more where it was not chosen. on_stage is called with a stage, its beam and the best node.
     """
     best, beam, stage = problem.start, [problem.start], 0
     while problem.continues(stage):

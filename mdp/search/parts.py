@@ -17,12 +17,12 @@ from mdp.sweep.crossing import NO_RIM
 from mdp.zone import NOWHERE, ZonesOnModel
 from profiles.machine import Machine
 
-MOST_FEATHERED = 0.1  # share of a seam; a person is told of more
+MOST_FEATHERED = 0.1  # share of a seam; more is reported
 MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 
 def one_piece(mesh: Mesh, machine: Machine, zones: ZonesOnModel = NOWHERE) -> Part:
-    """A model as it stands, uncut, with its zones; what needs support of it is not looked at."""
+    """A model as it stands, uncut, with its zones; what needs support of it is not worked out."""
     pose = level(machine)
     whole = Part(1, mesh, PLATFORM, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
     return replace(whole, no_seam=zones.no_seam, no_support=zones.no_support, support=zones.support, modifiers=zones.modifiers)

@@ -1,4 +1,4 @@
-"""Plan reading: a plan's file, each of its values checked; what is wrong is told with file, key, value and what is allowed."""
+"""Plan reading: a plan's file, each value checked; an error names the file, the key, the value and what is allowed."""
 
 import os
 from collections.abc import Sequence

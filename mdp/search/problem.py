@@ -122,7 +122,7 @@ class Problem:
 
     @property
     def evaluated(self) -> int:
-        """How many candidates were looked at."""
+        """The number of candidates that were evaluated."""
         return sum(self._evaluated)
 
     def late(self) -> bool:

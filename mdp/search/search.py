@@ -50,17 +50,20 @@ from profiles.profile import Profile
 NEARLY_BEST = 1.02  # times the beam's best that cuts of single limbs may cost to be polished
 
 
-# Told after which stage a search stands, 0 when it begins, of how many nodes its beam is, what share of the model's cost the best
-# so far has, and what gives that as a row of the front.
+# Called before the first stage and after each one with the number of stages done, the number of nodes in the beam, the cost of
+# the best node as a share of the model's, and a function that returns that node as a row of the front.
 OnStage = Callable[[int, int, float, Callable[[], FrontRow]], None]
 
 
 @dataclass(frozen=True)
 class SearchRequest:
-    """What is asked for beside the profile. plan: planes that are cut first and stay, and zones; parts: the most parts, instead
-    of as many as pay; price: what parts take to print, for the rows of the front and the choice between them: without it nothing
-    is searched for one part. on_phase is told in words what is done while no stage is; on_record is given what the search looked
-    at and what became of it, as the content of an .npz file."""
+    """What a caller asks for beside the profile.
+
+    plan: planes that are cut first and stay, and zones; parts: the most parts, where not as many as pay are wanted; price: the
+    time and filament that parts take to print, for the rows of the front and the choice between them: without it a search for
+    one part does nothing. on_phase is called with a description of each phase outside the stages; on_record with the record of
+    the search, the content of an .npz file.
+    """
 
     plan: PlanFile = NO_PLAN
     parts: int | None = None
@@ -72,7 +75,7 @@ class SearchRequest:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the model stays in one part and nobody looks at the front."""
+        """Whether the model stays in one part and no front is wanted."""
         return self.parts == 1 and self.price is None and self.on_record is None
 
 

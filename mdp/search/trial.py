@@ -41,8 +41,11 @@ Key = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Touch:
-    """The head at the place where one of its bodies would touch the table. All in the workpiece frame, mm: tip_mm; rotation: rows
-    of what turns the workpiece frame into the machine's there; body: its name; touched_mm: the place on the table."""
+    """The head at the place where one of its bodies would touch the table, in the workpiece frame.
+
+    tip_mm: the tip; rotation: rows of the rotation from the workpiece frame to the machine's; body: its name; touched_mm: the
+    place on the table.
+    """
 
     body: str
     tip_mm: Vector

@@ -28,12 +28,13 @@ Vector = tuple[float, float, float]
 
 
 class Underside(NamedTuple):
-    """What of a surface overhangs along a direction (3,), seen in a frame across it (2, 3): the heights of the vertices (n,), the
-    cosines of the faces' normals with the direction (m,), and the height up to which the surface rests on something.
+    """The overhanging faces of a surface along a direction (3,), in a frame across it (2, 3).
 
-    Overhanging faces that hang together are a patch, numbered from 1: number (m,) is that of each face, the faces of patch p are
-    faces[starts[p] : starts[p + 1]]; held (k,): whether an anchor holds it, UNKNOWN until it is asked for; waiting (k,): room for
-    patches to look at. point: (3,) mm, where the way down has come to; written by it."""
+    heights (n,) of the vertices; cosines (m,) of the faces' normals with the direction; the height up to which the surface rests
+    on something. Connected overhanging faces are a patch, numbered from 1: number (m,) is that of each face, the faces of patch p
+    are faces[starts[p] : starts[p + 1]]; held (k,): whether an anchor holds it, UNKNOWN until that is worked out; waiting (k,):
+    a queue of patches. point: (3,) mm, the current place of the descent, which writes it.
+    """
 
     surface: LinkedFaces
     direction: Floats

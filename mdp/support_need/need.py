@@ -1,4 +1,4 @@
-"""Need: what of a surface cannot do without support along a direction, for the search and for the slicer."""
+"""Need: the faces of a surface that require support along a direction, for the search and for the slicer."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -86,8 +86,8 @@ class SupportNeed:
         return _needing_upright(self.surface, limits, self.axes) | self.enforced
 
     def along(self, directions: Floats) -> Classes:
-        """(k, m) for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, meant for the faces that are
-        risky along it. Planes of later cuts are not looked at: what a face needs depends on nothing but face and direction."""
+        """(k, m) for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, valid for the faces that are
+        risky along it. Later cuts do not count: the class of a face depends on nothing but face and direction."""
         if len(directions) > FEW:
             return self._looked_up(self._tables, directions)
         rows = [self._looked_up(self._rows, direction[None]) for direction in directions]

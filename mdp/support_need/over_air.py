@@ -15,15 +15,15 @@ from mdp.topology.edges import LinkedFaces
 
 CELLS = 96  # of a grid along its longer side
 LEAST_COSINE = 0.05  # of a surface that looks up and the direction
-RASTER = 0.5  # cells between two places of flat places that are looked at
+RASTER = 0.5  # cells between two samples of flat places
 ASIDE = 0.29  # of the raster's step: where in it these places lie, so that they are on no edge of a cell
 FEW_SAMPLES = 8.0  # on a flat place that is too small for the raster
 MOST = 0.55  # share of a flat place over air that makes all of it; half of it often is, up to rounding
 TINY = 1e-9  # twice the area of a face seen edge-on, in cells
 
 
-# Rows of what is counted for every flat place, at its number (6, m): how low and how high it reaches, how many places of the
-# raster lie on it, how many of these over air; where they are too few, its area, and the area over air by points of its faces.
+# Rows of the figures of all flat places (6, m): lowest and highest point, the number of samples and of those over air; where
+# there are too few samples, the area, and the area over air by points of the faces.
 LOW, HIGH, SAMPLED, AIRY, AREA, AIRY_AREA = range(6)
 
 

@@ -320,7 +320,7 @@ def _is_held(under: Underside, asked: int) -> bool:
                             under.waiting[count], under.held[end] = end, UNHELD
                             count += 1
             at += 1
-        for k in range(count if held else 0):  # the others stay unasked, none of them was looked at to its end
+        for k in range(count if held else 0):  # the others stay unknown: the visit of none of them was finished
             under.held[under.waiting[k]] = UNKNOWN
         under.held[asked] = HELD if held else UNHELD
     return bool(under.held[asked] == HELD)

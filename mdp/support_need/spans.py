@@ -21,7 +21,7 @@ LINES = 24  # over a place at most; else one every line width
 MOST_LOOSE = 0.2  # share of the ends of lines that lie on no anchor, beyond which lines need not be drawn
 TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place
 ROUNDING_MM = 0.05  # a span may seem longer by this than it was drawn
-FINE_MM = 0.1  # between two places that are looked at, neither of them too far from an anchor
+FINE_MM = 0.1  # between two places that are tested, neither of them too far from an anchor
 NEAR_ROUNDING_MM = 1e-6  # a place just as far from a side as it may be
 DEEP = 64  # halvings of a triangle, one within the other
 

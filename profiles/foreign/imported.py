@@ -15,7 +15,7 @@ PROCESS_BASE = "standard"
 NOZZLE_MM = 0.4  # of the shipped machines, whose profile decides in the end
 KINDS = ("process", "material")
 RULES = {"process": PROCESS_RULES, "material": MATERIAL_RULES}
-CONDITIONS = {  # read beside others, and told with them
+CONDITIONS = {  # read together with other settings, and reported with them
     *("extrusion_width", "nozzle_diameter", "filament_type", "fan_always_on", "cooling", "brim_type", "thick_bridges"),
     *("wipe_distance", "enable_pressure_advance", "enable_dynamic_overhang_speeds", "enable_overhang_speed"),
     *("curr_bed_type", "adhesion_type"),

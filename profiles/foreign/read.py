@@ -1,4 +1,4 @@
-"""Read: a file of another slicer, told by what is in it; also the settings inside a .3mf that one has saved with its models."""
+"""Read: the settings in a file of another slicer, whose kind its content shows, or in a .3mf that it has saved."""
 
 import json
 from collections.abc import Callable, Mapping

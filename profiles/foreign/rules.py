@@ -1,4 +1,4 @@
-"""Rules: what of another slicer's print and filament settings becomes which key of a process and of a material."""
+"""Rules: which of another slicer's print and filament settings become which keys of a process and of a material."""
 
 import re
 from math import pi
