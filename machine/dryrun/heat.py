@@ -68,7 +68,8 @@ def _cold(program: ParsedProgram) -> Iterable[Finding]:
     first = int(rows[0])
     waited_row = max((event.row for event in heating if event.row <= first), default=0)
     severity, unless = unless_own(program, waited_row, first)
-    message = f"filament is pushed through a nozzle that is not hot (moves: {{count}}): M109 S must come first{unless}"
+    must = f"M109 S must come first and stay on{unless}"
+    message = f"filament is pushed through a nozzle that is not hot (moves: {{count}}): {must}"
     return per_part(program, rows, program.e_mm[rows], message, code="cold-extrusion", severity=severity)
 
 
