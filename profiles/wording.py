@@ -109,7 +109,8 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
         return "true or false"
     if annotation is str:
         pattern = next((text for rule in metadata for text in [_bound(rule, "pattern")] if text), None)
-        return _matching(pattern) if pattern else "a text"
+        longest = next((most for rule in metadata for most in [_bound(rule, "max_length")] if most), None)
+        return _matching(pattern) if pattern else f"a text of at most {longest} characters" if longest else "a text"
     if annotation in (int, float):
         return ("a whole number" if annotation is int else "a number") + _range(metadata)
     model = _model(annotation)

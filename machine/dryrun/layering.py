@@ -22,6 +22,7 @@ SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 LOOSE = (Kind.OVERHANG.value, Kind.BRIDGE.value, Kind.IRONING.value, Kind.PURGE.value, Kind.SKIRT.value, *SUPPORT)
 SLACK_MM, SLACK_SHARE = 0.02, 0.1  # of a layer's height
 STAND_OFF_MM = 0.5  # at most between a part and the support below it
+FARTHEST_SUPPORT_MM = 2.0  # from a bridge that stands on it, the most that process.support_gap_mm allows
 NEW_OBJECT_MM = 1.0  # a fall of more begins another object beside the first one
 FLOATING_SHARE = 0.5  # of a layer's length
 LEAST_MM = 10.0
@@ -64,7 +65,8 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             continue
         remark, gap = program.remark[high], gap[gap > 0.0]
         in_air = ((contacts.air_mm[high] + contacts.beside_mm[high]) > 0.0) & ~loose[high]
-        in_air |= spanning[high] & (gap > STAND_OFF_MM)  # whatever carries its ends lies below
+        # Whatever carries the ends of a bridge lies below it, or is support with its gap, rounded up to a layer.
+        in_air |= spanning[high] & (gap > FARTHEST_SUPPORT_MM + program.remarks.height_mm[remark])
         layer, lengths_mm = program.remarks.layer, deposited.length_mm[np.searchsorted(deposited.rows, mine)]
         laid_mm = np.bincount(layer[program.remark[mine]], weights=lengths_mm)
         hangs = (gap < SEEN_SHARE * program.remarks.height_mm[remark]) | in_air

@@ -5,6 +5,7 @@ are left, within one and a half, nearly all of it within half of one. What the p
 model itself; the rows of the front that are not taken stay those of the copy.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
 
@@ -27,7 +28,7 @@ WORTH = 0.7  # share of the faces above which a copy saves too little
 COARSEST, *FINER = (0.5, 1.5), (0.25, 1.0), (0.125, 1.0), (0.0625, 1.0)
 
 
-def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
+def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones, on_phase: Callable[[str], None] = lambda text: None) -> Mesh | None:
     """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than one layer and a half; None where
     the mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
     search, layer_mm = profile.search.effective, profile.process.layer_height_mm
@@ -35,6 +36,7 @@ def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones) -> Mesh | None:
     marked = any(not isinstance(zone, Volume) for zone in (*zones.keep, *zones.no_seam, *zones.no_support, *zones.support))
     if not fine or marked:
         return None
+    on_phase(f"looking for a copy of {len(mesh.faces):,} faces with fewer of them")
     for tolerance, off in (COARSEST, *FINER):
         copy = simplify(mesh, tolerance * layer_mm)
         if len(copy.faces) >= WORTH * len(mesh.faces):

@@ -101,9 +101,7 @@ def decompose(mesh: Mesh, name: str, profile: Profile, request: SearchRequest = 
         raise PlanError(f"--parts {parts}: the planes by hand of {plan.name} alone make {len(plan.parts) + 1} parts")
     copy = None
     if request.on_record is None:
-        if 0 < profile.search.effective.simplify_faces < len(mesh.faces):
-            request.on_phase(f"looking for a copy of {len(mesh.faces):,} faces with fewer of them")
-        copy = coarse_copy(mesh, profile, plan.zones)
+        copy = coarse_copy(mesh, profile, plan.zones, request.on_phase)
     if copy is not None:
         with suppress(PlanError):  # of a plane by hand that cuts the mesh and not its copy
             copy_began, own = perf_counter(), with_search(profile, simplify_faces=0)

@@ -58,6 +58,15 @@ def test_a_roof_far_above_all_that_lies_below_it_is_found_though_it_is_a_bridge(
     assert "layer 5 begins 8.40 mm above all that lies below it" in error.message
 
 
+@pytest.mark.parametrize("gap_mm", [0.2, 0.6, 1.25, 2.0])
+def test_a_bridge_on_support_is_sound_however_large_the_gap_between_them(gap_mm: float) -> None:
+    block, plate = m3.Manifold.cube((8, 8, 4)), m3.Manifold.cube((20, 20, 3)).translate((0, 0, 8))
+    part, profile = whole(standing(block + plate)), load(settings=(f"process.support_gap_mm={gap_mm}", "process.support=auto"))
+    decomposition = Decomposition("", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    program = plan(decomposition, slice_parts([part], profile), profile)
+    assert "gap" not in {finding.code for finding in dry_run(write_gcode(program, profile), profile).findings}
+
+
 @pytest.mark.parametrize("settings", TELLING, ids=lambda settings: settings[0])
 @pytest.mark.parametrize("layer", range(3, 24, 4))
 def test_a_layer_without_its_beads_is_found_at_the_next_one(settings: tuple[str, ...], layer: int) -> None:
