@@ -1,4 +1,4 @@
-"""The tree of errors a person can fix; each class below it is raised in one package, machine/app/cli.py makes sentences of them.
+"""The tree of errors a person can fix; each class below it is raised in one package, machine/cli/cli.py makes sentences of them.
 
 UserError                         message (one sentence: thing, value, what is allowed) and exit 1; by itself where nobody
                                   catches an error of its kind apart from others
@@ -14,7 +14,7 @@ UserError                         message (one sentence: thing, value, what is a
     LocalProtocolError            we broke the protocol
     FirmwareError                 the printer reported an error; its own text is kept
     SilenceError                silence beyond the bound
-    ServerError                 machine/network: a print server that cannot be reached or that refuses
+    ServerError                 machine/printing/servers: a print server that cannot be reached or that refuses
   JournalError                    machine/link: a journal from which a print cannot be resumed
 
 Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, exit 130.

@@ -16,7 +16,7 @@ import sys
 import pytest
 from hypothesis import HealthCheck, settings
 
-from machine.app.start import SELDOM
+from machine.cli.start import SELDOM
 
 # What shapes messages, and what turns on or off what a program shows; a terminal's own words are the test's to say.
 SHAPING = ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE", "PYTHONWARNINGS")
@@ -44,7 +44,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Before the whole suite is shared out, kernels are compiled, each once: the workers would all compile the same ones."""
     shares_out = getattr(session.config.option, "numprocesses", None) and not hasattr(session.config, "workerinput")
     if shares_out and session.config.args_source is pytest.Config.ArgsSource.TESTPATHS:
-        from machine.app.pipeline.compilers import wait_for
+        from machine.pipeline.compilers import wait_for
 
         wait_for(LARGEST)
 

@@ -25,23 +25,23 @@ CONFINED = {
         "slicer/geometry/",
         "slicer/interface/",
         "machine/kinematics/collision",
-        "machine/app/pipeline/precompile",
-        "machine/calibration/coupon/",
+        "machine/pipeline/precompile",
+        "machine/setup/coupon/",
     ),
     "numba": ("mdp/kernels/",),
     "llvmlite": ("mdp/kernels/cache.py",),
     "shapely": ("slicer/strokes/order", "machine/dryrun/placement"),
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
-    "httpx": ("machine/network/http.py",),
-    "starlette": ("machine/app/workbench/", "machine/app/serving/"),
-    "uvicorn": ("machine/app/workbench/", "machine/app/serving/"),
+    "httpx": ("machine/printing/servers/http.py",),
+    "starlette": ("machine/workbench/", "machine/view/serving/"),
+    "uvicorn": ("machine/workbench/", "machine/view/serving/"),
     "websockets": (),
-    "pydantic": ("profiles/", "machine/app/project_record.py"),
-    "rich": ("machine/app/", "mdp/batch/"),
-    "prompt_toolkit": ("machine/app/",),
-    "PIL": ("machine/app/pictures/",),
-    "tomlkit": ("machine/calibration/", "mdp/search/plan_writing.py"),
+    "pydantic": ("profiles/", "machine/pipeline/project_record.py"),
+    "rich": ("machine/cli/", "machine/pipeline/", "mdp/batch/"),
+    "prompt_toolkit": ("machine/cli/",),
+    "PIL": ("machine/pipeline/pictures/",),
+    "tomlkit": ("machine/setup/calibration/", "mdp/search/plan_writing.py"),
     "platformdirs": ("profiles/folders.py",),
     "torch": ("mdp/learning/",),
     "xgboost": ("mdp/learning/",),
@@ -52,7 +52,12 @@ CONFINED = {
     "tests": (),
     "tools": (),
 }
-JOINER = "machine.app"  # joins the stages and talks to people: nothing below it knows it
+FRONT_ENDS = ("machine/cli/", "machine/workbench/")  # they talk to people: nothing below knows them
+SPEAKING = (  # files below them that still speak to the terminal themselves
+    *(f"machine/printing/{name}.py" for name in ("attendance", "compatibility", "network_print", "resumption", "stream")),
+    *(f"machine/pipeline/{name}.py" for name in ("batch_model", "comparison", "compilers", "pipeline", "programs")),
+    *(f"machine/view/serving/{name}.py" for name in ("browser", "watch_page")),
+)
 HEAVY = {
     "numba",
     "rich",
@@ -88,8 +93,8 @@ def offences(path: str, source: str) -> list[str]:
             wrong["relative", top] = f"{path} imports by a relative name"
         if top in LAYERS and LAYERS.index(top) > LAYERS.index(layer):
             wrong["layer", top] = f"{path} imports {module}, which lies to the right of {layer}"
-        if module.startswith(JOINER) and not path.startswith(JOINER.replace(".", "/")):
-            wrong["joiner", top] = f"{path} imports {module}: only machine/app, which joins the stages, knows it"
+        if f"{module.replace('.', '/')}/".startswith(FRONT_ENDS) and not path.startswith((*FRONT_ENDS, *SPEAKING)):
+            wrong["front end", top] = f"{path} imports {module}: only the two front ends know each other"
         if top in CONFINED and not path.startswith(CONFINED[top]):
             wrong["confined", top] = f"{path} imports {module}, which is confined to {CONFINED[top] or 'no package'}"
     return list(wrong.values())
@@ -101,7 +106,7 @@ def modules() -> list[str]:
 
 def test_every_package_is_looked_at() -> None:
     assert {path.split("/")[0] for path in modules()} == set(LAYERS)
-    assert "machine/app/pictures/picture.py" in modules()
+    assert "machine/pipeline/pictures/picture.py" in modules()
 
 
 @pytest.mark.parametrize("path", modules())
@@ -121,11 +126,11 @@ def test_a_module_imports_only_from_its_left_and_third_parties_only_where_they_b
         ("mdp/formats/scene.py", "import trimesh", 0),
         ("machine/link/port.py", "import serial", 0),
         ("machine/link/stream.py", "import serial", 1),
-        ("machine/app/a.py", "from tests.shapes import box\nimport torch", 2),
+        ("machine/cli/a.py", "from tests.shapes import box\nimport torch", 2),
         ("slicer/a.py", "from . import walls", 1),
         ("slicer/walls/a.py", "import numba, shapely, manifold3d", 3),
-        ("machine/view/a.py", "from machine.app.pipeline import build", 1),
-        ("machine/app/a.py", "from machine.app.pipeline import build", 0),
+        ("machine/pipeline/a.py", "from machine.cli.terminal import say", 1),
+        ("machine/workbench/a.py", "from machine.cli.terminal import say", 0),
     ],
 )
 def test_the_check_finds_what_is_forbidden_and_only_that(path: str, source: str, count: int) -> None:
@@ -134,7 +139,7 @@ def test_the_check_finds_what_is_forbidden_and_only_that(path: str, source: str,
 
 def test_the_command_line_starts_without_heavy_imports() -> None:
     run = subprocess.run(
-        [sys.executable, "-c", "import sys, machine.app.cli; print(*{name.split('.')[0] for name in sys.modules})"],
+        [sys.executable, "-c", "import sys, machine.cli.cli; print(*{name.split('.')[0] for name in sys.modules})"],
         capture_output=True,
         text=True,
         check=True,
@@ -174,6 +179,6 @@ def test_files_at_the_top_of_a_folder_are_values_below_its_rooms_or_stages_above
 
 def test_a_file_that_is_not_there_is_refused_before_numpy_is_loaded() -> None:
     run = "main(['export', 'none.stl', '-o', 'x.gcode'])"
-    program = f"import sys; from machine.app.cli import main; {run}; print('numpy' in sys.modules)"
+    program = f"import sys; from machine.cli.cli import main; {run}; print('numpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("False\n", "tiltprint: none.stl: there is no such file\n")

@@ -91,7 +91,7 @@ def test_the_check_tells_what_exists_from_what_does_not() -> None:
         "slicer.slice.slice_parts(parts, profile, on_progress)",
         "machine.planning.plan.plan(decomposition, sliced, profile, stops)",
         "machine.gcode.writer.write_gcode(program, profile)",
-        "machine.reader.parse.parse_gcode(lines, machine)",
+        "machine.gcode.reader.parse.parse_gcode(lines, machine)",
         "machine.dryrun.dryrun.dry_run(lines, profile, known)",
         "profiles.profile.load(machine, material, process, settings)",
     ],

@@ -19,16 +19,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from machine.app.pipeline.pipeline import decompose_model
-from machine.app.requests import ModelRequest
 from machine.dryrun import clearance, dry_run, extrusion, heat, layering, motion, own_comments, placement, sequence
 from machine.dryrun.replay import replay
 from machine.dryrun.strokes import beads_of
 from machine.gcode.lines import GcodeFile
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
+from machine.pipeline.pipeline import decompose_model
+from machine.pipeline.requests import ModelRequest
 from machine.planning.plan import plan
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind
 from profiles.profile import Profile, load
 from slicer.slice import slice_parts
 

@@ -24,7 +24,7 @@ from mdp.mesh import Mesh
 from mdp.save import stl
 
 RUNS = 3
-OURS = [sys.executable, "-c", "import sys; from machine.app.start import main; sys.exit(main())"]
+OURS = [sys.executable, "-c", "import sys; from machine.cli.start import main; sys.exit(main())"]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

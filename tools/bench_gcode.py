@@ -7,9 +7,9 @@ import time
 import numpy as np
 
 from machine.firmware import dialects
+from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.writer import elapsed_s, write_gcode
 from machine.planning.moves import MARK, REORIENT, TRAVEL, BeginLayer, BeginPart, MachineProgram, Mark, Moves, Reorient
-from machine.reader.parse import parse_gcode
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.profile import load

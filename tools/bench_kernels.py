@@ -15,7 +15,7 @@ from typing import Any
 
 from numba.core import codegen, event
 
-from machine.app.pipeline.precompile import BUNDLES, NO_COLLECTION
+from machine.pipeline.precompile import BUNDLES, NO_COLLECTION
 
 PHASES = {
     "_optimize_functions": "LLVM functions",

@@ -17,12 +17,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
-from machine.app.printer.serial_log import SerialLog, tap
-from machine.app.printer.stream import QUEUE, USB_BYTES
 from machine.link.medium import Medium
 from machine.link.protocol import connection as protocol
 from machine.link.protocol.framing import frame
 from machine.link.stream import print_lines
+from machine.printing.serial_log import SerialLog, tap
+from machine.printing.stream import QUEUE, USB_BYTES
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter

@@ -6,8 +6,8 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.requests import ModelRequest
+from machine.pipeline.pipeline import build, decompose_model
+from machine.pipeline.requests import ModelRequest
 from machine.view.page import parts_page, print_page
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser

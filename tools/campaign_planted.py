@@ -7,8 +7,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from machine.app.embedded_profile import read_embedded_profile
 from machine.dryrun import dry_run
+from machine.pipeline.embedded_profile import read_embedded_profile
 from profiles.errors import GcodeError
 from profiles.profile import Profile, load
 from tests.machine.dryrun.planted import FAULTS, REFUSED, Edit, Fault

@@ -21,7 +21,7 @@ PRINTED, REFUSED, FINDINGS, BUG, KILLED = OUTCOMES = ("printed", "refused", "fin
 # As the command `tiltprint` begins, within limits that hold even where nobody watches any more.
 BEGIN = (
     "import resource as r, sys; r.setrlimit(r.RLIMIT_CPU, ({0}, {0} + 5)); r.setrlimit(r.RLIMIT_DATA, ({1}, {1})); "
-    "from machine.app.start import main; sys.exit(main())"
+    "from machine.cli.start import main; sys.exit(main())"
 )
 BUSY = 3.0  # other work may let a run take this many times its core seconds
 POLL_S = 0.05

@@ -16,9 +16,9 @@ from json import dumps, loads
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.requests import ModelRequest, Outputs
 from machine.dryrun.dryrun import summary
+from machine.pipeline.pipeline import build, decompose_model
+from machine.pipeline.requests import ModelRequest, Outputs
 from mdp.search.plan_writing import plan_text
 from profiles.errors import UserError
 from profiles.profile import load

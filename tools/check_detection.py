@@ -10,9 +10,9 @@ import sys
 from functools import reduce
 from pathlib import Path
 
-from machine.app.commands.profiles.detection import read_file
-from machine.detect.proposal import propose
-from machine.detect.read import read
+from machine.cli.commands.profiles.detection import read_file
+from machine.setup.detect.proposal import propose
+from machine.setup.detect.read import read
 from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import load

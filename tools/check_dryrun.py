@@ -12,10 +12,10 @@ from collections import Counter
 from pathlib import Path
 from time import process_time
 
-from machine.app.cli import main as tiltprint
-from machine.app.embedded_profile import read_embedded_profile
+from machine.cli.cli import main as tiltprint
 from machine.dryrun import dry_run
 from machine.dryrun.conformity.agreement import agreement
+from machine.pipeline.embedded_profile import read_embedded_profile
 from mdp.read import read_mesh
 from profiles.profile import load
 

@@ -10,7 +10,7 @@ them; seconds of one core that the estimate takes, once its kernels are compiled
 import argparse
 from time import process_time
 
-from machine.app.pipeline.pipeline import build
+from machine.pipeline.pipeline import build
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.model_file import locate

@@ -15,10 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
-from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.requests import ModelRequest
 from machine.dryrun.conformity.agreement import agreement
 from machine.link.stream import print_lines
+from machine.pipeline.pipeline import build, decompose_model
+from machine.pipeline.requests import ModelRequest
 from machine.program import Program
 from machine.simulator.planner import EXTRUDES_MM
 from machine.simulator.simulator import SimulatedPrinter

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.app.embedded_profile import read_embedded_profile
-from machine.app.pictures.png import write_png
 from machine.dryrun.balance.interfaces import LEAST, MOST, Interface, interfaces, wall_edges
 from machine.dryrun.balance.layers import layer_balances
 from machine.dryrun.dryrun import dry_run
+from machine.pipeline.embedded_profile import read_embedded_profile
+from machine.pipeline.pictures.png import write_png
 from profiles.profile import load
 
 HEAD = (

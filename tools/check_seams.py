@@ -23,13 +23,13 @@ import numpy as np
 import shapely
 from compare_prints import mesh_of
 
-from machine.app.embedded_profile import read_embedded_profile
-from machine.app.pipeline.pipeline import build
-from machine.app.pipeline.pricing import pricing
 from machine.dryrun.balance.interfaces import AT_THE_EDGE, NO_PART, interfaces, wall_edges
 from machine.dryrun.dryrun import DryRun, dry_run
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import shift, workpiece_points
-from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.pipeline.embedded_profile import read_embedded_profile
+from machine.pipeline.pipeline import build
+from machine.pipeline.pricing import pricing
 from mdp.mesh import Floats, Indices
 from mdp.model_file import locate
 from mdp.pose import Pose, rotation

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from compare_walls import BARE, Print, arachne, ours
 
-from machine.reader.parsed import MoveKind
+from machine.gcode.reader.parsed import MoveKind
 from mdp.cut import mesh_of, solid_of
 from mdp.directions.unit_vectors import spread
 from mdp.mesh import Floats, Mesh

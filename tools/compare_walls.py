@@ -24,9 +24,9 @@ from bench_slice import METER
 from bench_travel import PRUSA, SAME, own_gcode
 from check_layers import section_of
 
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import part_shift
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import locate
 from mdp.pose import level

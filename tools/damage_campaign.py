@@ -29,11 +29,11 @@ from time import perf_counter
 
 import trimesh
 
-from machine.app.cli import main as tiltprint
-from machine.app.embedded_profile import read_embedded_profile
-from machine.app.pipeline.programs import read_gcode_lines
-from machine.app.terminal.plain import plain_lines
+from machine.cli.cli import main as tiltprint
+from machine.cli.terminal.plain import plain_lines
 from machine.dryrun import dry_run
+from machine.pipeline.embedded_profile import read_embedded_profile
+from machine.pipeline.programs import read_gcode_lines
 from mdp.formats.readers import READERS
 from mdp.model_file import locate
 from mdp.read import read_mesh

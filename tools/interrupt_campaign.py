@@ -19,7 +19,7 @@ from time import monotonic, sleep
 
 MOST_S = 2.0
 SIGNALS = {"GROUP": signal.SIGINT, "INT": signal.SIGINT, "TERM": signal.SIGTERM, "KILL": signal.SIGKILL}
-START = [sys.executable, "-c", "from machine.app.start import main; raise SystemExit(main())"]
+START = [sys.executable, "-c", "from machine.cli.start import main; raise SystemExit(main())"]
 COMMANDS = {
     "decompose": ["decompose", "{model}", "--set", "search.beam_width=10"],
     "as is": ["decompose", "{model}", "--as-is"],

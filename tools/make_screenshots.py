@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.requests import Cuts, ModelRequest
+from machine.pipeline.pipeline import build, decompose_model
+from machine.pipeline.requests import Cuts, ModelRequest
 from machine.view.page import print_page
 from profiles.profile import load
 from tests.machine.browser import Browser

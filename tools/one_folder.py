@@ -44,7 +44,7 @@ LICENCE = re.compile(r"(?i)(^|/)(licen[cs]e|copying|notice|authors)[^/]*$")
 LAUNCHER = f"""#!/bin/sh
 here=$(dirname "$(readlink -f "$0")")
 unset PYTHONHOME PYTHONPATH
-exec "$here/bin/{VERSION}" -I -c "import sys; from machine.app.start import main; sys.exit(main())" "$@"
+exec "$here/bin/{VERSION}" -I -c "import sys; from machine.cli.start import main; sys.exit(main())" "$@"
 """
 
 

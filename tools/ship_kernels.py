@@ -59,9 +59,9 @@ def _wheel(copy: Path, out: Path) -> str:
 
 def _compile() -> None:
     """Compile by doing what calls the kernels; what is in the cache already is not compiled again."""
-    from machine.app.cli import main as tiltprint
-    from machine.app.pipeline.compilers import wait_for
-    from machine.app.pipeline.precompile import BUNDLES
+    from machine.cli.cli import main as tiltprint
+    from machine.pipeline.compilers import wait_for
+    from machine.pipeline.precompile import BUNDLES
     from mdp.kernels.cache import SHIPPED
 
     shutil.rmtree(SHIPPED, ignore_errors=True)

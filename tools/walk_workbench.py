@@ -16,8 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from machine.app.requests import SIMULATED, PrintRequest
-from machine.app.workbench.printing.last_printer import keep_printer
+from machine.pipeline.requests import SIMULATED, PrintRequest
+from machine.workbench.printing.last_printer import keep_printer
 from tests.machine.browser import Browser
 from tests.machine.prints import prints_line
 from tests.machine.test_workbench_page import choose

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import MOST, Finding, at_row, cut_short
 from machine.dryrun.strokes import Beads
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pieces, pose_runs
 from machine.kinematics.collision import Printed, Reach, gaps_of, hull, refined_gap, solids, sweep_gaps, swept, swing_mm
 from machine.planning.limits import axis_limits
-from machine.reader.parsed import MoveKind, ParsedProgram, pieces, pose_runs
 from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats, Indices
 from mdp.pose import UP, Pose, rotation

@@ -15,9 +15,9 @@ from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
 from machine.gcode.lines import Lines
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.planning.limits import axis_limits
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.kernels.threads import ahead
 from mdp.mesh import Floats
 from profiles.errors import GcodeError

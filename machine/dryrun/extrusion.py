@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, by_part
 from machine.dryrun.strokes import Beads, parts_on_plate
-from machine.reader.parsed import MoveKind, ParsedProgram, pieces
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pieces
 from mdp.mesh import Floats, Indices
 from profiles.profile import Profile
 from slicer.paths import Kind

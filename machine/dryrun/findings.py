@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.reader.parsed import OWN, Event, ParsedProgram
+from machine.gcode.reader.parsed import OWN, Event, ParsedProgram
 from mdp.mesh import Floats
 from profiles.profile import Profile
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
 from machine.gcode.line_text import to_ascii
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, fan_shares, pieces, temperatures
 from machine.gcode.words import quote
-from machine.reader.parsed import MoveKind, ParsedProgram, fan_shares, pieces, temperatures
 from mdp.mesh import Floats
 from profiles.machine import Machine
 from profiles.profile import Profile

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import Beads
-from machine.reader.parsed import Indices32, ParsedProgram, Remarks, pieces
+from machine.gcode.reader.parsed import Indices32, ParsedProgram, Remarks, pieces
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from slicer.paths import ON_PLATE_MM, Kind

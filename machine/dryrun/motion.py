@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_own
 from machine.firmware import dialect_of
 from machine.gcode.commands import EVERY
+from machine.gcode.reader.parsed import AT_ONCE, MoveKind, ParsedProgram, pieces
 from machine.planning.limits import ROUNDING, axis_limits
-from machine.reader.parsed import AT_ONCE, MoveKind, ParsedProgram, pieces
 from mdp.kernels.arrays import flags
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_row
 from machine.gcode.lines import Lines
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pieces
 from machine.gcode.settings import CONFIG_BEGIN, CONFIG_END, PartTotals, comment, flat
-from machine.reader.parsed import MoveKind, ParsedProgram, pieces
 from profiles.profile import Profile
 from slicer.paths import Kind
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, Beads, highest_of
+from machine.gcode.reader.parsed import ParsedProgram, pieces
 from machine.planning.limits import over_edge_mm
-from machine.reader.parsed import ParsedProgram, pieces
 from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind

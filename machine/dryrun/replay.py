@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from machine.dryrun.height_field import NOTHING, Field, depth_of, empty_field, highest_first, lay_bead
 from machine.dryrun.strokes import CROSSING_MM, LEVEL_SLACK_MM, SLACK_MM, Beads, Moves, Strokes, moves_of, strokes_of, turned_box
+from machine.gcode.reader.parsed import Indices32, MoveKind, ParsedProgram, pose_runs
 from machine.kinematics.table import machine_points
-from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pose_runs
 from mdp.head import Head, head_of
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, no_nrt

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_row, by_part
-from machine.reader.parsed import MoveKind, ParsedProgram, pieces
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pieces
 from profiles.profile import Profile
 from slicer.paths import Kind
 

@@ -18,7 +18,7 @@ from machine.dryrun.motion import standstills
 from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
 from machine.gcode.line_text import is_plain_move, read_line
-from machine.reader.parsed import Indices32, ParsedProgram
+from machine.gcode.reader.parsed import Indices32, ParsedProgram
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.gcode.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces
 from machine.kinematics.table import goes_on, workpiece_segments
-from machine.reader.parsed import Indices32, MoveKind, ParsedProgram, pieces
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from profiles.machine import Machine

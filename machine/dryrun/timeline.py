@@ -3,7 +3,7 @@
 import numpy as np
 
 from machine.dryrun.dryrun import DryRun
-from machine.reader.parsed import MoveKind
+from machine.gcode.reader.parsed import MoveKind
 
 
 class Timeline:

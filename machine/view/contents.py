@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.gcode.reader.parsed import ParsedProgram
 from machine.program import Alternative, Program, joints_of_print
-from machine.reader.parsed import ParsedProgram
 from machine.view import findings, layers, paths, scene
 from machine.view.encoding import pack
 from machine.view.front import front_records

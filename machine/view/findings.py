@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import workpiece_path
-from machine.reader.parsed import MoveKind, ParsedProgram
 from profiles.machine import Machine
 
 MACHINES_OWN = frozenset({"axis-limit", "axis-speed", "collision", "contact", "off-plate", "uncalibrated"})

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.reader.parsed import Indices32, MoveKind, ParsedProgram
+from machine.gcode.reader.parsed import Indices32, MoveKind, ParsedProgram
 from machine.view.encoding import Column
 from mdp.mesh import Floats
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.strokes import beads_of
-from machine.reader.parsed import MoveKind, ParsedProgram, fan_shares, temperatures
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, fan_shares, temperatures
 from machine.view.encoding import Column
 from machine.view.layers import Layers
 from mdp.mesh import Floats

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
+from machine.gcode.reader.parsed import MoveKind
 from machine.program import Alternative, Program
 from machine.quantities import duration, filament_g, newtons, percent, price_in_words
-from machine.reader.parsed import MoveKind
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, page_kinds

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.machine.browser import CHROMIUM, PLAIN, Browser
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.running_workbench import QUICK, Running, workbench
 
 WINDOW = (900, 560)  # a small picture: without a graphics card the processor draws it
 DENSITY = 0.5  # pixels for each CSS pixel, for the same reason

@@ -16,12 +16,12 @@ from typing import Self
 ROOT = Path(__file__).parents[2]
 ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 PATIENCE_S = 60.0
-# Instead of `-m machine.app.cli`: the same, but a line of progress comes, and a server is asked, every tenth of a second.
+# Instead of `-m machine.cli.cli`: the same, but a line of progress comes, and a server is asked, every tenth of a second.
 HASTY = """
 import sys
-from machine.app.cli import main
-from machine.app.terminal import progress
-from machine.network import follow
+from machine.cli.cli import main
+from machine.cli.terminal import progress
+from machine.printing.servers import follow
 progress.PLAIN_EVERY_S = follow.POLL_S = 0.1
 sys.exit(main(sys.argv[1:]))
 """
@@ -31,7 +31,7 @@ class Person:
     """`with Person("console", "--port", "sim") as person:` see(text), press(keys), end() -> exit code."""
 
     def __init__(self, *arguments: str, term: str = "xterm-256color") -> None:
-        self._command = [sys.executable, "-m", "machine.app.cli", *arguments]
+        self._command = [sys.executable, "-m", "machine.cli.cli", *arguments]
         self._term = term
         self.raw = ""
 

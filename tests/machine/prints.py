@@ -12,7 +12,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.machine.browser import Browser
 from tests.machine.firefox import Firefox
-from tests.machine.workbench import PATIENCE_S, Running
+from tests.machine.running_workbench import PATIENCE_S, Running
 
 # Every control of the page and of the page of the print in it gets an e; what would be sent is heard and goes nowhere.
 LETTER_E = """(() => {

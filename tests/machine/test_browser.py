@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from machine.app.serving.watch_page import serve
 from machine.dryrun.dryrun import dry_run
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
 from machine.program import Program
 from machine.view.bundle import bundle
 from machine.view.page import TEMPLATE, parts_page, print_page
+from machine.view.serving.watch_page import serve
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from profiles.profile import load
@@ -438,7 +438,7 @@ def test_without_webgl_the_report_is_shown_and_a_sentence_says_why(tmp_path: Pat
 
 
 def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.app.serving.watch_page.LAST_WORD_S", 0.0)
+    monkeypatch.setattr("machine.view.serving.watch_page.LAST_WORD_S", 0.0)
     profile, printed = program()
     line = int(printed.run.program.line[40])
     heat = Temperature(nozzle_c=209.6, nozzle_target_c=210.0)

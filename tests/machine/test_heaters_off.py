@@ -12,23 +12,23 @@ from typing import Self
 
 import pytest
 
-from machine.app.commands import console as console_module
-from machine.app.commands.console import console
-from machine.app.commands.measuring import at_port
-from machine.app.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
-from machine.app.commands.measuring.mover import PrinterMover
-from machine.app.commands.measuring.prober import ProbingSession
-from machine.app.printer.command_session import CommandSession, LeftError, StopError
-from machine.app.requests import ConsoleRequest, PortRequest, PrintRequest
-from machine.app.workbench.printing import at_hand
-from machine.app.workbench.printing.at_hand import by_hand
-from machine.app.workbench.printing.at_page import AtPage
-from machine.app.workbench.printing.checks import Checks
-from machine.app.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
-from machine.calibration.program import calibration_pen
+from machine.cli.commands import console as console_module
+from machine.cli.commands.console import console
+from machine.cli.commands.measuring import at_port
+from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
+from machine.cli.commands.measuring.mover import PrinterMover
+from machine.cli.commands.measuring.prober import ProbingSession
 from machine.link.medium import Medium, Wire
 from machine.link.stream import print_lines
+from machine.pipeline.requests import ConsoleRequest, PortRequest, PrintRequest
+from machine.printing.command_session import CommandSession, LeftError, StopError
+from machine.setup.calibration.program import calibration_pen
 from machine.simulator.virtual import PATH, VirtualPrinter
+from machine.workbench.printing import at_hand
+from machine.workbench.printing.at_hand import by_hand
+from machine.workbench.printing.at_page import AtPage
+from machine.workbench.printing.checks import Checks
+from machine.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
 from mdp.pose import Pose
 from profiles.errors import FirmwareError, MoveError, PortError, PrinterError
 from profiles.profile import load

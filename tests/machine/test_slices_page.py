@@ -15,10 +15,10 @@ from mdp.save import stl
 from profiles.profile import load
 from tests.machine import hand
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.running_workbench import Running
 from tests.machine.test_browser import opened, program, put, row, text
 from tests.machine.test_workbench_page import open_model, saved
 from tests.machine.view.test_text import FOREIGN
-from tests.machine.workbench import Running
 from tests.shapes import box, tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.workbench import PATIENCE_S
+from tests.machine.running_workbench import PATIENCE_S
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
@@ -26,7 +26,7 @@ def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
     strokes = "".join(f"G1 X40 Y{k % 100} E{k + 1} F60\nG0 X10 F6000\n" for k in range(1000))
     file.write_text(BEGIN + strokes + END)
     options = ["--port", "sim", "--sim-speed", "200", "--watch", "--no-browser", "--force"]
-    command = [sys.executable, "-m", "machine.app.cli", "print", str(file), *options]
+    command = [sys.executable, "-m", "machine.cli.cli", "print", str(file), *options]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stderr is not None

@@ -11,10 +11,10 @@ from machine.program import Program
 from machine.view.page import print_page
 from tests.machine import hand
 from tests.machine.browser import Browser
-from tests.machine.workbench import Running
+from tests.machine.running_workbench import Running
 
 ROOT = Path(__file__).resolve().parents[2] / "machine"
-STYLES = [ROOT / "view/template/style.css", ROOT / "app/workbench/web/page/style.css"]
+STYLES = [ROOT / "view/template/style.css", ROOT / "workbench/web/page/style.css"]
 LEAST_OF_TEXT = 4.5  # WCAG 2.2, 1.4.3
 TABS = ("model", "parts", "slices", "printing", "settings")
 TABS_OF_PRINT = ("show", "report", "findings", "code")

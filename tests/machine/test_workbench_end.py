@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.cli import main
+from machine.cli.cli import main
 from tests.machine.browser import CHROMIUM
 from tests.machine.conftest import small_browser
 from tests.machine.prints import commands_sent
+from tests.machine.running_workbench import QUICK, workbench
 from tests.machine.test_workbench_page import IDLE, choose, find_as_it_lies, saved
-from tests.machine.workbench import QUICK, workbench
 from tests.mdp.files import SHARED
 
 KITTEN, FIGURE = SHARED / "models" / "kitten.off", Path(__file__).parents[2] / "mdp" / "demos" / "figure.ply"

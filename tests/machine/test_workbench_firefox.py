@@ -8,8 +8,8 @@ import pytest
 from mdp.save import stl
 from tests.machine.firefox import FIREFOX, PATIENCE_S, XVFB, Firefox
 from tests.machine.prints import kinds_of_fields, prints_line
+from tests.machine.running_workbench import Running
 from tests.machine.test_workbench_page import FOUND, choose, find_as_it_lies
-from tests.machine.workbench import Running
 from tests.shapes import tee
 
 VIEW = "$('print-page').contentDocument"

@@ -18,12 +18,12 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from machine.app.workbench.access.addresses import network_addresses
+from machine.workbench.access.addresses import network_addresses
 from mdp.save import stl
 from tests.machine.browser import Browser
 from tests.machine.prints import PrintPage
+from tests.machine.running_workbench import PATIENCE_S, QUICK, OpenToNetwork, Page, open_workbench
 from tests.machine.test_workbench_page import choose
-from tests.machine.workbench import PATIENCE_S, QUICK, OpenToNetwork, Page, open_workbench
 from tests.shapes import box
 
 pytestmark = pytest.mark.skipif(not network_addresses(), reason="this computer has no address in a network")

@@ -9,8 +9,8 @@ import pytest
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.running_workbench import Running
 from tests.machine.test_workbench_page import drag_slider, find_as_it_lies, open_model
-from tests.machine.workbench import Running
 from tests.mdp.slicer_files import Made, Object, Placed, bambu
 from tests.shapes import tee
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.cli import main
+from machine.cli.cli import main
 from mdp.mesh import Mesh
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.conftest import small_browser
 from tests.machine.firefox import Firefox
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.running_workbench import QUICK, Running, workbench
 from tests.shapes import ball, tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")

@@ -8,8 +8,8 @@ from PIL import Image
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.running_workbench import Running
 from tests.machine.test_workbench_page import drag_slider, open_model
-from tests.machine.workbench import Running
 from tests.shapes import tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")

@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from machine.app.cli import main
+from machine.cli.cli import main
 from mdp.save import stl
 from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from profiles.profile import load
 from tests.machine.browser import Browser
+from tests.machine.running_workbench import QUICK, Running
 from tests.machine.test_workbench_place import pixels
-from tests.machine.workbench import QUICK, Running
 from tests.mdp.search.test_neck import hourglass
 from tests.shapes import tee
 

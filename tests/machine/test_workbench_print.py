@@ -10,23 +10,23 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.cli import main
+from machine.cli.cli import main
 from machine.link.journal import read_journal
-from machine.network.credentials import VARIABLE
+from machine.printing.servers.credentials import VARIABLE
 from machine.simulator.faults import Fault
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.network.stand_ins import KEY, stand_in
+from tests.machine.printing.servers.stand_ins import KEY, stand_in
 from tests.machine.prints import commands_sent, kinds_of_fields, prints_line
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.running_workbench import QUICK, Running, workbench
 from tests.shapes import box
 
 # The process of a print asks its server often.
 HASTY = """
-from machine.app.workbench.printing import running_print
-running_print.MAIN = f"from machine.network import follow; follow.POLL_S = 0.1; {running_print.MAIN}"
+from machine.workbench.printing import running_print
+running_print.MAIN = f"from machine.printing.servers import follow; follow.POLL_S = 0.1; {running_print.MAIN}"
 """
 PRINTING, VIEW = "document.documentElement.dataset.printing", "$('print-page').contentDocument"
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.cli import main
+from machine.cli.cli import main
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.running_workbench import Running
 from tests.machine.test_workbench_page import IDLE, choose, find_as_it_lies, open_model, saved
-from tests.machine.workbench import Running
 from tests.shapes import tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")

@@ -80,7 +80,7 @@ def test_the_folder_of_a_run_is_gone_at_its_end_and_what_is_lost_is_said_once(te
     temporary.chmod(0o777)
     (temporary.parent / "a.gcode").write_text("G28\n")
     environment = {"PATH": os.environ["PATH"], "PYTHONPATH": os.getcwd(), "TMPDIR": str(temporary.parent), "HOME": "/dev/null"}
-    code = "import sys; from machine.app.cli import main; raise SystemExit(main(['profiles', 'list']))"
+    code = "import sys; from machine.cli.cli import main; raise SystemExit(main(['profiles', 'list']))"
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert done.stderr == ""
     code = code.replace(

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from machine.app.workbench.bench.settings import USUAL, settings_list
+from machine.workbench.bench.settings import USUAL, settings_list
 from profiles.frozen import TITLES, unit_of
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys

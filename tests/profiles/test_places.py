@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.cli import main
+from machine.cli.cli import main
 from profiles.errors import ProfileError
 from profiles.places import known, own, own_folder, shipped
 from profiles.profile import check_file, load, load_one

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from machine.app.cli import main as tiltprint
+from machine.cli.cli import main as tiltprint
 from mdp.read import read_mesh
 from profiles.profile import load
 from tests.machine.dryrun.planted import FAULTS

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.pipeline.pipeline import build
 from machine.dryrun.dryrun import dry_run
+from machine.pipeline.pipeline import build
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile, load
 from tests.shapes import box

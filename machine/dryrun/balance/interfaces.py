@@ -13,7 +13,7 @@ import numpy as np
 from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.strokes import Beads, parts_on_plate, turned_box
-from machine.reader.parsed import ParsedProgram
+from machine.gcode.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose, rotation
 from profiles.profile import Profile

@@ -13,7 +13,7 @@ import numpy as np
 from machine.dryrun.balance.columns import Bars, Mask, laid, lattice_over, over_room
 from machine.dryrun.balance.interfaces import LEAST, MOST
 from machine.dryrun.strokes import Beads
-from machine.reader.parsed import ParsedProgram
+from machine.gcode.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices
 from profiles.profile import Profile
 from slicer.paths import Kind

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.conformity.deposit import AROUND, inside
 from machine.dryrun.dryrun import DryRun
-from machine.reader.parsed import pose_runs
+from machine.gcode.reader.parsed import pose_runs
 from mdp.kernels.arrays import flags, floats, longs
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Mesh

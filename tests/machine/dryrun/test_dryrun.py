@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from machine.dryrun import DryRun, dry_run, summary
 from machine.dryrun.strokes import turned_box
-from machine.reader import parsed
+from machine.gcode.reader import parsed
 from mdp.pose import Pose, rotation
 from profiles.errors import GcodeError
 from profiles.profile import load

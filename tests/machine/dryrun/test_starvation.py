@@ -4,11 +4,11 @@ from math import cos, sin
 
 import pytest
 
-from machine.app.cli import main
-from machine.app.printer.compatibility import is_rate_limited
+from machine.cli.cli import main
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.starvation import feeding, find_starvation
 from machine.link.stream import print_lines
+from machine.printing.compatibility import is_rate_limited
 from machine.simulator.board import BuildOptions
 from machine.simulator.record import Record
 from machine.simulator.virtual import PATH, VirtualPrinter

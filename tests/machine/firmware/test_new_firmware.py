@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from machine import firmware
-from machine.calibration.program import calibration_lines, plan_touches
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialects, identify
 from machine.gcode.modes import ModalState, axes_of
+from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
 from machine.link.protocol.connection import Connection
 from machine.link.stream import print_lines
-from machine.reader.parsed import MoveKind
+from machine.setup.calibration.program import calibration_lines, plan_touches
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.machine import FOLLOWS_TABLE

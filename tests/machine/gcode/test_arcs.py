@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
 from machine.gcode.arcs import arc_box, arc_centre, chord_count, chords, sweep_rad
+from machine.gcode.reader.codes import CHORD_MM
+from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.writer import write_gcode
-from machine.reader.codes import CHORD_MM
-from machine.reader.parse import parse_gcode
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from mdp.mesh import Floats

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.cli import main
+from machine.cli.cli import main
 from machine.firmware import dialects
 from machine.gcode.blocks import block_problems, refused_lines
 from machine.gcode.writer import write_gcode

@@ -4,17 +4,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.app.printer.settings_queries import QUESTIONS
-from machine.app.workbench.printing.at_hand import homing_lines
-from machine.calibration.program import calibration_lines, calibration_pen, cold_start, plan_touches
 from machine.firmware import Dialect, dialect_of, dialects
 from machine.gcode.blocks import cold_block, filled_start
 from machine.gcode.commands import EVERY, NOTHING_KNOWN, Heat, command_in, command_named, heat_in
 from machine.gcode.modes import COMMANDS as MODES
+from machine.gcode.reader.codes import CODES, MACROS
 from machine.link.protocol.framing import command_of
-from machine.reader.codes import CODES, MACROS
+from machine.printing.settings_queries import QUESTIONS
+from machine.setup.calibration.program import calibration_lines, calibration_pen, cold_start, plan_touches
 from machine.simulator.commands import COMMANDS as SIMULATED
 from machine.simulator.macros import MACROS as SIMULATED_MACROS
+from machine.workbench.printing.at_hand import homing_lines
 from profiles.errors import LocalProtocolError, MoveError
 from profiles.profile import Profile, load, shipped
 

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from machine.firmware import dialect_of, dialects
 from machine.gcode.blocks import fill_block
 from machine.gcode.line_text import plain_line, read_line, to_ascii
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import ParsedProgram
 from machine.link.protocol.framing import command_of, frame
-from machine.network.gcode_upload import GcodeUpload
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import ParsedProgram
+from machine.printing.servers.gcode_upload import GcodeUpload
 from profiles.errors import GcodeError, LocalProtocolError
 from profiles.machine import Machine
 from profiles.profile import load

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from machine.firmware import dialect_of, dialects
 from machine.gcode.modes import E_AXIS, ModalState, axes_of
-from machine.reader.parse import parse_gcode
+from machine.gcode.reader.parse import parse_gcode
 from machine.simulator.firmware import SimulatedFirmware
 from profiles.machine import Machine
 from tests.machine.firmware.test_dialects import profile

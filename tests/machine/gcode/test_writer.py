@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import BeginLayer, straight_moves
 from machine.quantities import duration
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind
 from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.profile import Profile, load

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from machine.app.printer.journal_folder import KEPT, new_journal
 from machine.gcode.lines import GcodeFile
 from machine.link import journal as journal_module
 from machine.link.journal import BLOCK_BYTES, EVERY_LINES, SLOTS, Checkpoint, Journal, JournalHeading, mark_resumed, read_journal
+from machine.printing.journal_folder import KEPT, new_journal
 from profiles.errors import JournalError, OutputError
 from profiles.profile import load
 

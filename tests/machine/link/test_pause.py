@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from machine.app.printer.serial_log import tap
 from machine.link.medium import Medium, Wire
 from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
 from machine.link.stream import Outcome, print_lines
+from machine.printing.serial_log import tap
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import FirmwareError, PortError, PrinterError

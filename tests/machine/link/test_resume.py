@@ -11,9 +11,7 @@ from threading import Event as Flag
 import numpy as np
 import pytest
 
-from machine.app.cli import main
-from machine.app.printer.journal_folder import continue_journal
-from machine.app.printer.serial_log import tap
+from machine.cli.cli import main
 from machine.gcode.lines import GcodeFile
 from machine.gcode.modes import ModalState, axes_of
 from machine.link import status
@@ -26,6 +24,8 @@ from machine.link.protocol.framing import frame
 from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, heights_mm, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
+from machine.printing.journal_folder import continue_journal
+from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from machine import firmware
-from machine.app.printer.serial_log import tap
 from machine.dryrun.dryrun import dry_run
 from machine.firmware.marlin import MARLIN
 from machine.link import journal as journal_module
@@ -29,6 +28,7 @@ from machine.link.protocol.events import Position, Temperature, read_event
 from machine.link.protocol.framing import command_of, frame
 from machine.link.protocol.resends import ASKED_LIMIT
 from machine.link.stream import Outcome, print_lines
+from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import SimulatedFirmware

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from machine.gcode.reader.parse import parse_gcode
 from machine.link.port import open_port, refusal
 from machine.link.progress import Progress, Schedule
 from machine.link.protocol.timeout import Timing
 from machine.link.stream import Outcome, print_lines
-from machine.reader.parse import parse_gcode
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import HEALED, Fault, random_script
 from machine.simulator.record import Record

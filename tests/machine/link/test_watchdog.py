@@ -5,10 +5,10 @@ from contextlib import nullcontext
 
 import pytest
 
-from machine.app.printer.serial_log import tap
 from machine.link.protocol.events import Echo, Temperature, read_event
 from machine.link.stream import print_lines
 from machine.link.watchdog import PrinterReports, Watchdog
+from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.virtual import PATH, VirtualPrinter

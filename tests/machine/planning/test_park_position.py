@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from machine.dryrun import dry_run
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
 from machine.kinematics.collision import hull, solids
 from machine.kinematics.table import machine_points, workpiece_points
 from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from machine.planning.stand import BESIDE_MM
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind
 from mdp.clearance import allowed_poses
 from mdp.decomposition import Decomposition
 from mdp.plane import PLATFORM, Plane

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.writer import write_gcode
 from machine.planning.layer import Laid, trail_after
 from machine.planning.moves import BeginLayer, MachineProgram
 from machine.planning.plan import plan
-from machine.reader.parse import parse_gcode
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from profiles.profile import Profile, load

@@ -5,12 +5,12 @@ from math import inf
 import numpy as np
 import pytest
 
-from machine.app.printer.compatibility import check_dialect
 from machine.firmware import dialects
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
 from machine.link.protocol.framing import command_of
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind
+from machine.printing.compatibility import check_dialect
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from profiles.errors import PrinterError

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import serial
 
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
 from machine.link.protocol.framing import checksum
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.record import Record

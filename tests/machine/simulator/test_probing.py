@@ -5,7 +5,7 @@ import pytest
 from machine.simulator.contact.probe import ProbedTable
 from machine.simulator.contact.surface import TrueBall
 from machine.simulator.firmware import SimulatedFirmware
-from tests.machine.calibration.touches import machine_of
+from tests.machine.setup.calibration.touches import machine_of
 
 BALL = TrueBall(10.0, (20.0, 0.0, 45.0))
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from machine.app.cli import main
-from machine.app.pipeline.pipeline import build
+from machine.cli.cli import main
 from machine.kinematics.table import workpiece_path
+from machine.pipeline.pipeline import build
 from machine.view.contents import of_parts
 from machine.view.page import page, print_page
 from mdp.model_file import locate

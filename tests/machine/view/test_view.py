@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from machine.dryrun.dryrun import dry_run
+from machine.gcode.reader.parse import parse_gcode
+from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
 from machine.kinematics.table import workpiece_path
 from machine.program import Program
-from machine.reader.parse import parse_gcode
-from machine.reader.parsed import MoveKind
 from machine.view.contents import of_parts, of_print
 from machine.view.encoding import Column, pack
 from machine.view.layers import layers_of

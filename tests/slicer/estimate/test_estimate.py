@@ -6,7 +6,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
-from machine.app.pipeline.pipeline import build
+from machine.pipeline.pipeline import build
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from profiles.process import Process

@@ -1,0 +1,178 @@
+"""The batch command: every model of a folder, on many cores or machines, a row each; what is done is not done again."""
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from machine.cli.terminal.plain import plain_line, show
+from machine.cli.terminal.progress import say
+from machine.gcode.blocks import check_blocks
+from machine.pipeline import compilers
+from machine.pipeline.batch_model import (
+    ACTIONS,
+    BETWEEN,
+    DONE,
+    FAILED,
+    REFUSED,
+    STATUSES,
+    Job,
+    Row,
+    inputs_of,
+    job_of,
+    row_of,
+)
+from machine.pipeline.output import check_folder, check_writable, delete
+from machine.pipeline.requests import BatchRequest
+from machine.quantities import duration
+from mdp.batch.pool import connected
+from mdp.batch.progress import BatchProgress
+from mdp.batch.rows import append_row, read_rows, write_rows, writing_alone
+from mdp.formats.readers import READERS
+from mdp.kernels.workers import CallError
+from mdp.ranking.ranker import ranker_named
+from profiles.errors import UserError, counted
+
+LOCK = "batch.lock"
+NO_FILES = "estimate"  # makes none
+CLASH = "{} would have the files of {}: another name is expected"
+REASONS = 5  # of the most common ones, told at the end
+NUMBER = re.compile(r"\d+([.,]\d+)*")
+
+
+def batch(request: BatchRequest) -> int:
+    """Do what is asked with every model of a folder; 1 unless all of them are done."""
+    if request.do not in ACTIONS:
+        raise UserError(f"--do {request.do}: {', '.join(ACTIONS)} is expected")
+    files = model_files(request.folder)
+    check_folder(request.out)
+    ranker_named(request.asked.ranker)
+    check_blocks(request.asked.profile)
+    job, table = job_of(request.do, request.asked, request.out.resolve()), request.out / f"{request.do}.csv"
+    with writing_alone(request.out, LOCK):
+        check_writable(table)
+        clashes = {} if request.do == NO_FILES else same_files(files)
+        rows = _rows_that_hold(table, {name: file for name, file in files.items() if name not in clashes}, job)
+        rows |= {name: Row(name, REFUSED, sentence=CLASH.format(name, first)) for name, first in clashes.items()}
+        write_rows(table, Row, _in_order(rows))
+        try:
+            _work_off(request, job, files, rows, table)
+        except KeyboardInterrupt:
+            done = sum(name in rows for name in files)
+            say(f"{done} of {len(files)} models have a row in {table}; started again, it goes on there")
+            raise
+        finally:
+            write_rows(table, Row, _in_order(rows))
+    ours = [rows[name] for name in files]
+    show(summary(ours, table))
+    return int(any(row.status != DONE for row in ours))
+
+
+def model_files(folder: Path) -> dict[str, Path]:
+    """The models of a folder by name, absolute. Raises UserError for a folder without any."""
+    if not folder.is_dir():
+        raise UserError(f"{folder}: there is no such folder; models are expected in it")
+    files = (file for file in folder.resolve().iterdir() if file.suffix.lower() in READERS and not file.name.startswith("."))
+    named = {file.name: file for file in sorted(files)}
+    if not named:
+        raise UserError(f"folder {folder} holds no model; {', '.join(READERS)} are read")
+    return named
+
+
+def is_current(row: Row, file: Path, job: Job) -> bool:
+    """Whether a row of an earlier run still holds: same model, same options, files there, and no failure that may pass."""
+    files = row.files.split(BETWEEN) if row.files else []
+    return row.status != FAILED and all((job.out / name).is_file() for name in files) and row.inputs == inputs_of(file, job)
+
+
+def _in_order(rows: Mapping[str, Row]) -> list[Row]:
+    return [rows[name] for name in sorted(rows)]
+
+
+def _delete_files(out: Path, row: Row) -> None:
+    """Nobody shall print what an earlier run has made of another model or by other options."""
+    for name in row.files.split(BETWEEN) if row.files else ():
+        if (out / name).resolve().is_relative_to(out):
+            delete(out / name)
+
+
+def _rows_that_hold(table: Path, files: Mapping[str, Path], job: Job) -> dict[str, Row]:
+    """The rows of earlier runs that need not be done again, those of models that are gone included."""
+    earlier = {row.model: row for row in read_rows(table, Row)}
+    stems = {_stem(name) for name in files}
+    gone = {name for name, row in earlier.items() if name not in files and not (row.files and _stem(name) in stems)}
+    rows = {name: row for name, row in earlier.items() if name in gone or (name in files and is_current(row, files[name], job))}
+    for name in earlier.keys() - rows.keys():
+        _delete_files(job.out, earlier[name])
+    done = sum(name in rows for name in files)
+    if done:
+        others = ": going on with the others" if done < len(files) else ""
+        say(f"{done} of {len(files)} models have been done before{others}")
+    return rows
+
+
+def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: dict[str, Row], table: Path) -> None:
+    """Add the missing rows, to the table at once."""
+    calls = {name: (file, job) for name, file in files.items() if name not in rows}
+    if not calls:
+        return
+    if request.workers.scheduler is None:
+        _compile(job)
+    folders = (request.folder.resolve(), job.out)
+    with connected(replace(request.workers, folders=folders)) as queue, BatchProgress(len(calls), "models") as progress:
+        for name, result in queue.completed(row_of, calls, progress.tick):
+            if isinstance(result, CallError):
+                result = Row(name, FAILED, sentence=plain_line(f"{name}: {result}"), inputs=inputs_of(files[name], job))
+            append_row(table, result)
+            rows[name] = result
+            progress.show(in_words(result), result.status != DONE)
+
+
+def in_words(row: Row) -> str:
+    """What came of a model, for a person who waits."""
+    parts = f"{row.parts} part{'s' * (row.parts > 1)}, {duration(row.time_s)}"
+    return f"{row.model}: {row.sentence.removeprefix(f'{row.model}: ') or parts}"
+
+
+def same_files(names: Iterable[str]) -> dict[str, str]:
+    """The models whose files would be those of another one, by the name of that."""
+    firsts: dict[str, str] = {}
+    return {name: first for name in sorted(names) if (first := firsts.setdefault(_stem(name), name)) != name}
+
+
+def _stem(name: str) -> str:
+    """What tells the files of a model from those of others; case does not count on some systems."""
+    return Path(name).stem.casefold()
+
+
+def _compile(job: Job) -> None:
+    """Compile once what every process of this machine needs."""
+    program = compilers.bundles_to_build(job.asked.profile) if job.do == "export" else ()
+    compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH, *program))
+
+
+def summary(rows: Iterable[Row], table: Path) -> str:
+    """What came of all models, what printing them takes, and why the others are not done."""
+    rows = list(rows)
+    counts = Counter(row.status for row in rows)
+    text = f"{counted(len(rows), 'model')}: " + ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
+    done = [row for row in rows if row.status == DONE]
+    if done:
+        filament_m = sum(row.filament_mm for row in done) / 1000.0
+        text += f"; to print: {duration(sum(row.time_s for row in done))}, {filament_m:.1f} m of filament"
+    lines = [f"{count:6} {reason}" for reason, count in reasons(rows)]
+    return "\n".join([text, *lines, f"a row for each is in {table}"]) + "\n"
+
+
+def reasons(rows: Iterable[Row]) -> list[tuple[str, int]]:
+    """The most common sentences of models that are not done, and how many models each is said of; names and numbers in them
+    do not count, those of the first model stand for all."""
+    firsts: dict[str, str] = {}
+    counts: Counter[str] = Counter()
+    for row in rows:
+        if row.status != DONE:
+            sentence = row.sentence.removeprefix(f"{row.model}: ")
+            kind = NUMBER.sub("0", sentence.replace(row.model, ""))
+            counts[firsts.setdefault(kind, sentence)] += 1
+    return counts.most_common(REASONS)

@@ -1,0 +1,323 @@
+"""Console: a person, or a pipe, talks to a printer line by line: what is typed is sent, what it says is shown."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from math import inf
+from typing import TYPE_CHECKING
+
+from machine.cli.terminal.interrupts import calling, interrupting
+from machine.cli.terminal.progress import say
+from machine.firmware import dialect_of
+from machine.link.port import open_port
+from machine.link.protocol import events
+from machine.pipeline.output import check_writable
+from machine.pipeline.requests import SIMULATED, ConsoleRequest
+from machine.printing.command_session import CommandSession, LeftError, StopError
+from machine.printing.compatibility import check_speed, describe_answer, identify_printer
+from machine.printing.serial_log import TappedWire, new_log
+from machine.printing.server_checks import check_no_server
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import LocalProtocolError, PrinterError
+from profiles.folders import state_folder
+
+if TYPE_CHECKING:
+    from prompt_toolkit import PromptSession
+    from prompt_toolkit.application import Application
+
+PROMPT = "> "
+AT_ONCE_S = 0.5
+HELP = """What you type is sent, one line after the other is answered. Besides:
+  /help     this
+  /reports  show or hide temperature reports
+  /stop     emergency stop (M112) at once, even while a command is under way
+  /quit     leave; Ctrl-D and Ctrl-C do too
+"""
+DIM, RED, YELLOW, CYAN = "2", "31", "33", "36"
+COLOURS: dict[type[events.Event], str] = {
+    **dict.fromkeys((events.Ok, events.PlainOk, events.Busy), DIM),
+    events.Temperature: CYAN,
+    **dict.fromkeys((events.Echo, events.Action, events.Start, events.Banner), YELLOW),
+    **dict.fromkeys((events.LineError, events.Resend, events.FirmwareFault), RED),
+}
+
+
+def console(request: ConsoleRequest) -> int:
+    """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
+    check_speed(request.sim_speed)
+    check_no_server(request.port)
+    if request.log is not None:
+        check_writable(request.log)
+    machine, port = request.profile.machine, request.port
+    with ExitStack() as stack:
+        simulated = port == SIMULATED
+        path = stack.enter_context(SimulatedPrinter(machine, request.sim_speed or inf)).path if simulated else port
+        log = stack.enter_context(new_log("console", f"console at {port}", request.log))
+        wire = stack.enter_context(open_port(path, request.baud))
+        if log.trouble:
+            say(f"the traffic is not logged: {log.file}: {log.trouble}")
+        stack.enter_context(interrupting())
+        shown = Shown(request.reports)
+
+        def tell(direction: str, data: bytes) -> None:
+            log.note(direction, data)
+            if direction == "<":
+                shown.hear(data)
+
+        hint = "; /help tells what can be typed" if sys.stdin.isatty() else ""
+        say(describe_answer(identify_printer(wire, request.baud, halted=True), request.baud) + hint)
+        session = CommandSession(TappedWire(wire, tell), dialect_of(machine).longest_line)
+        return _Console(session, shown, request.leave_heaters).run()
+
+
+class _Console:
+    """One console from the greeting to a safe end."""
+
+    def __init__(self, session: CommandSession, shown: Shown, leave_heaters: bool) -> None:
+        self._session, self._shown, self._leave_heaters = session, shown, leave_heaters
+        self._waiting: deque[str] = deque()
+        self._done = threading.Event()
+        self._error: BaseException | None = None
+        self._interrupted = False
+
+    def run(self) -> int:
+        """The exit code. Raises PrinterError, and whatever went wrong, after the heaters were switched off."""
+        typed, code, session = sys.stdin.isatty(), 0, self._session
+        heated, unknown = "", list[str]()
+        with session:
+            try:
+                session.greet()
+                self._shown.quiet = False
+                (self._typed if typed else self._piped)()
+            except KeyboardInterrupt:
+                code = 130
+            except PrinterError:
+                if not session.restarts:
+                    raise
+            finally:
+                self._shown.quiet = True
+            if session.restarts:
+                session.keep_heat = True  # the restart switches the heaters off, and nobody listens meanwhile
+                say("the printer restarts, its heaters are off: the next console or print waits until it is ready")
+                return code
+            if session.exchange.greeted:
+                unknown = session.unknown[:]
+                heated = session.heated()
+                session.keep_heat = self._leave_heaters or (typed and not code and bool(heated) and not _agreed(heated))
+        if heated:
+            say(f"{'left on' if session.keep_heat else 'switched off'}: {heated}")
+        if unknown and not typed:
+            raise PrinterError(f"the printer did not know {', '.join(repr(line) for line in unknown[:5])}")
+        return code
+
+    def _piped(self) -> None:
+        """Every line of a pipe, one after the other."""
+        for line in sys.stdin:
+            if self._meant_for_us(line.strip()):
+                return
+            if not line.startswith("/"):
+                self._session.command(line)
+
+    def _typed(self) -> None:
+        """What a person types; a thread of its own keeps listening meanwhile."""
+        prompt = _prompt_session()
+        worker = threading.Thread(target=self._serve, args=(prompt.app,), name="console", daemon=True)
+        worker.start()
+        try:
+            self._read_on(prompt)
+        finally:
+            self._part_from(worker)
+            if self._waiting:
+                say(f"not sent any more: {', '.join(self._waiting)}")
+        if self._error is not None:
+            raise self._error
+
+    def _part_from(self, worker: threading.Thread) -> None:
+        """Let the other thread end whatever interrupts: two must not talk at the same time."""
+        while worker.is_alive():
+            with suppress(KeyboardInterrupt):
+                self._session.order(LeftError)
+                worker.join()
+
+    def _read_on(self, prompt: PromptSession[str]) -> None:
+        while self._error is None:
+            try:
+                line = self._read_line(prompt)
+            except EOFError:
+                if not sys.stdin.isatty():  # the terminal was closed: its end can be read before its signal comes
+                    raise KeyboardInterrupt from None
+                return
+            if self._meant_for_us(line):
+                return
+            if line and not line.startswith("/"):
+                self._hand_over(line)
+
+    def _read_line(self, prompt: PromptSession[str]) -> str:
+        """What is typed at the prompt. Raises EOFError, and KeyboardInterrupt when the prompt has put everything in order."""
+        with calling(lambda: self._interrupt(prompt.app)), self._shown.above(prompt.app):
+            line = prompt.prompt(PROMPT, pre_run=lambda: self._begin_prompt(prompt.app)).strip()
+        if self._interrupted:
+            raise KeyboardInterrupt
+        return line
+
+    def _interrupt(self, app: Application[str]) -> None:
+        self._interrupted = True
+        if app.loop is None:  # the prompt has not begun, or is over
+            raise KeyboardInterrupt
+        self._call_prompt(app)
+
+    def _call_prompt(self, app: Application[str]) -> None:
+        """Have the prompt look whether it must end."""
+        loop = app.loop
+        if loop is not None:
+            with suppress(RuntimeError):  # the prompt has just ended, and its loop with it
+                loop.call_soon_threadsafe(self._end_prompt, app)
+
+    def _begin_prompt(self, app: Application[str]) -> None:
+        self._shown.write_above()
+        self._end_prompt(app)
+
+    def _end_prompt(self, app: Application[str]) -> None:
+        """Leave the prompt for an interrupt or an error of the other thread, also one that came before it could hear of it."""
+        if (self._interrupted or self._error is not None) and app.is_running and not app.is_done:
+            app.exit(exception=KeyboardInterrupt if self._interrupted else EOFError)
+
+    def _hand_over(self, line: str) -> None:
+        """Let the thread send a line; what is answered at once comes before the next prompt, what takes longer above it."""
+        self._done.clear()
+        self._waiting.append(line)
+        self._done.wait(AT_ONCE_S)
+
+    def _serve(self, app: Application[str]) -> None:
+        try:
+            while True:
+                if not self._waiting:
+                    self._session.listen()
+                    continue
+                try:
+                    self._session.command(self._waiting.popleft())
+                except LocalProtocolError as error:
+                    self._shown.write(str(error))
+                self._done.set()
+        except LeftError:
+            return
+        except BaseException as error:  # noqa: BLE001 - a bug, too, ends the console: run() raises it, the heaters off
+            self._error = error
+            self._done.set()
+            self._call_prompt(app)
+
+    def _meant_for_us(self, line: str) -> bool:
+        """Do what a line with a slash means; True when it means to leave."""
+        word = line.lower()
+        if word == "/stop" or word.split(" ")[0].split("*")[0] == "m112":
+            raise StopError
+        if word == "/reports":
+            self._shown.reports = not self._shown.reports
+            self._shown.write(f"temperature reports are {'shown' if self._shown.reports else 'hidden'}")
+        elif word == "/help":
+            self._shown.write(HELP.rstrip())
+        elif word.startswith("/") and word != "/quit":
+            self._shown.write(f"{line} is not known: /help, /reports, /stop and /quit are")
+        return word == "/quit"
+
+
+def _agreed(heated: str) -> bool:
+    """Whether heaters that are on are to be switched off: anything but a plain no agrees."""
+    try:
+        return not input(f"{heated}: switch off? [Y/n] ").strip().lower().startswith("n")
+    except (EOFError, KeyboardInterrupt):
+        return True
+
+
+def _prompt_session() -> PromptSession[str]:
+    """A prompt that knows the lines typed in earlier consoles, by the arrow keys, and leaves its own for later ones."""
+    from prompt_toolkit import PromptSession
+    from prompt_toolkit.history import FileHistory
+    from prompt_toolkit.output.defaults import create_output
+
+    output = create_output()
+    setattr(output, "enable_cpr", False)  # noqa: B010 - only menus need to know where the cursor stands, and not all terminals tell
+    return PromptSession(history=FileHistory(str(state_folder() / "console_lines")), output=output)
+
+
+class Shown:
+    """Prints what the printer says, line by line; on a terminal in colours, and above the line that is being typed."""
+
+    def __init__(self, reports: bool) -> None:
+        self.reports = reports
+        self.quiet = True
+        self._half = b""
+        self._busy = 0  # in a row
+        self._lock = threading.Lock()
+        self._lines: list[str] = []  # that wait to be written above the prompt
+        self._app: Application[str] | None = None  # the prompt, while there is one
+        self._colours = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+
+    def hear(self, data: bytes) -> None:
+        """Take what was received."""
+        *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
+        self._half = self._half[-4096:]
+        for line in lines:
+            if line.strip() and not self.quiet:
+                self._show(line)
+
+    def _show(self, line: bytes) -> None:
+        event = events.read_event(line)
+        if isinstance(event, events.Temperature) and not self.reports:
+            return
+        if isinstance(event, events.Busy):
+            self._busy += 1
+            if self._busy > 1:
+                return
+        elif self._busy:
+            if self._busy > 1:
+                self.write(f"(busy {self._busy - 1} more times)")
+            self._busy = 0
+        text = "".join(c if c.isprintable() else "?" for c in line.decode("ascii", "replace"))
+        colour = COLOURS.get(type(event))
+        self.write(f"\x1b[{colour}m{text}\x1b[0m" if colour and self._colours else text)
+
+    def write(self, text: str) -> None:
+        """One line; while a person types it is put above the line that is being typed. Any thread may call this."""
+        with self._lock:
+            self._lines.append(text)
+            if self._app is None:
+                self._print_lines()
+            elif len(self._lines) > 1:
+                return  # what waits is written together
+            elif (loop := self._app.loop) is not None:  # without one the prompt is about to begin and writes them first
+                with suppress(RuntimeError):  # it has just ended: above() writes them
+                    loop.call_soon_threadsafe(self.write_above)
+
+    @contextmanager
+    def above(self, app: Application[str]) -> Iterator[None]:
+        """Write lines above this prompt, from its own thread, so that they never come between two moves of its cursor."""
+        try:
+            with self._lock:
+                self._app = app
+            yield
+        finally:
+            with self._lock:
+                self._app = None
+                self._print_lines()
+
+    def write_above(self) -> None:
+        """Write what waits; the prompt's thread calls this."""
+        from prompt_toolkit.application import run_in_terminal
+
+        def print_lines() -> None:
+            with self._lock:
+                self._print_lines()
+
+        if self._lines:
+            run_in_terminal(print_lines)
+
+    def _print_lines(self) -> None:
+        sys.stdout.write("".join(f"{line}\n" for line in self._lines))
+        sys.stdout.flush()
+        self._lines.clear()

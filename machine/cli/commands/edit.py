@@ -1,0 +1,95 @@
+"""The edit command: the workbench, served on this computer until Ctrl-C."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from machine.cli.terminal.plain import show
+from machine.cli.terminal.progress import say
+from machine.pipeline.project import is_project
+from machine.pipeline.requests import GCODE_SUFFIXES, EditRequest
+from machine.view.serving.browser import lead_browser
+from machine.workbench.access.lan import Lan, open_lan
+from machine.workbench.session.session import Session
+from machine.workbench.web.serve import serve_workbench
+from machine.workbench.work.worker_pool import WorkerPools
+from mdp.model_file import DEMO, check_file, locate, plan_beside
+from mdp.search.plan_file import PlanFile
+from mdp.search.plan_reading import read_plan
+from profiles.errors import MeshError, OutputError, PlanError
+
+PLAN_SUFFIX = ".toml"
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What lies on the workbench first: the file and name of a model, with a plan to cut it by, or of a project."""
+
+    path: Path
+    name: str
+    plan: PlanFile | None = None
+    project: bool = False
+
+
+def edit(request: EditRequest) -> int:
+    """Serve the page; a model that cannot be read is told in it, a file that is not there at once."""
+    opened = None if request.model is None else _find(request.model)
+    lan = _lan(request)
+
+    def make(pools: WorkerPools) -> Session:
+        return Session(request.profile, request.given, pools)
+
+    def begin(session: Session) -> None:
+        if opened is not None:
+            session.start(_open(session, opened))
+
+    def announce(address: str, *of_lan: str) -> None:
+        show("".join(f"{each}\n" for each in (address, *of_lan)))
+        say(f"the workbench is there, for this computer{'' if of_lan else ' alone'}; Ctrl-C ends it")
+        if request.browser:
+            lead_browser(address, until_end)
+
+    with ExitStack() as until_end:
+        serve_workbench(make, begin, announce, request.port, request.upload_mib, lan)
+    return 0
+
+
+def _lan(request: EditRequest) -> Lan | None:
+    """The network that the workbench is opened to, None: to none. Raises OutputError."""
+    if request.lan:
+        return open_lan(request.certificate, request.key)
+    if request.certificate or request.key:
+        raise OutputError("--certificate and --key encrypt what --lan opens: give --lan, too")
+    return None
+
+
+async def _open(session: Session, opened: Opened) -> None:
+    if opened.project:
+        await session.open_project(opened.path, opened.name)
+        return
+    await session.open_model(opened.path, opened.name)
+    if opened.plan is not None:
+        await session.take_plan(opened.plan)
+
+
+def _find(model: str) -> Opened:
+    """The files of a MODEL or a PLAN. Raises UserError for those that are not there."""
+    if Path(model).suffix.lower() == PLAN_SUFFIX and not model.startswith(DEMO):
+        return _of_plan(Path(model), read_plan(Path(model)))
+    if Path(model).suffix.lower() in GCODE_SUFFIXES:
+        raise MeshError(f"{model} is G-code, which is sliced already: tiltprint view shows it")
+    path = locate(model)
+    check_file(path)
+    if is_project(path):
+        return Opened(path, path.name, project=True)
+    plan = plan_beside(model)
+    return Opened(path, model if model.startswith(DEMO) else path.name, None if plan is None else read_plan(plan))
+
+
+def _of_plan(file: Path, plan: PlanFile) -> Opened:
+    """The model that a plan names: one that ships, or the file of that name beside the plan."""
+    path = locate(plan.model) if plan.model.startswith(DEMO) else file.parent / Path(plan.model).name
+    if not plan.model or not path.is_file():
+        reason = f"its model {plan.model} is not beside it" if plan.model else "it names no model"
+        raise PlanError(f"plan {file}: {reason}: open the model first, then choose the plan in the page")
+    return Opened(path, plan.model, plan)

@@ -1,0 +1,80 @@
+"""The export command: a model's G-code, dry-run first, and one layer's picture."""
+
+import re
+from collections.abc import Sequence
+
+from machine.cli.terminal.plain import show
+from machine.cli.terminal.progress import say_lines
+from machine.cli.terminal.report import joints_table, print_price, print_table
+from machine.dryrun.dryrun import summary
+from machine.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+from machine.pipeline.file_roles import check_model_files
+from machine.pipeline.output import check_outputs, write_bytes, write_json, write_lines
+from machine.pipeline.pipeline import build, decompose_model
+from machine.pipeline.programs import refuse_errors
+from machine.pipeline.requests import STDOUT, ModelRequest
+from machine.planning.stops import parts_in_words
+from machine.view.page import print_page
+from profiles.errors import OutputError
+from slicer.drawing import layer_svg
+from slicer.paths import SlicedPart
+
+
+def export(request: ModelRequest) -> int:
+    """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced.
+
+    Where the G-code goes to standard output the table goes to stderr.
+    """
+    outputs = request.outputs
+    if outputs.gcode == outputs.json == STDOUT:
+        raise OutputError("-o - and --json -: only one of them can go to standard output")
+    check_outputs(outputs)
+    check_model_files(request, ())
+    part, layer = parse_layer(outputs.layer, outputs.svg is not None)
+    decomposed = decompose_model(request, to_build=True)
+    profile = decomposed.profile
+    program = build(decomposed.decomposition, profile, pictures=True, stops=request.stops)
+    refuse_errors(program.run.errors, request.force)
+    picture = b"" if outputs.svg is None else draw_layer(program.sliced, part, layer)
+    if outputs.gcode is not None:
+        write_lines(outputs.gcode, program.lines)
+    if outputs.svg is not None:
+        write_bytes(outputs.svg, picture)
+    alternatives = compare_with_one_part(program, profile) if request.compare else ()
+    if outputs.html is not None:
+        write_bytes(outputs.html, print_page(request.name, program, profile, alternatives=alternatives))
+    if outputs.json is not None:
+        comparison = {"compare": alternatives_json(alternatives)} if alternatives else {}
+        write_json(outputs.json, summary(program.run) | print_price(program, profile) | comparison)
+    table = print_table(program, profile)
+    if alternatives:
+        table += "\n" + joints_table(alternatives[0].joints) + compare_table(alternatives)
+    if outputs.gcode == STDOUT:
+        say_lines(table.removesuffix("\n"))
+    elif outputs.json != STDOUT:
+        show(table)
+    return 0
+
+
+def parse_layer(layer: str | None, has_file: bool) -> tuple[int, int]:
+    """Part and layer, both counted from 1, of a --layer option; the first layer of all when it is absent.
+
+    Raises OutputError for a text that is not PART:LAYER, and when there is no picture to draw it in.
+    """
+    if layer is None:
+        return 1, 1
+    if not has_file:
+        raise OutputError(f"--layer {layer} says which layer to draw: --svg FILE must say where to")
+    match = re.fullmatch(r"(\d{1,9}):(\d{1,9})", layer)
+    if match is None:
+        raise OutputError(f"--layer {layer}: PART:LAYER is expected, both counted from 1, such as 2:15")
+    return int(match[1]), int(match[2])
+
+
+def draw_layer(sliced: Sequence[SlicedPart], part: int, layer: int) -> bytes:
+    """The SVG file of a layer; raises OutputError or SliceError when there is no such part or layer."""
+    for piece in sliced:
+        if piece.index == part:
+            return layer_svg(piece, layer).encode()
+    there = parts_in_words(max(p.index for p in sliced))
+    raise OutputError(f"--layer {part}:{layer}: there is no part {part}, the parts are {there}")

@@ -1,0 +1,152 @@
+"""The calibrate command: writes the program and the sheet, works out the numbers, saves them in the user's own profile."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from machine.cli.commands.measuring.calibrate_dialogue import ask_touches
+from machine.cli.terminal.plain import show
+from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
+from machine.pipeline.requests import CalibrationRequest
+from machine.setup.calibration.fit import Calibration, calibrate
+from machine.setup.calibration.program import calibration_lines, plan_touches
+from machine.setup.calibration.saved import fitted_tables, own_profile
+from machine.setup.calibration.sheet import Sheet, read_sheet, sheet_text
+from profiles.axes import RotaryAxis
+from profiles.errors import ProfileError
+from profiles.machine import Machine
+from profiles.profile import Profile, load_one
+
+MOST_OFF_MM = 0.5
+MARK_HEIGHT_MM = 20.0
+
+
+def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> int:
+    """Write the G-code and, beside it, the sheet to fill in."""
+    sheet = out.with_suffix(".toml")
+    for file in (out, sheet):
+        check_writable(file)
+        refuse_to_overwrite(file, request.replace)
+    height = mark_height_mm(request)
+    touches = plan_touches(profile.machine, height, request.mark_radius_mm)
+    write_lines(out, calibration_lines(profile, touches))
+    write_bytes(sheet, sheet_text(request.machine, profile.machine, touches).encode())
+    radius = touches.mark_mm[0]
+    show(
+        f"fix a pointed mark, {height:g} mm high, {radius:g} mm from the middle of the plate\n"
+        f"run {out}: it takes the cold nozzle to the mark at {len(touches.poses)} poses\n"
+        f"each time bring the tip onto the mark, note X Y Z in {sheet}, then go on\n"
+        f"then: tiltprint calibrate --machine {request.machine} --measured {sheet}\n"
+    )
+    return 0
+
+
+def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
+    """Find signs, zeros and centres from a filled sheet, tell them and save them."""
+    machine, name = tilting_machine(request), request.machine
+    sheet = read_sheet(measured, request.mark_height_mm)
+    if sheet.machine not in (None, name):
+        raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
+    calibration, off = judged(request, machine, sheet)
+    if off:
+        raise ProfileError(f"{off}: look at touch {calibration.worst} first")
+    save_calibration(request, machine, calibration, sheet.mark_angle_deg is not None)
+    return 0
+
+
+def ask_for_touches(request: CalibrationRequest) -> int:
+    """Ask a person for the touches one by one, tell what follows from them, save it."""
+    machine, name = tilting_machine(request), request.machine
+    refuse_if_saved(request)
+    accepted: list[Calibration] = []
+
+    def judge(sheet: Sheet) -> str | int | None:
+        try:
+            calibration, off = judged(request, machine, sheet)
+        except ProfileError as error:  # the person is asked again
+            return str(error)
+        if off:
+            show(f"{off}\n")
+            return calibration.worst
+        accepted.append(calibration)
+        return None
+
+    sheet = ask_touches(name, machine, mark_height_mm(request), request.mark_radius_mm, judge)
+    save_calibration(request, machine, accepted[-1], sheet.mark_angle_deg is not None)
+    return 0
+
+
+def mark_height_mm(request: CalibrationRequest) -> float:
+    """As asked for, or the usual one."""
+    return MARK_HEIGHT_MM if request.mark_height_mm is None else request.mark_height_mm
+
+
+def tilting_machine(request: CalibrationRequest) -> Machine:
+    """The machine of a request; raises ProfileError for one without rotary axes."""
+    machine = load_one(request.machine, request.settings).get("machine")
+    if not isinstance(machine, Machine):
+        raise ProfileError(f"{request.machine} is not a machine profile")
+    if not machine.tilts:
+        raise ProfileError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
+    return machine
+
+
+def judged(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple[Calibration, str]:
+    """What follows from the touches, which is shown, and why it is not taken; "" when it is."""
+    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg, request.directions)
+    show(comparison(machine, calibration, sheet.mark_angle_deg is not None))
+    if calibration.rms_mm <= MOST_OFF_MM or request.force:
+        return calibration, ""
+    off = f"the touches are {calibration.rms_mm:.2f} mm off on average"
+    return calibration, f"{off}, at most {MOST_OFF_MM:g} mm is taken without --force"
+
+
+def save_calibration(request: CalibrationRequest, machine: Machine, calibration: Calibration, zero_of_turn: bool = False) -> None:
+    """The found numbers in the user's own profile, and the file before beside it."""
+    save_tables(request, fitted_tables(machine, calibration, zero_of_turn))
+
+
+def refuse_if_saved(request: CalibrationRequest) -> None:
+    """Raise OutputError at once where the result could not be saved at the end."""
+    name = Path(request.machine).stem
+    refuse_to_overwrite(own_profile("machine", request.save or name, request.machine, {})[0], request.replace)
+
+
+def save_tables(request: CalibrationRequest, tables: Mapping[str, Any]) -> None:
+    """What was found in the user's own profile, and the file before beside it."""
+    file, text = own_profile("machine", request.save or Path(request.machine).stem, request.machine, tables)
+    write_own(file, text, request.replace)
+    show(f"saved: {file}; use it as --machine {file.stem}\n")
+
+
+def through(name: str, old: RotaryAxis, new: RotaryAxis, sigma_mm: float) -> str:
+    """Where an axis was found to be, and how sure that is, beside where the profile has it."""
+    point, was = (
+        " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", axis.point_mm, strict=True)) for axis in (new, old)
+    )
+    return f"{name} {new.letter}: through {point} (+-{sigma_mm:.3f} mm), was {was}"
+
+
+def comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -> str:
+    """The found numbers beside the profile's, and how far the touches are off."""
+    lines = []
+    for axis in ("tilt", "turn"):
+        old, new = getattr(before, axis), getattr(calibration.machine, axis)
+        sigma = max(value for key, value in calibration.sigma.items() if key.startswith(f"{axis}.point_mm"))
+        lines.append(through(axis, old, new, sigma))
+        lines.append(f"{axis} {new.letter}: sign {new.sign}, was {old.sign}")
+        if axis == "tilt" or zero_of_turn:
+            lines.append(f"{axis} {new.letter}: zero {new.zero_deg:.4f} deg, was {old.zero_deg:g}")
+        if calibration.directions:
+            along = " ".join(f"{value:.5f}" for value in new.axis)
+            was = " ".join(f"{value:g}" for value in old.axis)
+            lines.append(f"{axis} {new.letter}: along {along} (+-{calibration.sigma[f'{axis}.axis']:.4f} deg), was {was}")
+    touches, mean_mm = len(calibration.residuals_mm), calibration.rms_mm
+    most = f"most at touch {calibration.worst}: {max(calibration.residuals_mm):.4f} mm"
+    lines.append(f"touches: {touches}, {mean_mm:.4f} mm off on average, {most}")
+    if calibration.directions and before.coordinates == "workpiece":
+        lines.append(
+            f"note: {before.dialect} follows the table as if its axes were straight: the directions count where "
+            'coordinates = "table"'
+        )
+    return "\n".join(lines) + "\n"

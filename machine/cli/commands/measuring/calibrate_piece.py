@@ -1,0 +1,113 @@
+"""Calibrate by a printed piece: what a person reads off the pads of `demo:calibration`, turned into axes of their profile."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from machine.cli.commands.measuring.calibrate import refuse_if_saved, save_tables, through, tilting_machine
+from machine.cli.commands.measuring.calibrate_dialogue import read_reply
+from machine.cli.terminal.plain import show
+from machine.gcode.lines import GcodeFile
+from machine.gcode.reader.parse import parse_gcode
+from machine.pipeline.embedded_profile import read_embedded_profile
+from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes
+from machine.pipeline.requests import CalibrationRequest
+from machine.setup.calibration.piece.fit import Correction, correct
+from machine.setup.calibration.piece.pads import Piece, read_piece
+from machine.setup.calibration.piece.page import piece_page
+from machine.setup.calibration.piece.readings import EXPECTED, parse_pad, parse_readings
+from machine.setup.calibration.saved import found_tables
+from profiles.errors import ProfileError
+from profiles.machine import Machine
+from profiles.profile import load
+
+FOUND = ("machine.turn.point_mm", "machine.tilt.point_mm", "machine.tilt.zero_deg")
+INTRO = f"""Look at each pad with its holes above: one hole is pad 1. Below it and to its right, count which of its notches goes
+on as a groove of the roof, from the long one in the middle: 1, 2, ... to the right and up, -1, -2, ... to the left and down.
+Then measure how high the pad's top stands over the roof beside it, mm. {EXPECTED.capitalize()}; b goes back.
+"""
+
+
+def write_page(request: CalibrationRequest, printed: Sequence[Path], html: Path) -> int:
+    """A page on which the readings of a piece are typed, and that tells the corrections at once."""
+    check_writable(html)
+    refuse_to_overwrite(html, request.replace)
+    if len(printed) != 1:
+        raise ProfileError(f"--html is the page of one piece: --printed is given {len(printed)} times")
+    piece = _read(printed[0], tilting_machine(request))
+    write_bytes(html, piece_page(piece, request.machine, printed[0].name))
+    show(f"open {html} beside the printed piece\n")
+    return 0
+
+
+def correct_axes(request: CalibrationRequest, printed: Sequence[Path], readings: Sequence[str]) -> int:
+    """Find the axes from the readings of one or several pieces, tell what changes, save it."""
+    machine = tilting_machine(request)
+    if len(printed) != len(readings):
+        raise ProfileError(f"--printed is given {len(printed)} times, --readings {len(readings)} times: as often is expected")
+    pieces = [_read(path, machine) for path in printed]
+    told = np.array([parse_readings(text) for text in readings])
+    return _settle(request, machine, correct(machine, pieces, told), len(pieces))
+
+
+def ask_for_readings(request: CalibrationRequest, printed: Path) -> int:
+    """Ask a person in a terminal for the readings of a piece, pad by pad, then as `correct_axes`."""
+    machine = tilting_machine(request)
+    refuse_if_saved(request)
+    piece = _read(printed, machine)
+    sys.stdout.write(INTRO)
+    told: list[list[float]] = []
+    while len(told) < len(piece.pads):
+        pad = piece.pads[len(told)]
+        reply = read_reply(
+            f"pad {pad.number} ({pad.number} hole{'s' * (pad.number > 1)}): right, up, height: ", "all pads were told"
+        )
+        if reply == "b":
+            told = told[:-1]
+            continue
+        try:
+            told.append(parse_pad(reply, pad.number))
+        except ProfileError as error:  # the person is asked again
+            sys.stdout.write(f"  {error}\n")
+    return _settle(request, machine, correct(machine, [piece], np.array([told])), 1)
+
+
+def _read(path: Path, machine: Machine) -> Piece:
+    """The piece that a program of ours prints. Raises ProfileError where that was made for another machine."""
+    lines = GcodeFile(path).lines()
+    profile, taken = read_embedded_profile(lines, load(), frozenset())
+    if "machine" not in taken:
+        raise ProfileError(
+            f"{path} does not say for which machine it was made: a program of `export demo:calibration` is expected"
+        )
+    if profile.machine.name != machine.name:
+        raise ProfileError(f"{path} was made for {profile.machine.name}: --machine names {machine.name}")
+    return read_piece(parse_gcode(lines, profile.machine), profile.machine, str(path))
+
+
+def _settle(request: CalibrationRequest, machine: Machine, correction: Correction, pieces: int) -> int:
+    """Tell a correction, and save it where it is more than the readings can be off."""
+    show(comparison(machine, correction))
+    if correction.doubtful is not None and not request.force:
+        piece, pad, way = correction.doubtful
+        raise ProfileError(f"piece {piece}, pad {pad}: {way} does not fit the others: look at it again, or take it with --force")
+    if not correction.significant:
+        show("no number changes by more than the readings can be off: the profile stays as it is\n")
+        return 0
+    source = f"tiltprint calibrate, {pieces} printed piece{'s' * (pieces > 1)}"
+    save_tables(request, found_tables(machine, correction.machine, FOUND, source))
+    return 0
+
+
+def comparison(before: Machine, correction: Correction) -> str:
+    """The found numbers beside the profile's, how sure they are, and what no numbers explain."""
+    after, sigma = correction.machine, correction.sigma.tolist()
+    lines = [
+        through("turn", before.turn, after.turn, max(sigma[:2])),
+        through("tilt", before.tilt, after.tilt, max(sigma[2:4])),
+        f"tilt {after.tilt.letter}: zero {after.tilt.zero_deg:.3f} (+-{sigma[4]:.3f} deg), was {before.tilt.zero_deg:g}",
+        f"left over of the readings: {np.nanmax(np.abs(correction.left_mm)):.2f} mm at most",
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,113 @@
+"""Calibrate by probe: the machine at a port measures a ball on its own plate, and its axes follow from that."""
+
+import sys
+
+from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
+from machine.cli.commands.measuring.calibrate import MOST_OFF_MM, comparison, refuse_if_saved, save_calibration, tilting_machine
+from machine.cli.commands.measuring.calibrate_dialogue import read_reply
+from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
+from machine.cli.terminal.plain import show
+from machine.cli.terminal.progress import say
+from machine.firmware import dialect_of, firmware_of
+from machine.firmware.probing import ProbingRules
+from machine.pipeline.output import check_writable
+from machine.pipeline.requests import CalibrationRequest, ProbeRequest
+from machine.printing.server_checks import check_no_server
+from machine.setup.calibration.fit import Calibration, calibrate
+from machine.setup.calibration.probing.ball import Ball
+from machine.setup.calibration.probing.measure import Measuring, Probe
+from machine.setup.calibration.program import calibration_pen, usual_radius_mm
+from machine.simulator.contact.probe import ProbedTable
+from machine.simulator.contact.surface import TrueBall
+from profiles.errors import PrinterError, ProfileError
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+BALL_HEIGHT_MM = 45.0  # of its centre over the plate
+NOISE_MM = 0.005  # of the simulated probe
+PLACE = (
+    "fix a ball {diameter:g} mm in diameter, its centre {height:g} mm over the plate and {radius:g} mm from the middle towards +X"
+)
+
+
+def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Profile) -> int:
+    """Measure, tell what follows, save it as calibrate saves. Raises UserError, the tip raised and nothing saved."""
+    machine = tilting_machine(request)
+    check_no_server(probing.at.port)
+    refuse_if_saved(request)
+    if probing.png is not None:
+        check_writable(probing.png)
+    ball, probe = _ball(request, probing, machine), _probe(probing, machine)
+    with cold_session(probing.at, machine, _table(machine, ball, probe)) as session:
+        prober = PrinterProber(session, calibration_pen(profile), _rules(machine), probe.offset_mm[2])
+        measuring = Measuring(machine, ball, prober, probe, say)
+        with tip_raised_after(prober):
+            _begin(session, prober, machine, ball)
+            touches = measuring.run()
+    calibration = calibrate(machine, touches, ball.centre_mm[2], directions=True)
+    show(
+        f"{comparison(machine, calibration, False)}contacts: {measuring.contacts}\n"
+        f"{residual_table(calibration, machine, measuring)}"
+    )
+    if probing.png is not None:
+        from machine.pipeline.pictures.png import write_png
+        from machine.pipeline.pictures.residual_picture import residual_picture
+
+        write_png(probing.png, residual_picture(calibration, [touch.pose for touch in touches], machine))
+    if calibration.rms_mm > MOST_OFF_MM and not request.force:
+        raise ProfileError(
+            f"the contacts are {calibration.rms_mm:.2f} mm off on average, at most {MOST_OFF_MM:g} mm is taken without --force"
+        )
+    save_calibration(request, machine, calibration)
+    return 0
+
+
+def residual_table(calibration: Calibration, machine: Machine, measuring: Measuring) -> str:
+    """A line a pose: how far the ball's centre is from where the found machine has it, mm."""
+    rows = [f"{'pose':>18}  {'x':>7}  {'y':>7}  {'z':>7}  mm off"]
+    for touch, (x, y, z) in zip(measuring.touches, calibration.errors_mm, strict=True):
+        pose = f"{machine.tilt.letter}{touch.pose.tilt_deg:.2f} {machine.turn.letter}{touch.pose.turn_deg:.2f}"
+        rows.append(f"{pose:>18}  {x:7.3f}  {y:7.3f}  {z:7.3f}")
+    return "\n".join(rows) + "\n"
+
+
+def _ball(request: CalibrationRequest, probing: ProbeRequest, machine: Machine) -> Ball:
+    height = BALL_HEIGHT_MM if request.mark_height_mm is None else request.mark_height_mm
+    radius = usual_radius_mm(machine, request.mark_radius_mm)
+    if height < 0.5 * probing.ball_mm:
+        raise ProfileError(f"--mark-height {height:g}: a ball {probing.ball_mm:g} mm in diameter has its centre higher up")
+    return Ball(0.5 * probing.ball_mm, (radius, 0.0, height))
+
+
+def _probe(probing: ProbeRequest, machine: Machine) -> Probe:
+    """The nozzle's own end is as flat as the profile's silhouette says; a probe beside it is taken to be pointed."""
+    radius, height = machine.head.silhouette_mm[0]
+    own = Probe(probing.offset_mm)
+    return Probe(probing.offset_mm, radius if own.is_nozzle and height == 0.0 else 0.0)
+
+
+def _rules(machine: Machine) -> ProbingRules:
+    rules = firmware_of(machine).probing
+    if rules is None:
+        raise PrinterError(
+            f"{machine.name}: how {dialect_of(machine).firmware} probes is not known: touch a mark by hand instead"
+        )
+    return rules
+
+
+def _table(machine: Machine, ball: Ball, probe: Probe) -> ProbedTable:
+    """What a simulated printer has on its plate."""
+    there = TrueBall(ball.radius_mm, ball.centre_mm)
+    return ProbedTable(machine, there, offset_mm=probe.offset_mm, flat_mm=probe.flat_mm, noise_mm=NOISE_MM)
+
+
+def _begin(session: ProbingSession, prober: PrinterProber, machine: Machine, ball: Ball) -> None:
+    """Cold and homed, with a person's word that the ball stands there."""
+    begin_cold(session, prober, machine)
+    if not _rules(machine).limited:
+        say(f"{dialect_of(machine).firmware} probes down to the axis' end where nothing is met: keep a hand at the switch")
+    place = PLACE.format(diameter=2.0 * ball.radius_mm, height=ball.centre_mm[2], radius=ball.centre_mm[0])
+    say(place)
+    if sys.stdin.isatty():
+        session.exchange.drain()
+        read_reply("Enter when it stands there, Ctrl-C ends: ", "the ball stood there")

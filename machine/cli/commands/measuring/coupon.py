@@ -1,0 +1,131 @@
+"""The coupon command: writes the bars' program and the sheet, works out what their break loads say, saves it in profiles."""
+
+from collections.abc import Mapping, Sequence
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from machine.cli.commands.measuring.coupon_dialogue import ask_loads
+from machine.cli.terminal.plain import show
+from machine.cli.terminal.report import print_table
+from machine.pipeline.output import check_outputs, check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
+from machine.pipeline.pictures.picture import contact_sheet
+from machine.pipeline.pictures.png import write_png
+from machine.pipeline.pipeline import build
+from machine.pipeline.programs import refuse_errors
+from machine.pipeline.requests import STDOUT, CouponRequest, Outputs
+from machine.setup.calibration.saved import own_profile
+from machine.setup.coupon.bars import SHAPES, Shape
+from machine.setup.coupon.design import factors, settings_of_bars
+from machine.setup.coupon.fit import Outcome, evaluate
+from machine.setup.coupon.plate import coupon
+from machine.setup.coupon.report import outcome_text, report_lines
+from machine.setup.coupon.saved import material_tables, process_tables
+from machine.setup.coupon.sheet import Sheet, empty_sheet, read_sheet, sheet_text
+from machine.view.page import print_page
+from profiles.errors import OutputError, ProfileError
+from profiles.part_settings import PartSettings
+from profiles.places import KINDS
+from profiles.profile import Profile, load, with_part_settings
+
+UNSUPPORTED = ("process.support=none",)  # the bars carry themselves; support would stand on what is measured
+
+
+def write_program(request: CouponRequest, out: Path) -> int:
+    """Write the G-code and, beside it, the sheet to fill in; a page that shows the bars where asked."""
+    sheet_file = out.with_suffix(".toml")
+    if sheet_file == out:
+        raise OutputError(f"-o {out}: the sheet is written there, beside the program: another ending is expected, as .gcode")
+    for file in (out, sheet_file):
+        check_writable(file)
+        refuse_to_overwrite(file, request.replace)
+    check_outputs(Outputs(html=request.html, png=request.png))
+    shape = _shape(request)
+    profile = load(*request.names, settings=(*request.settings, *UNSUPPORTED))
+    chosen = factors(profile, request.vary)
+    decomposition = coupon(shape, profile)
+    profile = _with_settings_of_bars(profile, settings_of_bars(chosen))
+    program = build(decomposition, profile, pictures=True)
+    refuse_errors(program.run.errors, request.force)
+    write_lines(out, program.lines)
+    write_bytes(sheet_file, sheet_text(empty_sheet(shape, request.names, chosen)).encode())
+    if request.html is not None:
+        write_bytes(request.html, print_page(decomposition.name, program, profile))
+    if request.png is not None:
+        write_png(request.png, contact_sheet(decomposition, profile.machine))
+    show(print_table(program, profile))
+    show(
+        f"print {out}, break the bars, note the loads in {sheet_file}\n"
+        f"then: tiltprint coupon {request.named} --measured {sheet_file}\n"
+    )
+    return 0
+
+
+def evaluate_sheet(request: CouponRequest, measured: Path) -> int:
+    """Find strengths and the settings that won from a filled sheet; save them, or only write them as a report."""
+    sheet = read_sheet(measured)
+    for kind, told, name in zip(KINDS, (sheet.machine, sheet.material, sheet.process), request.names, strict=True):
+        if told != name:
+            raise ProfileError(f"{measured} is a sheet of {told}: --{kind} {told} is expected, not {name}")
+    outcome = evaluate(sheet)
+    if request.report is not None:
+        if request.report != STDOUT:
+            check_writable(request.report)
+            refuse_to_overwrite(request.report, request.replace)
+        write_lines(request.report, report_lines(sheet, outcome, version("tiltprint")))
+        return 0
+    show(outcome_text(outcome))
+    _save(request, outcome)
+    return 0
+
+
+def ask_for_loads(request: CouponRequest) -> int:
+    """Ask a person for the loads one by one, tell what follows from them, save it."""
+    profile = load(*request.names, settings=request.settings)
+    sheet = empty_sheet(_shape(request), request.names, factors(profile, request.vary))
+    for kind in ("material", "process"):
+        refuse_to_overwrite(_own_profile(request, kind, {})[0], request.replace)
+
+    def judge(answered: Sheet) -> str:
+        try:
+            evaluate(answered)
+        except ProfileError as error:  # the person is asked again
+            return str(error)
+        return ""
+
+    outcome = evaluate(ask_loads(sheet, judge))
+    show(outcome_text(outcome))
+    _save(request, outcome)
+    return 0
+
+
+def _save(request: CouponRequest, outcome: Outcome) -> None:
+    """Strengths and what won in the user's own profiles, the files before beside them."""
+    day = date.today()
+    before = load(*request.names, settings=request.settings).material
+    found = {"material": material_tables(outcome, before, day), "process": process_tables(outcome, day)}
+    profiles = {kind: _own_profile(request, kind, tables) for kind, tables in found.items() if tables}
+    for file, _ in profiles.values():
+        refuse_to_overwrite(file, request.replace)
+    for kind, (file, text) in profiles.items():
+        write_own(file, text, request.replace)
+        show(f"saved: {file}; use it as --{kind} {file.stem}\n")
+    if "process" not in profiles:
+        show("no setting is better than the process's own: it stays as it is\n")
+
+
+def _own_profile(request: CouponRequest, kind: str, tables: Mapping[str, Any]) -> tuple[Path, str]:
+    name = dict(zip(KINDS, request.names, strict=True))[kind]
+    return own_profile(kind, request.save or Path(name).stem, name, tables)
+
+
+def _shape(request: CouponRequest) -> Shape:
+    if request.shape not in SHAPES:
+        raise ProfileError(f"--shape {request.shape}: {' or '.join(SHAPES)} is expected")
+    return SHAPES[request.shape]
+
+
+def _with_settings_of_bars(profile: Profile, settings: Sequence[dict[str, Any]]) -> Profile:
+    given = [PartSettings(part=bar + 1, process=own) for bar, own in enumerate(settings, start=1) if own]
+    return with_part_settings(profile, given)

@@ -1,0 +1,127 @@
+"""The simulated printer as a program of its own: any host prints on it, through a terminal or a TCP port."""
+
+import threading
+from dataclasses import fields, replace
+from math import inf, isfinite
+
+from machine.cli.terminal.interrupts import stopping
+from machine.cli.terminal.plain import show
+from machine.cli.terminal.progress import say
+from machine.firmware import dialect_of, dialects
+from machine.firmware.line import check_baud
+from machine.pipeline.requests import SimulatorRequest
+from machine.printing.running_simulators import announced
+from machine.quantities import duration
+from machine.simulator.board import BuildOptions, build_options
+from machine.simulator.contact.probe import ProbedTable
+from machine.simulator.contact.surface import TrueBall
+from machine.simulator.faults import FaultScript, read_script
+from machine.simulator.record import Record
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import PrinterError
+
+KEPT = 10000  # moves on record; of the others only the sums are reported
+LOOK_S = 0.5
+PROBE_NOISE_MM = 0.005  # one sigma of a contact's height
+LEAST, MOST = {"rx_ring": 16, "queue": 1}, 65536  # bytes and lines that a firmware may be built with
+
+
+def simulate_printer(request: SimulatorRequest) -> int:
+    """Run until Ctrl-C or a termination request, which is its end: 0. The path to open stands on stdout, then what was done."""
+    script = read_script(request.faults) if request.faults is not None else FaultScript()
+    _check(request)
+    machine, baud = request.profile.machine, request.baud
+    build = read_build_options(request.habits, build_options(machine, baud))
+    stop = threading.Event()
+    simulated = SimulatedPrinter(
+        machine,
+        request.speed or inf,
+        build=build,
+        faults=script,
+        link=request.link,
+        tcp=request.tcp,
+        baud=baud,
+        kept_moves=KEPT,
+        table=_table(request),
+    )
+    with (
+        stopping(stop),
+        simulated as printer,
+        announced(f"simulated printer ({machine.name}, {dialect_of(machine).firmware})", printer.path) as announce,
+    ):
+        show(f"{printer.path}\n")
+        say(f"simulated printer ({machine.name}, {dialect_of(machine).firmware}) listens there; Ctrl-C ends it")
+        path = printer.path
+        while not stop.wait(LOOK_S):
+            if printer.path != path:
+                path = printer.path
+                announce(path)
+                show(f"{path}\n")
+        record = printer.record
+    show(summary(record))
+    return 0
+
+
+def _table(request: SimulatorRequest) -> ProbedTable | None:
+    """What its probe meets; None where nothing is said of it."""
+    if request.ball is None and request.true is None:
+        return None
+    true = request.profile.machine if request.true is None else request.true.machine
+    if request.ball is None:
+        return ProbedTable(true, noise_mm=PROBE_NOISE_MM)
+    try:
+        x, y, z, diameter = (float(word) for word in request.ball.split(","))
+    except ValueError:
+        raise PrinterError(f"--ball is {request.ball}: four numbers X,Y,Z,D in mm are allowed") from None
+    if not (all(isfinite(value) for value in (x, y, z)) and 0.0 < diameter <= 100.0):
+        raise PrinterError(f"--ball is {request.ball}: a place, and a diameter above 0 up to 100 mm, are allowed")
+    return ProbedTable(true, TrueBall(0.5 * diameter, (x, y, z)), noise_mm=PROBE_NOISE_MM)
+
+
+def _check(request: SimulatorRequest) -> None:
+    machine, speed, baud, tcp = request.profile.machine, request.speed, request.baud, request.tcp
+    if not dialect_of(machine).serial:
+        streamed = ", ".join(name for name, dialect in dialects().items() if dialect.serial)
+        raise PrinterError(f"{machine.name} speaks {machine.dialect}, which takes no lines: {streamed} are simulated")
+    if not (isfinite(speed) and speed >= 0):
+        raise PrinterError(f"--speed is {speed:g}: it must be 0 (as fast as possible) or a number above")
+    if baud is not None:
+        check_baud(baud)
+    if tcp is not None and not 0 <= tcp <= 65535:
+        raise PrinterError(f"--tcp is {tcp}: 0 (a free port) to 65535 is allowed")
+    if request.link is not None and tcp is not None:
+        raise PrinterError("--pty and --tcp are two ways to reach the printer: one of them is allowed")
+
+
+def read_build_options(text: str, build: BuildOptions) -> BuildOptions:
+    """Build options changed by words: `no-advanced-ok,realtime,rx-ring=64,queue=16`. Raises PrinterError."""
+    names = [field.name for field in fields(BuildOptions)]
+    for word in filter(None, (part.strip() for part in text.split(","))):
+        name, _, value = word.replace("-", "_").partition("=")
+        if value.isdigit() and name in LEAST and LEAST[name] <= int(value) <= MOST:
+            build = replace(build, rx_ring=int(value)) if name == "rx_ring" else replace(build, queue=int(value))
+        elif name == "no_rx_ring":
+            build = replace(build, rx_ring=None)
+        elif not value and name.removeprefix("no_") in names and name.removeprefix("no_") not in LEAST:
+            build = replace(build, **{name.removeprefix("no_"): not name.startswith("no_")})
+        else:
+            allowed = ", ".join(known.replace("_", "-") for known in names if known not in LEAST)
+            raise PrinterError(
+                f"--habits holds {word!r}: {allowed}, with or without no-, rx-ring=BYTES (from 16) and queue=LINES are allowed"
+            )
+    return build
+
+
+def summary(record: Record) -> str:
+    """What a simulated print came to."""
+    lines = [
+        f"{record.moves} moves in {duration(record.moving_s)}, {record.lines} lines, {record.strokes} strokes of "
+        f"{record.pushed_mm:.1f} mm filament",
+        f"{record.clamped} coordinates out of limits, {record.unknown} unknown commands",
+        f"{record.underruns} stops because no line came in time, {record.slowed} moves slowed down for want of lines",
+    ]
+    if record.lost_bytes:
+        lines.append(f"{record.lost_bytes} bytes lost by a full receive ring")
+    lines += [f"at {seconds:.1f} s: {trouble}" for seconds, trouble in record.troubles]
+    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C"
+    return "".join(f"{line}\n" for line in [*lines, heaters])

@@ -1,0 +1,346 @@
+"""Options: those that several commands share, alone or in groups, and what they ask for together."""
+
+import re
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from os.path import exists
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from machine.pipeline.requests import MOST_COPIES, Cuts, Given, ModelRequest, PortRequest, ProbeRequest
+from profiles.errors import PlanError
+
+if TYPE_CHECKING:
+    from profiles.profile import Profile
+
+
+def _names_of(kind: str) -> Callable[[str], list[str]]:
+    """What the shell offers where the name of a profile is typed: those that ship and those of the user."""
+
+    def complete(incomplete: str) -> list[str]:
+        from profiles.places import known
+
+        return [name for name in known(kind) if name.startswith(incomplete)]
+
+    return complete
+
+
+OF_FILE = "; else the project's or G-code file's own, else {}"
+
+
+def _profile_option(kind: str, otherwise: str = "") -> Any:
+    words = f"{kind} profile{otherwise.format(getattr(Given, kind))}"
+    return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=_names_of(kind), help=words)
+
+
+Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
+Models = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="MODEL",
+        show_default=False,
+        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 is three of it",
+    ),
+]
+ModelsOrGcode = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as of export, or a G-code file"
+    ),
+]
+MachineName = Annotated[str, _profile_option("machine")]
+MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
+Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
+PlansGiven = Annotated[
+    list[Path] | None,
+    typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search; one for each model"),
+]
+JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
+HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
+Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
+ForceAll = Annotated[bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")]
+LogFile = Annotated[
+    Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
+]
+Baud = Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")]
+PortOrSim = Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")]
+SimSpeed = Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")]
+Watch = Annotated[bool, typer.Option("--watch", help="open a page of this computer that follows and commands the print")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="only tell the address")]
+WatchPort = Annotated[
+    int | None, typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one")
+]
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How a model is cut into parts."""
+
+    beam_width: Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")] = None
+    search: Annotated[
+        str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
+    ] = None
+    time_limit: Annotated[
+        float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")
+    ] = None
+    ranker: Annotated[
+        str,
+        typer.Option(
+            "--ranker",
+            metavar="classic|learned|FILE.onnx",
+            help="which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
+        ),
+    ] = "classic"
+    orient: Annotated[
+        bool | None,
+        typer.Option("--orient/--as-is", help="lay the model down in the cheapest orientation, or print it as its file has it"),
+    ] = None
+    parts: Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")] = None
+    part: Annotated[
+        list[str] | None,
+        typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
+    ] = None
+
+    @property
+    def settings(self) -> list[str]:
+        """Those of the profile that are given as options of their own."""
+        values = {"beam_width": self.beam_width, "method": self.search, "time_limit_s": self.time_limit}
+        return [f"search.{key}={value}" for key, value in values.items() if value is not None]
+
+
+@dataclass(frozen=True)
+class FileOptions(SearchOptions):
+    """Options of a command for one model: how to cut it, and which plate and settings of a slicer file to use."""
+
+    plate: Annotated[
+        int | None,
+        typer.Option(
+            "--plate", metavar="N", help="plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something"
+        ),
+    ] = None
+    settings_of_file: Annotated[
+        bool,
+        typer.Option("--settings-of-file", help="print by the settings inside a .3mf of another slicer; see profiles import"),
+    ] = False
+
+
+@dataclass(frozen=True)
+class ProgramOptions(FileOptions):
+    """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
+
+    plan: PlansGiven = None
+    pause: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--pause", metavar="PART:LAYER", help="wait for a person before this layer, or at a height: 1:8.4mm; repeatable"
+        ),
+    ] = None
+    filament_change: Annotated[
+        list[str] | None,
+        typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
+    ] = None
+    copies: Annotated[
+        int | None, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate, 1 by default")
+    ] = None
+
+
+@dataclass(frozen=True)
+class ProfileOptions:
+    """The profile, by its names and settings over it; what is None is that of the project or G-code file, else the default."""
+
+    machine: MachineGiven = None
+    material: Annotated[str | None, _profile_option("material", OF_FILE)] = None
+    process: Annotated[str | None, _profile_option("process", OF_FILE)] = None
+    settings: Settings = None
+
+    @property
+    def names(self) -> tuple[str | None, str | None, str | None]:
+        """The names of machine, material and process as they were given."""
+        return self.machine, self.material, self.process
+
+    def given(self, search: SearchOptions | None = None) -> Given:
+        """The names with the defaults in the place of those that are None, and all settings."""
+        names = {
+            kind: name for kind, name in zip(("machine", "material", "process"), self.names, strict=True) if name is not None
+        }
+        return Given(**names, settings=(*(self.settings or ()), *(search.settings if search else ())))
+
+    def over(self, given: Given) -> "ProfileOptions":
+        """These options over what a project was made with."""
+        new = given.replaced(self.names, self.settings or ())
+        return ProfileOptions(new.machine, new.material, new.process, list(new.settings))
+
+    @property
+    def sections(self) -> frozenset[str]:
+        """The sections of the profile that the user has said something about."""
+        named = {kind for kind in ("machine", "material", "process") if getattr(self, kind) is not None}
+        return frozenset(named | {setting.partition(".")[0] for setting in self.settings or ()})
+
+    def profile(self, search: SearchOptions | None = None) -> "Profile":
+        """The profile, with what the options of a search set in it. Raises ProfileError."""
+        from profiles.part_settings import parse_part_settings
+        from profiles.profile import load, with_part_settings
+
+        profile = load(**asdict(self.given(search)))
+        return with_part_settings(profile, map(parse_part_settings, search.part or () if search else ()))
+
+
+@dataclass(frozen=True)
+class DefaultProfileOptions(ProfileOptions):
+    """The same of a command that reads neither a model nor G-code."""
+
+    machine: MachineName = Given.machine
+    material: Annotated[str, _profile_option("material")] = Given.material
+    process: Annotated[str, _profile_option("process")] = Given.process
+
+
+def named_models(models: list[str]) -> list[str]:
+    """The models of a plate as often as they are to stand there: MODEL:N is a model N times. Raises PlanError."""
+    named: list[str] = []
+    for text in models:
+        counted = re.fullmatch(r"(.*[^:]):([-+\d.]*)", text)
+        if counted is None or exists(text) or text == "demo:":
+            named.append(text)
+            continue
+        name, count = counted.groups()
+        if not re.fullmatch(r"[0-9]{1,9}", count) or not 1 <= int(count) <= MOST_COPIES:
+            raise PlanError(f"{text}: the number of copies behind {name}: must be a whole number from 1 to {MOST_COPIES}")
+        named += int(count) * [name]
+    return named
+
+
+def check_model(model: str) -> None:
+    """Refuse what is no model file before the command is loaded, which takes a second. Raises MeshError."""
+    from mdp.model_file import check_file, locate
+
+    check_file(locate(model))
+
+
+def model_request(
+    model: str, search: SearchOptions, given: ProfileOptions, copies: int | None = 1, **further: Any
+) -> ModelRequest:
+    """What is asked for of a model; further: other fields of the request. A project decides what the options leave open.
+
+    copies: None for one, or as many as a project has. Raises ProfileError, and PlanError for a project that is damaged.
+    """
+    from machine.pipeline.project import open_project
+
+    file = search if isinstance(search, FileOptions) else FileOptions()
+    project = open_project(model)
+    if project is not None and file.settings_of_file:
+        raise PlanError(f"--settings-of-file: {model} is a project of tiltprint, whose settings hold without it")
+    if project is not None:
+        given, profile = _over_project(given, project.given, search, model)
+    else:
+        given = given.over(_given_by(model, given)) if file.settings_of_file else given
+        profile = given.profile(search)
+    request = replace(
+        ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names),
+        settings=given.given(search).settings,
+        copies=1 if copies is None else copies,
+        plate=file.plate,
+        **further,
+    )
+    return request if project is None else project.applied(request, Path(model), copies)
+
+
+def _over_project(
+    given: ProfileOptions, of_project: Given, search: SearchOptions, model: str
+) -> "tuple[ProfileOptions, Profile]":
+    """The options over what a project was made with, and their profile. Raises ProfileError, which names whose fault it is."""
+    from profiles.errors import ProfileError
+
+    given.profile(search)
+    both = given.over(of_project)
+    try:
+        return both, both.profile(search)
+    except ProfileError as error:
+        raise ProfileError(f"{model}: {error}") from None
+
+
+def _given_by(model: str, given: ProfileOptions) -> Given:
+    """The settings inside a slicer file for the profiles that no option names; a note on stderr says how many are used.
+
+    Raises ProfileError if the model has no settings, or if both profiles are named.
+    """
+    from machine.cli.terminal.progress import say
+    from machine.pipeline.file_settings import settings_inside
+    from profiles.errors import ProfileError
+
+    file, kinds = Path(model), [kind for kind in ("material", "process") if getattr(given, kind) is None]
+    if not kinds:
+        raise ProfileError(
+            "--settings-of-file: --material and --process name both profiles, so none of its settings would be used"
+        )
+    try:
+        inside, note = settings_inside(file, file.name, kinds)
+    except ProfileError as error:
+        raise ProfileError(f"--settings-of-file: {error}") from None
+    say(note)
+    return inside
+
+
+def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
+    """The request for the program of models on a plate, or of a G-code file. Raises PlanError, SliceError, ProfileError."""
+    from machine.pipeline.project import is_project
+    from machine.planning.stops import parse_stops
+
+    stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(tuple(program.plan or ()), program.parts)
+    first, *others = named_models(models)
+    if program.settings_of_file and len({first, *others}) > 1:
+        several = ", ".join(dict.fromkeys((first, *others)))
+        raise PlanError(f"--settings-of-file goes with one model, and several are given: {several}")
+    for name in models if len(models) > 1 or others else ():
+        if len(models) == 1 and is_project(Path(first)):
+            raise PlanError(f"{name}: {first} is a project, which is a plate of its own: --copies N prints more")
+        if is_project(Path(named_models([name])[0])):
+            raise PlanError(f"{name} is a project, which is a plate of its own: no model goes beside it; --copies N prints more")
+    return model_request(first, program, given, program.copies, cuts=cuts, stops=stops, beside=tuple(others), **further)
+
+
+def machine_profile(machine: str | None, settings: list[str] | None = None) -> "Profile":
+    """The profile where only the machine matters."""
+    return ProfileOptions(machine, settings=settings).profile()
+
+
+def page_port(watch: bool, watch_port: int | None) -> int | None:
+    """Where the page of a print is served, 0: at any free port; None: nowhere."""
+    return (watch_port or 0) if watch or watch_port is not None else None
+
+
+@dataclass(frozen=True)
+class ProbeOptions:
+    """A machine that measures a ball on its plate by itself."""
+
+    probe: Annotated[bool, typer.Option("--probe", help="the machine at --port measures a ball on its plate by itself")] = False
+    port: Annotated[
+        str | None,
+        typer.Option("--port", metavar="PORT|sim", help="serial port of the machine to measure; sim: simulated"),
+    ] = None
+    baud: Baud = 115200
+    ball_mm: Annotated[float, typer.Option("--ball-mm", metavar="MM", min=4, max=60, help="diameter of the ball")] = 20.0
+    probe_offset: Annotated[
+        str,
+        typer.Option("--probe-offset", metavar="X,Y,Z", help="from the nozzle's tip to what touches; 0,0,0: the nozzle senses"),
+    ] = "0,0,0"
+    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="of --probe: picture of what is left over")] = None
+    log: LogFile = None
+
+    @property
+    def at(self) -> PortRequest | None:
+        """The printer at --port, None: there is none."""
+        return None if self.port is None else PortRequest(self.port, self.baud, self.log)
+
+    def request(self) -> ProbeRequest:
+        """What is asked for with --probe; raises BadParameter."""
+        if self.at is None:
+            raise typer.BadParameter("--probe needs --port PORT, or sim for the simulated printer")
+        try:
+            x, y, z = (float(word) for word in self.probe_offset.split(","))
+        except ValueError:
+            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: three numbers X,Y,Z in mm are expected") from None
+        if not all(-200.0 <= value <= 200.0 for value in (x, y, z)):
+            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: -200 to 200 mm are allowed")
+        return ProbeRequest(self.at, self.ball_mm, (x, y, z), self.png)

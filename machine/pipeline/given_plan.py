@@ -1,0 +1,140 @@
+"""Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from machine.pipeline.requests import MOST_COPIES, ModelRequest
+from machine.planning.stops import parts_in_words
+from mdp.directions.orientation import motion_between
+from mdp.mesh import Floats, Mesh
+from mdp.model_file import plan_beside
+from mdp.pose import turned_further
+from mdp.search.plan_file import PlanFile
+from mdp.search.plan_reading import read_plan
+from mdp.search.search import check_part_count
+from mdp.zone import NO_ZONES, Modifier, Zones
+from profiles.errors import PlanError, ProfileError
+from profiles.part_settings import problems_of_place
+from profiles.profile import Profile, with_part_settings
+
+
+def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
+    """What is asked for of each model of a plate alone, with the plan that names it. Raises PlanError."""
+    models = list(dict.fromkeys((request.model, *request.beside)))
+    each = {name: replace(request, model=name, beside=(), cuts=replace(request.cuts, plans=())) for name in models}
+    names = [own.name for own in each.values()]
+    if request.profile.parts and len(models) > 1:
+        part = request.profile.parts[0]
+        raise PlanError(
+            f"--part {part.part} goes with one model, and several are given, {', '.join(names)}: settings of a part of one of "
+            "them stand in its plan, as process = {...} of its [[part]], and --plan names that"
+        )
+    for file in request.cuts.plans:
+        model = read_plan(file).model if len(models) > 1 else names[0]
+        if names.count(model) != 1:
+            raise PlanError(
+                f'plan {file}: model is "{model}": beside other models it must be the name of one of these: {", ".join(names)}'
+            )
+        name = models[names.index(model)]
+        if each[name].cuts.plans:
+            raise PlanError(f"--plan {file}: --plan {each[name].cuts.plan} cuts {model} already, and one plan cuts a model")
+        each[name] = replace(each[name], cuts=replace(request.cuts, plans=(file,)))
+    return each
+
+
+def with_file_marks(plan: PlanFile, zones: Zones, before: Mesh, after: Mesh, pedestal_mm: float) -> PlanFile:
+    """The plan with marks of the model's file, which lie on the model as it is read. after: the same model as it lies now."""
+    if zones == NO_ZONES:
+        return plan
+    rotation, shift_mm = (np.eye(3), np.zeros(3)) if after is before else motion_between(before, after)
+    return replace(plan, zones=zones.transform(rotation, shift_mm + np.array([0.0, 0.0, pedestal_mm])).beside(plan.zones))
+
+
+def check_number(request: ModelRequest) -> None:
+    """Raise PlanError for more models than a plate may have."""
+    count = request.copies * (1 + len(request.beside))
+    if count > MOST_COPIES:
+        of_each = f" with --copies {request.copies}" if request.copies > 1 else ""
+        raise PlanError(f"{count} models are to stand on the plate{of_each}: {MOST_COPIES} at most are allowed")
+
+
+def read_given_plan(request: ModelRequest) -> PlanFile | None:
+    """The plan to cut by or the planes to start from; None: all is searched. Raises PlanError, also for options that do not go
+    together."""
+    cuts, record = request.cuts, request.outputs.record
+    if cuts.parts is not None:
+        check_part_count(cuts.parts)
+    if cuts.plan is not None and cuts.planes is not None:
+        raise PlanError(f"--planes {cuts.planes}: --plan {cuts.plan} exists, so nothing is searched; one of them is allowed")
+    if cuts.plan is not None and record is not None:
+        raise PlanError(f"--record {record}: --plan {cuts.plan} exists, so nothing is searched that could be recorded")
+    if cuts.planes is not None and request.orient:
+        raise PlanError(f"--orient: the planes of {cuts.planes} belong to the model as it lies; process.rotate_deg turns it")
+    if cuts.plan is not None and request.orient:
+        raise PlanError(f"--orient: the plan {cuts.plan} says how the model lies; leave one of them out")
+    file = cuts.plan or cuts.planes or _plan_of_demo(request)
+    given = None if file is None else read_plan(file)
+    if given is not None and given.orientation is not None and request.orient is False:
+        raise PlanError(f"--as-is: the plan {file} lays the model down by its orientation; leave one of them out")
+    return given
+
+
+def _plan_of_demo(request: ModelRequest) -> Path | None:
+    """The plan that a demo comes with, unless the user wants it cut or laid down otherwise."""
+    otherwise = request.cuts.parts is not None or request.orient or request.outputs.record is not None
+    return None if otherwise else plan_beside(request.model)
+
+
+def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:
+    """Whether it is searched how the model lies: where the user asks for it, or nothing says how it lies, as a plan does."""
+    if request.orient is not None or given is not None:
+        return bool(request.orient) and given is None
+    return lies_freely(profile)
+
+
+def lies_freely(profile: Profile) -> bool:
+    """Whether a profile leaves it open how a model lies; turns and the paper's terms mean it as it is."""
+    return profile.search.effective.seam_mm > 0.0 and not any(profile.process.rotate_deg)
+
+
+def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
+    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it
+    lies; None: it was not turned."""
+    if orientation is None:
+        return profile
+    rotate_deg = turned_further(profile.process.rotate_deg, orientation)
+    return profile.model_copy(update={"process": profile.process.model_copy(update={"rotate_deg": rotate_deg})})
+
+
+def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
+    """The profile with the settings that a plan has for single parts, under those of --part. Raises PlanError, also for settings
+    that no modifier may have."""
+    if given is None:
+        return profile
+    check_modifiers(profile, given.zones.modifiers, f"plan {given.name}")
+    if not given.settings:
+        return profile
+    try:
+        with_part_settings(profile.of_all_parts, given.settings)
+    except ProfileError as error:
+        raise PlanError(f"plan {given.name}: {error}") from None
+    return with_part_settings(profile, given.settings)
+
+
+def check_modifiers(profile: Profile, modifiers: Sequence[Modifier], where: str) -> None:
+    """Raise PlanError for settings that no modifier may have with a profile. where: the name of what has them."""
+    for number, modifier in enumerate(modifiers, start=1):
+        problems = list(problems_of_place(profile.process, modifier.process, profile.machine.head.nozzle_mm))
+        if problems:
+            raise PlanError(f"{where}: " + "; ".join(f"modifier {number}: {problem}" for problem in problems))
+
+
+def check_parts_named(profile: Profile, parts: int) -> None:
+    """Raise ProfileError for settings of parts that are not there."""
+    for settings in profile.parts:
+        if settings.part > parts:
+            there = parts_in_words(parts)
+            raise ProfileError(f"part {settings.part} is not there to have {settings.in_words}: the parts are {there}")

@@ -1,0 +1,175 @@
+"""Picture: a decomposition as images: the model and its parts side by side, and the print as a sheet of frames."""
+
+from collections.abc import Sequence
+from math import ceil, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+from PIL import ImageDraw, ImageFont
+
+from machine.pipeline.pictures.raster import Image, View, draw, seen_from
+from machine.view.parts import part_colours, residual_faces
+from mdp.cost.cost import needing_upright
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Floats, Mesh
+from mdp.pose import UP, unit
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+PLAIN = (214.0, 217.0, 222.0)
+PRINTED = (196.0, 202.0, 210.0)
+FLOOR = (236.0, 238.0, 241.0)
+NOZZLE = (128.0, 131.0, 138.0)
+SPREAD = 0.13  # gap between exploded parts as a share of the model's size
+SEGMENTS = 96
+
+
+def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[int, int] = (1600, 800)) -> Image:
+    """The model straight up with its risky faces red beside its parts, moved apart, with what stays risky red.
+
+    Returns (h, w, 3), uint8; size is width and height in pixels.
+    """
+    model, parts = decomposition.mesh, decomposition.parts
+    risky = needing_upright(model, profile)
+    floor, view, half = floor_of(model), best_view(model, risky), (size[0] // 2, size[1])
+    plain = draw([floor, model], [FLOOR, PLAIN], reds=[None, risky], view=view, size=half)
+    apart = parts_apart(parts)
+    reds = [residual_faces(part, profile) for part in parts]
+    exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], reds=[None, *reds], view=view, size=half)
+    return np.concatenate([plain, exploded], axis=1)
+
+
+def parts_apart(parts: Sequence[Part]) -> list[Mesh]:
+    """The meshes of parts, each moved away from the part that it stands on."""
+    low, high = (pick([part.mesh.bounds_mm[side] for part in parts], axis=0) for side, pick in enumerate((np.min, np.max)))
+    gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(high - low))
+    return [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
+
+
+def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[int, int]) -> Image:
+    """The parts in colour where they belong. Returns (h, w, 3), uint8; size is width and height in pixels."""
+    risky = needing_upright(decomposition.mesh, profile)
+    parts = [part.mesh for part in decomposition.parts]
+    return draw(parts, list(part_colours(len(parts))), view=best_view(decomposition.mesh, risky), size=size)
+
+
+def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:
+    """One numbered frame a part in print order: the table tilted as for that part, the part in colour under the nozzle.
+
+    Returns (h, w, 3), uint8: the model's name, below it frames of frame_pixels squared in rows.
+    """
+    parts, model = decomposition.parts, decomposition.mesh
+    view = _along_the_tilt_axis(parts, machine)
+    floor, nozzle = floor_of(model), _nozzle(machine)
+    span = 1.1 * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
+    frames = []
+    for part, colour in zip(parts, part_colours(len(parts)), strict=True):
+        printed = [earlier.mesh.transform(part.rotation) for earlier in parts[: part.index]]
+        meshes = [floor.transform(part.rotation), *printed, nozzle.transform(np.eye(3), _last_point(printed[-1]))]
+        paints = [FLOOR, *([PRINTED] * (part.index - 1)), colour, NOZZLE]
+        frame = draw(meshes, paints, view=view, size=(frame_pixels, frame_pixels), span_mm=span)
+        frames.append(_label(frame, part, machine))
+    return add_title(tile(frames), decomposition.name, frame_pixels)
+
+
+def _shifts(parts: Sequence[Part], gap_mm: float) -> list[Floats]:
+    """Where each part is moved: along its direction away from the part it stands on, which has moved itself."""
+    shifts: list[Floats] = [np.zeros(3)]
+    for position, part in enumerate(parts[1:], start=1):
+        foot = part.mesh.vertices[part.base.heights_mm(part.mesh.vertices) < 1e-3].mean(axis=0)
+        below = min(range(position), key=lambda k: float(np.abs(parts[k].mesh.vertices - foot).sum(axis=1).min()))
+        shifts.append(shifts[below] + gap_mm * part.direction)
+    return shifts
+
+
+def best_view(model: Mesh, risky: NDArray[np.bool_]) -> View:
+    """The side that shows most of the model's outline and of its risky faces, a little from above."""
+    azimuths = np.arange(-180.0, 180.0, 10.0)
+    toward = np.stack([np.cos(np.radians(azimuths)), np.sin(np.radians(azimuths)), np.zeros(len(azimuths))])
+    facing = model.normals @ toward
+    outline = 0.5 * model.areas_mm2 @ np.abs(facing)
+    red = (model.areas_mm2 * risky) @ np.maximum(facing, 0.0)
+    score = outline / outline.max() + 0.3 * red / max(red.max(), 1e-9) - 1e-4 * np.abs(azimuths + 60.0)
+    return seen_from(float(azimuths[int(np.argmax(score))]), 9.0)
+
+
+def _along_the_tilt_axis(parts: tuple[Part, ...], machine: Machine) -> View:
+    """Nearly along the tilt axis, from the side to which most of the tilted tables show their upper faces."""
+    axis = unit(machine.tilt.axis)
+    across = np.cross(UP, axis)
+    shown = sum(float(np.sign(np.round(part.rotation @ UP @ across, 6))) for part in parts)
+    aside = 35.0 if shown > 0 else -35.0
+    return seen_from(float(np.degrees(np.arctan2(axis[1], axis[0]))) + aside, 14.0)
+
+
+def floor_of(model: Mesh) -> Mesh:
+    """A disc that suggests the platform: as wide as the model reaches."""
+    reach = float(np.hypot(*model.vertices[:, :2].T).max())
+    return _revolve([(0.0, -0.03 * reach), (reach, -0.03 * reach), (reach, -0.01), (0.0, -0.01)])
+
+
+def _nozzle(machine: Machine) -> Mesh:
+    """The lowest 5 mm of the head's silhouette and a stub above them, tip at the origin."""
+    low = [(radius, height) for radius, height in machine.head.silhouette_mm if height <= 5.0]
+    outline = low or [(1.0, 0.0)]
+    radius, height = outline[-1]
+    return _revolve([(0.0, outline[0][1]), *outline, (radius, height + 4.0), (0.0, height + 4.0)])
+
+
+def _last_point(mesh: Mesh) -> Floats:
+    """The highest place of a part in the pose it is printed at, a hair above it."""
+    above: Floats = mesh.vertices[int(np.argmax(mesh.vertices[:, 2]))] + np.array([0.0, 0.0, 0.3])
+    return above
+
+
+def _revolve(outline: list[tuple[float, float]]) -> Mesh:
+    """The closed surface of an outline (radius, z) from axis to axis, counter-clockwise, turned about z."""
+    turns = np.linspace(0.0, 2.0 * np.pi, SEGMENTS, endpoint=False)
+    rings = np.array([[(r * np.cos(t), r * np.sin(t), z) for t in turns] for r, z in outline])
+    k = np.arange(SEGMENTS)
+    faces = []
+    for ring in range(len(outline) - 1):
+        a, b = ring * SEGMENTS + k, ring * SEGMENTS + (k + 1) % SEGMENTS
+        c, d = b + SEGMENTS, a + SEGMENTS
+        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    return Mesh(rings.reshape(-1, 3), np.concatenate(faces))
+
+
+def tile(frames: list[Image]) -> Image:
+    """Frames in rows, white where none is left."""
+    rows = max(1, round(sqrt(len(frames) / 1.6)))
+    columns = ceil(len(frames) / rows)
+    blank = np.full_like(frames[0], 255)
+    filled = frames + [blank] * (rows * columns - len(frames))
+    return np.concatenate([np.concatenate(filled[row * columns : (row + 1) * columns], axis=1) for row in range(rows)], axis=0)
+
+
+def add_title(sheet: Image, name: str, frame_pixels: int) -> Image:
+    """The sheet below a line with the model's name."""
+    height = frame_pixels // 12
+    title = np.full((height, *sheet.shape[1:]), 255, dtype=np.uint8)
+    written = write_text(title, name, (frame_pixels / 32, 0.8 * height), 0.7 * height, 90)
+    return np.concatenate([written, sheet], axis=0)
+
+
+def write_text(image: Image, text: str, at: tuple[float, float], height: float, grey: int) -> Image:
+    """The image (h, w, 3) with a line of text, in the font that Pillow brings along, so that it is the same on every machine.
+
+    at: where its baseline begins, height: of the font, all in pixels.
+    """
+    picture = Pillow.fromarray(image)
+    ImageDraw.Draw(picture).text(at, text, (grey, grey, grey), ImageFont.load_default(height), anchor="ls")
+    return np.asarray(picture)
+
+
+def _label(frame: Image, part: Part, machine: Machine) -> Image:
+    """The frame with the part's number in its upper left corner, and where the table stands in the lower left one."""
+    pixels, pose = len(frame), part.pose
+    left = pixels / 32
+    labelled = write_text(frame, str(part.index), (left, pixels / 10), pixels / 12, 90)
+    axes = (("tilt", machine.tilt.letter, pose.tilt_deg), ("turn", machine.turn.letter, pose.turn_deg)) if machine.tilts else ()
+    for row, (word, letter, value) in enumerate(axes):
+        text = f"{word} {letter} {round(value, 1) + 0.0:.1f}°"
+        labelled = write_text(labelled, text, (left, pixels * (0.93 + 0.04 * row)), pixels / 28, 120)
+    return labelled

@@ -1,0 +1,263 @@
+"""Pipeline: joins the stages, from a model's name to parts, sliced parts, G-code lines and the dry run."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from machine.cli.terminal.advice import orientation_in_words, standing_in_words
+from machine.cli.terminal.progress import Report, reporting, say
+from machine.dryrun.dryrun import DryRun, dry_run
+from machine.firmware import dialect_of
+from machine.gcode.blocks import check_blocks
+from machine.gcode.writer import write_gcode
+from machine.pipeline import compilers
+from machine.pipeline.given_plan import (
+    as_turned,
+    check_modifiers,
+    check_number,
+    check_parts_named,
+    lays_down,
+    read_given_plan,
+    request_of_each,
+    with_file_marks,
+    with_plan_settings,
+)
+from machine.pipeline.memory import keep_modules, return_unused
+from machine.pipeline.output import write_bytes
+from machine.pipeline.pictures.png import with_thumbnails
+from machine.pipeline.plate import naming, naming_parts, on_one_plate
+from machine.pipeline.pricing import pricing
+from machine.pipeline.requests import ModelRequest, check_copies
+from machine.planning.fit import check_parts, check_standing, lifted, standing_at
+from machine.planning.moves import MachineProgram
+from machine.planning.plan import has_purge, plan
+from machine.planning.stops import Stop
+from machine.program import Program
+from mdp.decomposition import Decomposition, FrontRow, Part
+from mdp.directions.orientation import standing_still
+from mdp.mesh import Mesh
+from mdp.model_file import locate
+from mdp.ranking.ranker import ranker_named
+from mdp.read import ReadModel, read_model
+from mdp.search.front import Weights
+from mdp.search.orient import orient_and_decompose
+from mdp.search.plan_file import NO_PLAN, PlanFile, plan_of
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
+from mdp.zone import NO_ZONES
+from profiles.profile import Profile
+from slicer.interface.interface import pin_width_mm, room_around_mm
+from slicer.paths import SlicedPart
+from slicer.slice import SlicingProgress, slice_parts
+
+
+@dataclass(frozen=True, eq=False)
+class Decomposed:
+    """A decomposition, the plan that cuts it again, and how long its steps took.
+
+    profile: what it is printed with, the plan's settings of single parts and how the model lies included.
+    """
+
+    decomposition: Decomposition
+    profile: Profile
+    plan: PlanFile
+    read_s: float
+    total_s: float
+
+
+def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed:
+    """Read a model and find its parts, or those of all models of a plate, each for itself; repairs and notes go to stderr.
+
+    to_build: `build` comes next, the first run may compile what it needs meanwhile, and the rows of the front that need not be
+    chosen from get no time. Raises PlanError where models have no room beside each other, and for what goes with one alone.
+    """
+    keep_modules()
+    ranker_named(request.ranker)  # a wrong one is told before anything else is done
+    check_copies(request.copies, "--copies")
+    check_number(request)
+    requests = request_of_each(request)
+    began = perf_counter()
+    models = [name for name in (request.model, *request.beside) for _ in range(request.copies)]
+    each = {}
+    for name in dict.fromkeys(models):
+        with naming(Path(name).name if request.beside else ""):
+            each[name] = _decompose_alone(requests[name], to_build)
+    first = each[request.model]
+    profile = first.profile if len(each) == 1 else request.profile  # each lies in its own way
+    settings = {own.decomposition: own.profile.parts for own in each.values()}
+    decomposition, profile = on_one_plate([each[name].decomposition for name in models], profile, settings)
+    return replace(first, decomposition=decomposition, profile=profile, total_s=perf_counter() - began)
+
+
+def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
+    """One of the models, as if it were the only one."""
+    record_file, given = request.outputs.record, read_given_plan(request)
+    profile = with_plan_settings(request.profile, given)
+    if to_build:
+        check_blocks(profile)
+    began = perf_counter()
+    model = read_model(locate(request.model), profile.process.scale, profile.process.rotate_deg, request.plate)
+    mesh, read_s = model.mesh, perf_counter() - began
+    for note in model.notes:
+        say(f"{request.name}: {note}")
+    check_modifiers(profile, model.zones.modifiers, request.name)
+    compilers.begin((*compilers.JUDGE, *compilers.SEARCH, *(compilers.bundles_to_build(profile) if to_build else ())))
+    compilers.wait_for(compilers.JUDGE)
+    orientation = None if given is None or given.orientation is None else np.array(given.orientation)
+    if orientation is not None:
+        mesh = standing_still(mesh, orientation)
+    laying = lays_down(request, given, profile)
+    if to_build and not laying:
+        check_standing(mesh, profile)  # a search may take minutes
+    with reporting() as report:
+        asked = _Search(request, given, model, to_build and not laying, report)
+        if laying:
+            oriented = orient_and_decompose(mesh, profile, pricing, asked.search)
+            decomposition, notes = oriented.decomposition, orientation_in_words(oriented, "--as-is keeps it as it stands")
+            orientation = None if oriented.orientation is None else oriented.orientation.rotation
+        else:
+            decomposition, notes = asked.search(mesh), standing_in_words(mesh, profile)
+    if record_file is not None:
+        write_bytes(record_file, asked.record_of(decomposition))
+    check_parts_named(profile, len(decomposition.parts))
+    for note in (*decomposition.notes, *notes):
+        say(f"{request.name}: {note}")
+    plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
+    return Decomposed(decomposition, as_turned(profile, orientation), plan, read_s, perf_counter() - began)
+
+
+class _Search:
+    """The search of one request, for a mesh that lies one way or another, or the plan that takes its place."""
+
+    def __init__(
+        self, request: ModelRequest, given: PlanFile | None, model: ReadModel, prices_unused: bool, report: Report
+    ) -> None:
+        self._request, self._given, self._model, self._report = request, given, model, report
+        cuts, profile = request.cuts, request.profile.of_all_parts
+        free = cuts.plan is not None or cuts.parts is not None or not Weights.of(profile)
+        self._price = None if prices_unused and free else pricing(profile)
+        self._records: list[tuple[Decomposition, list[bytes]]] = []
+
+    def search(self, mesh: Mesh) -> Decomposition:
+        """The parts of a mesh."""
+        request, cuts, given = self._request, self._request.cuts, self._with_marks(mesh)
+        asked = SearchRequest(given or NO_PLAN, cuts.parts, request.ranker, self._price)
+        if cuts.plan is not None:
+            return cut_by_plan(mesh, request.name, request.profile, asked)
+        record: list[bytes] = []
+        on_record = None if request.outputs.record is None else record.append
+        asked = replace(asked, on_stage=self._show, on_phase=self._report, on_record=on_record)
+        decomposition = decompose(mesh, request.name, request.profile, asked)
+        self._records.append((decomposition, record))
+        return decomposition
+
+    def _with_marks(self, mesh: Mesh) -> PlanFile | None:
+        """The plan with the marks that the model's file has, on the model as it lies now; None: there are neither."""
+        zones = self._model.zones if self._request.own_marks else self._model.zones.shapes
+        if zones == NO_ZONES:
+            return self._given
+        given = PlanFile(self._request.name) if self._given is None else self._given
+        return with_file_marks(given, zones, self._model.mesh, mesh, self._request.profile.search.pedestal_mm)
+
+    def record_of(self, decomposition: Decomposition) -> bytes:
+        """What was recorded of the search that ended with a decomposition."""
+        return next(record[0] for searched, record in self._records if searched is decomposition)
+
+    def _show(self, stage: int, beam: int, best_share: float, measure: Callable[[], FrontRow]) -> None:
+        if stage == 0:
+            compilers.wait_for(compilers.SEARCH, self._report)
+            return
+        left = f"{100 * best_share:.1f} % of the risky area left"
+        self._report(f"searching parts: stage {stage}, {beam} in the beam, {left}")
+
+
+def build(
+    decomposition: Decomposition,
+    profile: Profile,
+    *,
+    pictures: bool = False,
+    stops: Sequence[Stop] = (),
+    report: Report | None = None,
+    on_slices: Callable[[SlicingProgress], None] | None = None,
+) -> Program:
+    """Slice, plan, write and dry-run a decomposition, at its place on the plate. Before slicing it raises MoveError for a part
+    that the machine has no room for, ProfileError for a G-code block that the machine's firmware refuses.
+
+    pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
+    for a person. report: where progress is shown; None: on the terminal. on_slices: is shown the parts while they are sliced.
+    """
+    parts = decomposition.parts
+    check_blocks(profile)
+    with naming_parts(parts):
+        check_parts(parts, profile)
+    decomposition = standing_at(decomposition, profile.process.place_mm)
+    parts = decomposition.parts
+    compilers.wait_for(compilers.PROGRAM, report)
+    return_unused()  # of the search
+    with naming_parts(parts), reporting() if report is None else nullcontext(report) as tell:
+
+        def show(slicing: SlicingProgress) -> None:
+            if on_slices is not None:
+                on_slices(slicing)
+            begun, share = max(slicing.begun, 1), slicing.share
+            tell(f"slicing part {begun} of {len(parts)}: {int(100 * share)} % of all layers", share)
+
+        decomposition, sliced = lifted(decomposition, slice_parts(parts, profile, show), profile)
+        tell("planning moves")
+        program = plan(decomposition, sliced, profile, stops)
+        for note in (*_too_thin(sliced, profile), *_without_pins(parts, sliced, profile), *_left_out(program, profile)):
+            say(f"{decomposition.name}: {note}")
+        lines = write_gcode(program, profile)
+        if pictures and profile.machine.thumbnails_px:
+            compilers.wait_for(compilers.PICTURES, tell)
+            lines = with_thumbnails(lines, decomposition, profile)
+        del program  # as large as its text, and that tells all of it
+        return_unused()
+        tell("dry run")
+        run = dry_run(lines, profile)
+    return Program(lines, run, _with_own_figures(decomposition, run), tuple(sliced))
+
+
+def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decomposition:
+    """The row of the front that is printed with the print's own time and filament where it has no estimate."""
+    chosen = decomposition.chosen
+    if chosen is None or chosen.time_s is not None or chosen.parts != len(decomposition.parts):
+        return decomposition
+    printed = replace(chosen, time_s=run.time_s, filament_mm=float(np.max(run.program.filament_mm, initial=0.0)))
+    return replace(decomposition, front=tuple(printed if row is chosen else row for row in decomposition.front))
+
+
+def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
+    """Layers that no line is narrow enough for, with what is above them; the tip that a vase ends below."""
+    for part in sliced:
+        if part.too_thin and profile.process.spiral_vase and part.layers[-1].z_mm <= part.too_thin_mm + 1e-6:
+            yield f"the vase stops at {part.too_thin_mm:.2f} mm: above that the model is too narrow for a spiral wall"
+        elif part.too_thin:
+            where = f"of part {part.index} {part.too_thin} layer(s), the first at {part.too_thin_mm:.2f} mm"
+            nozzle = f"a line of a {profile.machine.head.nozzle_mm:g} mm nozzle"
+            wanted = "a larger process.scale or a finer nozzle prints them"
+            yield f"{where}, hold nothing wide enough for {nozzle}, so what is above them hangs: {wanted}"
+
+
+def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
+    """Which parts were to have pins and have no room for any."""
+    for part, piece in zip(parts, sliced, strict=True):
+        own = profile.of_part(part.index)
+        if not part.on_platform and own.process.interlock == "pins" and not piece.pins:
+            room_mm = pin_width_mm(own) + 2.0 * room_around_mm(own.process)
+            deep = f"{own.process.pin_depth_mm:g} mm deep into the part below"
+            yield f"no pins under part {part.index}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"
+
+
+def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
+    """What was asked for and is not in the program."""
+    if profile.process.raft_layers and profile.process.brim_mm > 0.0:
+        yield "process.brim_mm has no effect with a raft: process.raft_first_layer_expansion_mm makes that wider"
+    if profile.machine.purge_mm > 0.0 and not has_purge(program):
+        yield "no place on the plate is clear of the print for a line of machine.purge_mm: there is none"
+    dialect = dialect_of(profile.machine)
+    if profile.material.pressure_advance is not None and not dialect.pressure_advance:
+        yield f"material.pressure_advance is left out: {dialect.firmware} has no command for it"

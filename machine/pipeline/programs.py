@@ -1,0 +1,89 @@
+"""Programs: of a model, which is cut, sliced and planned, or of a G-code file as it is; dry-run either way."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from machine.cli.terminal.progress import say
+from machine.dryrun.dryrun import dry_run
+from machine.dryrun.findings import Finding
+from machine.gcode.lines import GcodeFile, Lines
+from machine.pipeline import compilers
+from machine.pipeline.embedded_profile import in_words, read_embedded_profile
+from machine.pipeline.memory import return_large_arrays
+from machine.pipeline.requests import FORCE_GOES_ON, ModelRequest
+from machine.program import Program
+from profiles.errors import GcodeError, MoveError, PlanError
+from profiles.profile import Profile
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedProgram:
+    """A program and the profile it was tried with, which a G-code file may hold itself. name: of what it prints.
+
+    source: the G-code file that holds it; None: it is kept beside the journal. machine_known: the machine is told by the file
+    or by the user, not guessed.
+    """
+
+    name: str
+    program: Program
+    profile: Profile
+    source: Path | None = None
+    machine_known: bool = True
+
+
+def load_program(request: ModelRequest) -> LoadedProgram:
+    """The program of a model or of a G-code file. Raises GcodeError for a file that cannot be read."""
+    return_large_arrays()
+    if not request.is_gcode:
+        from machine.pipeline.pipeline import build, decompose_model  # a G-code file needs no search and no slicer
+
+        decomposed = decompose_model(request, to_build=True)
+        program = build(decomposed.decomposition, decomposed.profile, stops=request.stops)
+        return LoadedProgram(request.name, program, decomposed.profile)
+    _refuse_cuts(request)
+    source = Path(request.model)
+    lines = read_gcode_lines(source)
+    profile, sections = read_embedded_profile(lines, request.profile, request.chosen_sections)
+    if sections:
+        say(f"{request.name}: {in_words(sections, profile)}, as the file itself tells")
+    compilers.wait_for(compilers.DRY_RUN)
+    known = "machine" in request.chosen_sections or profile.machine is not request.profile.machine
+    return LoadedProgram(request.name, Program(lines, dry_run(lines, profile), None), profile, source, known)
+
+
+def _refuse_cuts(request: ModelRequest) -> None:
+    """Raise PlanError where a G-code file is to be cut."""
+    for option, value in (("--plan", request.cuts.plan), ("--parts", request.cuts.parts)):
+        if value is not None:
+            raise PlanError(f"{option} {value}: {request.model} is G-code, which is cut already; it goes with a model")
+    if request.beside:
+        raise PlanError(f"{request.model} is G-code, which is a plate of its own: {request.beside[0]} cannot go beside it")
+    if request.copies != 1:
+        raise PlanError(f"--copies {request.copies}: {request.model} is G-code, which is sliced already; it goes with a model")
+    for stop in request.stops:
+        raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
+    for settings in request.profile.parts:
+        raise PlanError(f"--part {settings.part}: {request.model} is G-code, which is sliced already; it goes with a model")
+
+
+def read_gcode_lines(path: Path) -> Lines:
+    """The lines of a G-code file. Raises GcodeError when it cannot be read, is no text or is empty."""
+    lines = GcodeFile(path).lines()
+    if not any(line.strip() for line in lines):
+        raise GcodeError(f"G-code file {path} is empty")
+    return lines
+
+
+def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
+    """Raise MoveError for a program whose dry run found errors; force: only say so."""
+    if not errors:
+        return
+    count = f"{len(errors)} error{'s' * (len(errors) > 1)}"
+    if force:
+        say(f"the dry run found {count}", forced=True)
+        return
+    raise MoveError(
+        f"the dry run found {count}, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})",
+        forcible=True,
+    )

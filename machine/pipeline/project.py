@@ -1,0 +1,439 @@
+"""Project: a model with all that decides its print: plan, marks, profiles, placement, pauses, copies.
+
+A project's folder holds `work.json`, which says what was asked for and names the other files: the model's file as it was, the
+plan, meshes of modifiers, and profiles that do not ship with the program. The workbench keeps its work in such folders. A project
+file is a 3MF of the model as it lies, which any slicer opens, with a picture and the folder's files under Metadata/tiltprint.
+"""
+
+import hashlib
+import io
+import json
+import os
+import re
+import shutil
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory, gettempdir
+from time import time
+from typing import Any
+
+import numpy as np
+
+from machine.pipeline.output import plain_name
+from machine.pipeline.profile_file import profile_text
+from machine.pipeline.project_record import (
+    RECORD,
+    VERSION,
+    GivenRecord,
+    NewerError,
+    Record,
+    checked_record,
+    is_file_name_anywhere,
+    read_record,
+)
+from machine.pipeline.requests import Given, ModelRequest
+from machine.planning.stops import Stop
+from mdp.decomposition import FrontRow
+from mdp.mesh import Mesh
+from mdp.model_file import DEMO
+from mdp.save import MODEL_PART, model_xml, write_package
+from mdp.search.plan_file import ZONE_KINDS, PlanFile
+from mdp.zone import MeshVolume
+from profiles.errors import PlanError, first_line, reason
+from profiles.files import DAMAGED_ZIP, lock_folder, remove_locked, whole_file, write_whole
+from profiles.frozen import Vector
+from profiles.places import KINDS, PARENT, is_file_name, own, shipped
+from profiles.toml_text import read_toml
+
+STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
+PLAN = "plan.toml"
+INSIDE, THUMBNAIL = "Metadata/tiltprint/", "Metadata/thumbnail.png"
+PICTURE_PX = (256, 256)
+MESH_DIGEST = "mesh.sha256"  # of the 3MF's model part, to see whether another program has changed it
+PROGRAM = f"tiltprint {version('tiltprint')}"
+SUFFIX = ".3mf"
+FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: in no other folder, on any disk
+ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-([0-9a-f]{{12}})-")  # to the names of a project's files
+MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, OSError)  # of a zip archive
+PREFIX = "tiltprint-project-"  # of temporary folders
+BEGUN_S = 60.0  # a folder as new as this may belong to a program that has not locked it yet
+_unpacked: list[tuple[TemporaryDirectory[str], str, int | None]] = []  # projects that were opened: folder, file, lock
+
+
+def without_folders(text: str) -> str:
+    """A sentence that names a project where it named its temporary folder."""
+    for folder, model, _ in _unpacked:
+        text = text.replace(f"{folder.name}/.model/", "").replace(folder.name, model)
+    return text
+
+
+def close_projects() -> None:
+    """Remove the folders of all projects that were opened; else that is done when the program ends."""
+    while _unpacked:
+        folder, _, lock = _unpacked.pop()
+        if lock is not None:
+            os.close(lock)
+        folder.cleanup()
+
+
+@dataclass(frozen=True)
+class Project:
+    """A model and everything that decides its print; files lie in the project's folder once it is read.
+
+    model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows
+    them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
+    parts: 0 where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the
+    print waits for a person; marks_in_plan: the plan has the boxes that the model's own file marks; figures: of the print,
+    for people and other programs; plate: of the model where that is a slicer file.
+    """
+
+    name: str
+    model: Path | None
+    given: Given
+    rotation: tuple[Vector, ...] = STANDING
+    plan: Path | None = None
+    parts: int = 0
+    locked: tuple[int, ...] = ()
+    stops: tuple[Stop, ...] = ()
+    copies: int = 1
+    own_names: dict[str, str] = field(default_factory=dict)
+    figures: dict[str, float] = field(default_factory=dict)
+    written_s: float = 0.0
+    plate: int | None = None
+    marks_in_plan: bool = False
+
+    def applied(self, request: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
+        """A request for the model inside: the project decides what the command line leaves open.
+
+        file: the project; copies: as the user has given it, None for as many as the project has. Raises PlanError for options
+        that do not go with it.
+        """
+        self.check_plate(request.plate, file)
+        own_plan = self.plan if not request.cuts.plans and request.cuts.planes is None else None
+        if own_plan is not None:
+            self._check_plan_goes_with(request, file)
+        return replace(
+            request,
+            model=self.argument,
+            project=file,
+            cuts=request.cuts if own_plan is None else replace(request.cuts, plans=(own_plan,)),
+            own_marks=own_plan is None or not self.marks_in_plan,
+            stops=request.stops or self.stops,
+            copies=self.copies if copies is None else copies,
+            plate=self.plate,
+        )
+
+    def check_plate(self, plate: int | None, file: Path) -> None:
+        """Raises PlanError where another plate is asked for: the parts of the project are those of one."""
+        if plate is not None:
+            raise PlanError(f"--plate {plate}: {file} is a project of tiltprint, whose plan is of one plate")
+
+    def _check_plan_goes_with(self, request: ModelRequest, file: Path) -> None:
+        if request.orient or (request.orient is False and self.rotation != STANDING):
+            option = "--orient" if request.orient else "--as-is"
+            raise PlanError(f"{option}: the project {file} says how its model lies; decompose the model itself to change that")
+        if (record := request.outputs.record) is not None:
+            raise PlanError(f"--record {record}: the project {file} has its parts, so nothing is searched that could be recorded")
+
+    @property
+    def argument(self) -> str:
+        """What a command line says for MODEL."""
+        return self.name if self.model is None else str(self.model)
+
+
+def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
+    """Write a project's folder. Older models in it go; profiles and meshes stay, for a step that is undone may name them.
+
+    Raises OSError, ProfileError and PlanError; the record is written last, so that it names only what is there.
+    """
+    profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
+    model = "" if project.model is None else _copied(project.model, folder, "model")
+    if plan is not None:
+        from mdp.search.plan_writing import plan_text  # loads tomlkit, which only projects need
+
+        write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
+    given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
+    record = checked_record(
+        version=VERSION,
+        program=PROGRAM,
+        name=project.name,
+        model=model,
+        given=GivenRecord(**given),
+        own_profiles={kind: _bare_name(Path(getattr(project.given, kind))) for kind in profiles},
+        rotation=[list(row) for row in project.rotation],
+        plan=plan is not None,
+        parts=project.parts,
+        locked=list(project.locked),
+        pauses=[stop.option.partition(" ")[2] for stop in project.stops if not stop.change],
+        changes=[stop.option.partition(" ")[2] for stop in project.stops if stop.change],
+        copies=project.copies,
+        plate=project.plate,
+        marks_in_plan=project.marks_in_plan,
+        figures=project.figures,
+    )
+    write_whole(folder / RECORD, record.model_dump_json().encode())
+    for file in folder.glob("model-*"):
+        if file.name != model:
+            file.unlink()
+    if plan is None:
+        (folder / PLAN).unlink(missing_ok=True)
+
+
+def _profile_file(folder: Path, kind: str, name: str) -> str:
+    """The name of a file with a profile of the user's own; "" for one that ships with the program."""
+    if name in shipped(kind) and name not in own(kind):
+        return ""
+    text = profile_text(kind, name).encode()
+    file = f"{kind}-{hashlib.sha256(text).hexdigest()[:12]}-{plain_name(Path(_bare_name(Path(name))).stem)}.toml"
+    if not (folder / file).exists():
+        write_whole(folder / file, text)
+    return file
+
+
+def with_meshes(plan: PlanFile, folder: Path) -> PlanFile:
+    """The plan with copies of the meshes of its marks and modifiers in a folder."""
+    return _with_mesh_files(plan, lambda file: (folder / _copied(file, folder, "modifier")).absolute())
+
+
+def with_meshes_beside(plan: PlanFile) -> tuple[PlanFile, dict[str, Path]]:
+    """The plan with meshes that lie beside it, under the names that `with_meshes` gives them, and their files by these."""
+    files = dict[str, Path]()
+
+    def beside(file: Path) -> Path:
+        files[_name_inside(file, "modifier")] = file
+        return Path(_name_inside(file, "modifier"))
+
+    return _with_mesh_files(plan, beside), files
+
+
+def _with_mesh_files(plan: PlanFile, file_of: Callable[[Path], Path]) -> PlanFile:
+    def named(volume: Any) -> Any:
+        return replace(volume, file=file_of(volume.file)) if isinstance(volume, MeshVolume) else volume
+
+    marks = {kind: tuple(map(named, getattr(plan.zones, kind))) for kind in ZONE_KINDS}
+    modifiers = tuple(replace(modifier, volume=named(modifier.volume)) for modifier in plan.zones.modifiers)
+    return replace(plan, zones=replace(plan.zones, modifiers=modifiers, **marks))
+
+
+def _check_alone(model: Path | None) -> None:
+    """Raise PlanError for a glTF file that refers to others, which a project would lack."""
+    if model is None or model.suffix.lower() != ".gltf":
+        return
+    document = json.loads(model.read_text(encoding="utf-8"))
+    for buffer in document.get("buffers", []):
+        if not (file := buffer.get("uri", "data:")).startswith("data:"):
+            raise PlanError(f"{model}: refers to the file {file}, and a project holds one model file: save it as .glb first")
+
+
+def _digest(file: Path) -> str:
+    """What tells the content of a file from others, as its name in a project has it."""
+    with file.open("rb") as source:
+        return hashlib.file_digest(source, "sha256").hexdigest()[:12]
+
+
+def _name_inside(file: Path, role: str) -> str:
+    return f"{role}-{_digest(file)}-{plain_name(_bare_name(file))}"
+
+
+def _bare_name(file: Path) -> str:
+    """The name of a file as it was before it became one of a project."""
+    return ADDED.sub("", file.name)
+
+
+def _copied(file: Path, folder: Path, role: str) -> str:
+    """The name in a folder of a copy of a file, which is made where it is not there yet."""
+    name = _name_inside(file, role)
+    if not (folder / name).exists():
+        with file.open("rb") as source, whole_file(folder / name) as copy:
+            shutil.copyfileobj(source, copy)
+    return name
+
+
+def read_folder(folder: Path) -> Project:
+    """The project in a folder. Raises PlanError with a sentence where it cannot be read, or not by this version."""
+    try:
+        return _project_of(folder, read_record(folder))
+    except NewerError:
+        raise PlanError(f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}") from None
+    except PlanError as error:
+        raise PlanError(f"what is kept in {folder} is no work of a workbench, or damaged: {error}") from None
+    except OSError as error:
+        raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
+
+
+def _project_of(folder: Path, record: Record) -> Project:
+    given, own_names = record.given, {str(kind): Path(name).name for kind, name in record.own_profiles.items()}
+    files = {kind: str(folder / Path(getattr(given, kind)).name) for kind in own_names}
+    x, y, z = record.rotation
+    return Project(
+        name=record.name,
+        model=folder / Path(record.model).name if record.model else None,
+        given=Given(**{**given.model_dump(), **files, "settings": tuple(given.settings)}),
+        rotation=((x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])),
+        plan=folder / PLAN if record.plan else None,
+        parts=record.parts,
+        locked=tuple(record.locked),
+        stops=record.stops,
+        copies=record.copies,
+        marks_in_plan=record.marks_in_plan,
+        plate=record.plate,
+        own_names=own_names,
+        figures=record.figures,
+        written_s=(folder / RECORD).stat().st_mtime,
+    )
+
+
+def _check_inside(folder: Path, project: Project) -> None:
+    """Raise PlanError where the files of an unpacked project are not those that it names, or not as they were saved."""
+    if project.model is None and not project.name.startswith(DEMO):
+        raise PlanError(f"{RECORD}: model is missing")
+    if project.model is not None and not project.model.name.startswith("model-"):
+        raise PlanError(f"{RECORD}: model is {project.model.name!r}: a file model-... of the project is expected")
+    named = [project.model, *(Path(getattr(project.given, kind)) for kind in project.own_names), folder / PLAN]
+    for file in named:
+        if file is not None and not file.is_file():
+            raise PlanError(f"its file {file.name or RECORD} is missing")
+    for file in folder.iterdir():
+        if (digest := ADDED.match(file.name)) is not None and digest[2] != _digest(file):
+            raise PlanError(f"its file {file.name} is not as it was saved")
+    for kind in KINDS:
+        name = getattr(project.given, kind)
+        if kind in project.own_names:
+            name = str(_toml(Path(name)).get(PARENT, shipped(kind)[0]))
+        if is_file_name(name):
+            raise PlanError(f"{kind} is {name!r}: a profile that ships with the program, or a file of the project, is expected")
+    if project.plan is None:
+        raise PlanError(f"{RECORD}: plan is false: a project has one")
+    text = _toml(project.plan)
+    lists = (text[key] for key in (*ZONE_KINDS, "modifier") if isinstance(text.get(key), list))
+    for mesh in (table["mesh"] for tables in lists for table in tables if isinstance(table, dict) and "mesh" in table):
+        if Path(str(mesh)).name != mesh:
+            raise PlanError(f"{PLAN}: mesh is {mesh!r}: a file of the project is expected")
+    try:
+        from mdp.search.plan_reading import read_plan  # takes 30 ms to load; only projects need it
+
+        plan = read_plan(project.plan)
+    except PlanError as error:
+        raise PlanError(str(error).replace(f"{folder}{os.sep}", "")) from None
+    if max(project.parts, 1) != len(plan.parts) + 1:
+        raise PlanError(f"{RECORD}: parts is {project.parts}: {PLAN} has {len(plan.parts) + 1}")
+    if not np.allclose(plan.orientation or STANDING, project.rotation, atol=1e-9):
+        raise PlanError(f"{RECORD}: rotation is {project.rotation}, which is not the orientation of {PLAN}")
+
+
+def _toml(file: Path) -> dict[str, Any]:
+    """The tables of a TOML file. Raises PlanError."""
+    try:
+        return read_toml(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise PlanError(f"its file {file.name} is no TOML: {error}") from None
+
+
+def figures_of(row: FrontRow | None) -> dict[str, float]:
+    """The figures of a decomposition, as far as they are known."""
+    names = ("time_s", "filament_mm", "support_area_mm2", "seam_mm", "cost_mm2")
+    return {name: value for name in names if (value := getattr(row, name, None)) is not None}
+
+
+def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
+    """The content of a project file: mesh is the model as it lies, picture a PNG.
+
+    Raises OSError, and PlanError for what could not be opened again.
+    """
+    _check_alone(project.model)
+    if not is_file_name_anywhere(project.name):
+        raise PlanError(f"{project.name!r}: a project cannot keep a model of this name: rename its file")
+    content = io.BytesIO()
+    with TemporaryDirectory(prefix="tiltprint-save-") as name:
+        folder = Path(name)
+        write_folder(folder, project, plan)
+        model = model_xml([(mesh, project.name)], {"Title": project.name, "Application": PROGRAM})
+        digest = hashlib.sha256(model.encode()).hexdigest().encode()
+        own_files = [(INSIDE + path.name, path.read_bytes()) for path in sorted(folder.iterdir())]
+        if len(own_files) > MOST_FILES or sum(len(file) for _, file in own_files) + len(model) > LARGEST_BYTES:
+            raise PlanError(f"{project.name}: a project holds at most {MOST_FILES} files and {LARGEST_BYTES} bytes")
+        write_package(content, model, [(THUMBNAIL, picture), (INSIDE + MESH_DIGEST, digest), *own_files])
+    return content.getvalue()
+
+
+def is_project(path: Path) -> bool:
+    """Whether a file is a project that `project_bytes` made, or one that was damaged since."""
+    if path.suffix.lower() != SUFFIX or not path.is_file():
+        return False
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.startswith(INSIDE) for name in archive.namelist())
+    except DAMAGED:
+        return False
+
+
+def open_project(model: str) -> Project | None:
+    """A project file, unpacked for as long as the program runs; None for any other MODEL. Raises PlanError."""
+    if model.startswith(DEMO) or not is_project(Path(model)):
+        return None
+    _tidy()
+    folder = TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True)
+    lock = lock_folder(Path(folder.name))  # for as long as the program runs
+    _unpacked.append((folder, model, lock))
+    project = unpack(Path(model), Path(folder.name))
+    if project.model is None:
+        return project
+    named = Path(folder.name) / ".model" / Path(project.name).name  # messages and G-code say the name that the model had
+    named.parent.mkdir()
+    return replace(project, model=project.model.rename(named))
+
+
+def _tidy() -> None:
+    """Remove the folders of programs that were killed while they had a project open."""
+    for folder in Path(gettempdir()).glob(f"{PREFIX}*"):
+        with suppress(OSError):
+            if time() - folder.stat().st_mtime > BEGUN_S and (lock := lock_folder(folder, surely=True)) is not None:
+                remove_locked(folder, lock)
+
+
+def unpack(path: Path, folder: Path) -> Project:
+    """A project file, unpacked into an empty folder. Raises PlanError for one that is damaged or was changed."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            changed = _extract(archive, folder)
+        project = _project_of(folder, read_record(folder))
+        _check_inside(folder, project)
+    except NewerError:
+        raise PlanError(f"{path}: this project was saved by a newer tiltprint, which can open it") from None
+    except PlanError as error:
+        raise PlanError(f"{path}: this project is damaged: {error}") from None
+    except DAMAGED as error:
+        raise PlanError(f"{path}: this project is damaged: it is no whole zip archive ({first_line(error)})") from None
+    if changed:
+        raise PlanError(
+            f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
+            " from there as STL, and decompose that"
+        )
+    return project
+
+
+def _extract(archive: zipfile.ZipFile, folder: Path) -> bool:
+    """Unpack a project's files; whether its model for other slicers has been changed. Raises PlanError."""
+    entries = [entry for entry in archive.infolist() if entry.filename.startswith(INSIDE)]
+    names = {entry.filename for entry in archive.infolist()}
+    for name in (MODEL_PART, INSIDE + MESH_DIGEST, INSIDE + RECORD):
+        if name not in names:
+            raise PlanError(f"{name} is missing")
+    read = [*entries, archive.getinfo(MODEL_PART)]
+    if len(entries) > MOST_FILES or sum(entry.file_size for entry in read) > LARGEST_BYTES:
+        raise PlanError(f"it unpacks to more than {MOST_FILES} files or {LARGEST_BYTES} bytes")
+    for entry in entries:
+        if entry.is_dir():
+            continue  # zip -r writes an entry for each folder
+        name = entry.filename.removeprefix(INSIDE)
+        if not FILE_NAME.fullmatch(name) or (folder / name).exists():
+            raise PlanError(f"{entry.filename!r} is no name of a file of a project, or there twice")
+        with archive.open(entry) as source, (folder / name).open("xb") as copy:
+            shutil.copyfileobj(source, copy)
+    digest = hashlib.sha256(archive.read(MODEL_PART)).hexdigest()
+    return digest.encode() != archive.read(INSIDE + MESH_DIGEST)

@@ -1,0 +1,129 @@
+"""Project record: what `work.json` of a project says, and its checks."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from machine.pipeline.requests import MOST_COPIES
+from machine.planning.stops import Stop, parse_stops
+from profiles.errors import PlanError, SliceError
+from profiles.part_settings import MOST_PARTS
+from profiles.places import KINDS
+from profiles.wording import LONGEST_VALUE, sentences
+
+VERSION = 1
+RECORD = "work.json"
+LONGEST_NAME = 255  # bytes of a file's name on any disk
+
+
+class NewerError(PlanError):
+    """A record of a newer version of this program."""
+
+
+def _not_newer(value: object) -> object:
+    if isinstance(value, int) and not isinstance(value, bool) and value > VERSION:
+        raise NewerError(f"{RECORD} has version {value}")
+    return value
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+
+class GivenRecord(_Table):
+    """Names of profiles, or files of the project, and KEY=VALUE settings over them."""
+
+    machine: str
+    material: str
+    process: str
+    settings: list[str]
+
+
+class Record(_Table):
+    """A project's record, with the values of machine.pipeline.project.Project. model: a file of the project; "": it is a demo."""
+
+    version: Annotated[int, BeforeValidator(_not_newer), Field(ge=1)]
+    program: str = ""
+    name: str
+    model: str
+    given: GivenRecord
+    own_profiles: dict[str, str]
+    rotation: list[list[float]]
+    plan: bool
+    parts: Annotated[int, Field(ge=0, le=MOST_PARTS)]
+    locked: list[Annotated[int, Field(ge=0)]]
+    pauses: list[str]
+    changes: list[str]
+    copies: Annotated[int, Field(ge=1, le=MOST_COPIES)]
+    plate: Annotated[int, Field(ge=0)] | None = None
+    marks_in_plan: bool = True
+    figures: dict[str, float] = {}
+
+    @model_validator(mode="after")
+    def _agrees(self) -> "Record":
+        matrix = np.array(self.rotation) if [len(row) for row in self.rotation] == [3, 3, 3] else np.zeros((3, 3))
+        matrix = np.clip(matrix, -2.0, 2.0)  # no entry of a rotation is that large, and products of larger numbers overflow
+        if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0.0:
+            raise ValueError(f"rotation is {self.rotation}: it must be three rows of a rotation")
+        if not self.own_profiles.keys() <= set(KINDS):
+            raise ValueError(f"own_profiles is of {', '.join(self.own_profiles)}: {', '.join(KINDS)} are known")
+        if any(k >= max(self.parts, 1) - 1 for k in self.locked):
+            raise ValueError(f"locked is {self.locked}: it must be places of the {max(self.parts, 1) - 1} planes, from 0")
+        _ = self.stops
+        if not is_file_name_anywhere(self.name):
+            raise ValueError(f"name is {self.name!r}: it must be the name of a file")
+        return self
+
+    @property
+    def stops(self) -> tuple[Stop, ...]:
+        """Where the print waits for a person. Raises ValueError."""
+        try:
+            return parse_stops(self.pauses, self.changes)
+        except SliceError as error:
+            raise ValueError(f"pauses and changes: {str(error).partition(' ')[2]}") from None
+
+
+def is_file_name_anywhere(name: str) -> bool:
+    """Whether a file on any disk could have this name."""
+    try:
+        size = len(name.encode())
+    except UnicodeEncodeError:
+        return False
+    control = any(ord(letter) < 32 for letter in name)
+    return Path(name).name == name and name not in ("", "..") and not control and size <= LONGEST_NAME
+
+
+def read_record(folder: Path) -> Record:
+    """The record of a project in a folder.
+
+    Raises OSError, NewerError for one of a newer version, and PlanError with a sentence on what is wrong with it.
+    """
+    text = (folder / RECORD).read_bytes()
+    try:
+        return Record.model_validate_json(text)
+    except ValidationError as error:
+        raise PlanError(_in_words(error)) from None
+
+
+def checked_record(**values: Any) -> Record:
+    """The record of these values. Raises PlanError with a sentence on what is wrong with them."""
+    try:
+        return Record(**values)
+    except ValidationError as error:
+        raise PlanError(_in_words(error)) from None
+
+
+def _in_words(error: ValidationError) -> str:
+    """A sentence on the first problem of a record."""
+    problem: Any = error.errors(include_url=False)[0]
+    *_, last = path = problem["loc"] or ("",)
+    if problem["type"] == "json_invalid":
+        return f"{RECORD} is not JSON"
+    if not problem["loc"] and problem["type"] != "value_error":
+        return f"{RECORD} is {str(problem['input'])[:LONGEST_VALUE]}: a table of keys is expected"
+    if isinstance(last, int) or path[0] in ("figures", "own_profiles"):  # an item of a list, or of a table with free keys
+        key, expected = ".".join(map(str, path)), problem["msg"].removeprefix("Input should be ")
+        return f"{RECORD}: {key} is {str(problem['input'])[:LONGEST_VALUE]}: it must be {expected}"
+    return f"{RECORD}: {sentences([problem], Record)[0]}"

@@ -1,0 +1,133 @@
+"""Journal folder: where the journals of prints are, each with its program beside it, the newest ones only."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
+from os.path import isfile, lexists
+from pathlib import Path
+from time import time
+
+from machine.gcode.lines import GcodeFile
+from machine.link.journal import LONGEST_BYTES, Checkpoint, Journal, JournalHeading, is_being_printed, read_journal
+from machine.pipeline.file_roles import PROGRAM, program_beside
+from machine.pipeline.output import write_lines
+from profiles.errors import JournalError, OutputError, reason
+from profiles.folders import state_folder
+from profiles.profile import Profile
+
+KEPT = 20
+BEGUN_S = 3600.0  # a program as new as this may be of a print that another process begins now: its journal comes after it
+
+
+def new_journal(
+    lines: Iterable[str], profile: Profile, name: str, source: Path | None = None, file: Path | None = None
+) -> Journal:
+    """Begin the journal of a print. source: the G-code file that is printed; None: the lines are cached beside the journal.
+
+    file: the journal's own path, else a new one in the state folder, where the oldest ones go. Raises OutputError, GcodeError.
+    """
+    path = file if file is not None else _new_path(name)
+    if source is None:
+        source = program_beside(path)
+        if file is not None:
+            check_new_journal(file, source)
+        write_lines(source, tuple(lines), private=True)
+    return continue_journal(GcodeFile(source.resolve()), profile, name, path)
+
+
+def check_new_journal(file: Path, program: Path | None = None) -> None:
+    """Refuse a journal that is there, or whose program is: it belongs to another print, which may yet be resumed."""
+    for there in (file, *([] if program is None else [program])):
+        if lexists(there):
+            raise OutputError(f"journal {file}: {there} exists already: each print has one of its own, choose another name")
+
+
+def continue_journal(program: GcodeFile, profile: Profile, name: str, file: Path | None = None) -> Journal:
+    """Begin another journal of a program that is on disk already."""
+    heading = JournalHeading(str(program.path), program.sha256(), name, profile.model_dump(mode="json"))
+    return Journal(file if file is not None else _new_path(name), heading)
+
+
+@dataclass(frozen=True)
+class ResumableJournal:
+    """A journal of the state folder whose print did not come to its end.
+
+    line: up to which it was surely executed; written_s: when it was written last, seconds since 1970.
+    """
+
+    path: Path
+    name: str
+    machine: str
+    line: int
+    written_s: float
+
+
+def resumable_journals() -> list[ResumableJournal]:
+    """The newest first; those that cannot be read, are being printed, are resumed already or have lost their program are left
+    out."""
+    return [journal for journal in map(_resumable, _newest_first(_folder())) if journal is not None]
+
+
+def _resumable(path: Path) -> ResumableJournal | None:
+    try:
+        story, written_s = read_journal(path), path.stat().st_mtime
+    except (JournalError, OSError):
+        return None
+    last, heading = story.last, story.heading
+    if story.finished or story.continued_in is not None or last == Checkpoint() or not isfile(heading.program):
+        return None
+    if is_being_printed(path):
+        return None
+    machine = heading.profile.get("machine")
+    name = machine.get("name", "") if isinstance(machine, dict) else ""
+    return ResumableJournal(path, heading.name, str(name), last.executed, written_s)
+
+
+def _folder() -> Path:
+    return state_folder() / "journals"
+
+
+def _newest_first(folder: Path) -> list[Path]:
+    return sorted((path for path in folder.glob("*.journal") if isfile(path)), reverse=True)
+
+
+def _new_path(name: str) -> Path:
+    """A new file's path, named after the time and the model."""
+    folder = _folder()
+    try:
+        folder.mkdir(0o700, exist_ok=True)
+        _thin(folder)
+    except OSError as error:
+        raise OutputError(f"folder {folder} cannot be written: {reason(error)}") from None
+    plain = "".join(c if c.isalnum() and c.isascii() else "-" for c in name)[:40].strip("-") or "print"
+    return folder / f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}-{plain}.journal"
+
+
+def _thin(folder: Path) -> None:
+    """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is
+    left that names it, a new one only with its journal."""
+    gone = [old for old in _newest_first(folder)[KEPT - 1 :] if not is_being_printed(old)]
+    ended = b"".join(map(_first_line, gone))
+    for old in gone:
+        old.unlink(missing_ok=True)
+    headings = b"".join(map(_first_line, _newest_first(folder)))
+    for program in folder.glob(f"*{PROGRAM}"):
+        name = program.name.encode()
+        if name not in headings and (name in ended or not _is_new(program)):
+            program.unlink(missing_ok=True)
+
+
+def _is_new(program: Path) -> bool:
+    try:
+        return time() - program.stat().st_mtime < BEGUN_S
+    except FileNotFoundError:  # another process was quicker
+        return False
+
+
+def _first_line(journal: Path) -> bytes:
+    try:
+        with journal.open("rb") as file:
+            return file.readline(LONGEST_BYTES)
+    except FileNotFoundError:
+        return b""

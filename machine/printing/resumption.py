@@ -1,0 +1,246 @@
+"""Resumption: a print that was cut off, read from its journal, and its rest: what is told, what is asked, what is refused.
+
+Whoever asks a person, at the terminal or at a page, is given the question as text, and asks it only when the printer itself has
+told where it stands: until the answer is yes, nothing of it moves or heats.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import hypot
+from os.path import isfile
+from pathlib import Path
+
+from machine.cli.terminal.progress import say
+from machine.dryrun.dryrun import dry_run
+from machine.firmware import dialect_of
+from machine.gcode.lines import GcodeFile
+from machine.link.journal import (
+    Checkpoint,
+    Journal,
+    JournalContents,
+    JournalHeading,
+    is_being_printed,
+    mark_resumed,
+    read_journal,
+)
+from machine.link.pending_commands import CancelledError
+from machine.link.resume import (
+    PARKED,
+    InterruptedPrint,
+    ResumePlan,
+    ResumePoint,
+    heights_mm,
+    is_in_doubt,
+    plan_resume,
+    position_at_interruption,
+    read_interrupted_print,
+)
+from machine.link.status import PrinterStatus
+from machine.pipeline.file_roles import check_roles, printing_files
+from machine.pipeline.programs import LoadedProgram
+from machine.pipeline.requests import SIMULATED, PrintRequest
+from machine.printing.attendance import Attendance, AtTerminal, Observers
+from machine.printing.compatibility import check_dialect
+from machine.printing.journal_folder import continue_journal
+from machine.printing.serial_log import new_log
+from machine.printing.server_checks import check_no_server
+from machine.printing.stream import report_end, stream_program
+from machine.program import Program
+from machine.view.serving.watch_page import serve_watch_page
+from profiles.errors import JournalError, ProfileError
+from profiles.profile import Profile, profile_of_tables
+
+RESTARTED = (
+    "this computer may have restarted since the print began, so the newest records may be missing: see that the print is no "
+    "higher than this, and that tip and table stand as told here, before you go on"
+)
+NOTHING, STOPPED = 1, 130  # what a resume ends with besides 0: the answer was no; a person has stopped the rest
+
+
+@dataclass(frozen=True, eq=False)
+class Resumption:
+    """A print that can be gone on with, as its journal and its program tell; journal: its file."""
+
+    journal: Path
+    story: JournalContents
+    profile: Profile
+    text: GcodeFile
+    point: InterruptedPrint
+    lines: Sequence[str]
+
+    @property
+    def name(self) -> str:
+        """What was printed."""
+        return self.story.heading.name
+
+    def sentences(self) -> tuple[str, ...]:
+        """Where it was cut off, as sentences for a person."""
+        position, at = self.point.position, self.point.modal.at
+        of_parts = f" of {position.parts}" if position.parts else ""
+        where = [f"part {position.part}{of_parts}"] if position.part is not None else []
+        where += [f"layer {position.layer}"] if position.layer is not None else []
+        letters = self.point.modal.axes.letters
+        known = [f"{letter} {value:.3f}" for letter, value in zip(letters[:5], at[:5], strict=True) if value is not None]
+        torn = self.story.torn
+        return (
+            f"{self.name}, {', '.join([*where, f'line {self.point.line} of {len(self.lines)}'])}",
+            f"surely executed: up to line {self.point.line - 1}" + (f", at {', '.join(known)}" if known else ""),
+            *([f"{torn} of the journal's records could not be read: a power cut has torn them"] if torn else []),
+            *([] if self.story.computer_ran_on else [RESTARTED]),
+        )
+
+
+def read_resumption(journal: Path, printing: PrintRequest, named: Profile | None = None) -> Resumption:
+    """What a journal tells. named: the profile whose machine the user has named. Raises JournalError and other UserErrors for
+    what cannot be resumed at this port."""
+    if printing.port == SIMULATED:
+        raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
+    check_no_server(printing.port)
+    if is_being_printed(journal):  # asked first: what is read after that does not change any more
+        raise JournalError(
+            f"journal {journal}: its print runs now, in another terminal or page: it can be resumed when it has ended"
+        )
+    story = read_journal(journal)
+    profile = _profile(journal, story.heading, named)
+    check_dialect(profile.machine)
+    text = _program(journal, story)
+    check_roles((("the journal", journal), ("its program", text.path)), printing_files(printing))
+    point = read_interrupted_print(text, story.last, profile, dialect_of(profile.machine).longest_line)
+    return Resumption(journal, story, profile, text, point, tuple(text))
+
+
+def print_rest(
+    cut_off: Resumption,
+    printing: PrintRequest,
+    agrees: Callable[[str], bool],
+    which: Callable[[str, tuple[float, ...]], float | None],
+    attendance: Attendance | None = None,
+) -> int:
+    """Ask the printer where it stands, then agrees(question) a person, and print the rest; says how it ended.
+
+    0, NOTHING or STOPPED. which(question, heights): where the tip may have stood at several heights, the one a person sees, None
+    for none; may raise JournalError. The journal of the request is a new one. attendance: of a person who is not at the terminal.
+    Raises PrinterError.
+    """
+    person = attendance or AtTerminal()
+    job = LoadedProgram(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
+    with _further_journal(cut_off, printing) as further:
+
+        def begin(status: PrinterStatus) -> ResumePoint:
+            way = plan_resume(cut_off.point, status, cut_off.profile)
+            point = cut_off.point
+            if is_in_doubt(way, point, cut_off.profile):
+                stood_mm = which(_height_question(point), heights_mm(point))
+                if stood_mm is None:
+                    raise CancelledError
+                point = replace(point, stood_mm=stood_mm)
+                way = plan_resume(point, status, cut_off.profile)
+            if not agrees(_question(way, point, cut_off.profile)):
+                raise CancelledError
+            _hand_over(cut_off, further, way.start.line - 1)
+            return way.start
+
+        with (
+            new_log("print", f"the rest of {job.name} to {printing.port}", printing.log) as log,
+            serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched,
+        ):
+            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin=begin, attendance=person)
+            watched.end("stopped" if outcome.cancelled else "done")
+        if outcome.cancelled and outcome.heaters_off is None:
+            say("nothing was moved or heated")
+            return NOTHING
+        return report_end(outcome, journal=further)
+
+
+@contextmanager
+def _further_journal(cut_off: Resumption, printing: PrintRequest) -> Iterator[Journal]:
+    """The journal of the rest; one that tells nothing is not left, for it would let the whole program begin anew."""
+    with continue_journal(cut_off.text, cut_off.profile, cut_off.name, printing.journal) as further:
+        try:
+            yield further
+        finally:
+            if further.last == Checkpoint():
+                further.abandon()
+
+
+def _hand_over(cut_off: Resumption, further: Journal, done: int) -> None:
+    """Before the rest begins: the new journal takes over on the disk, then the old one says so. From here on the printer counts
+    its lines anew: only the new journal can tell whether it has restarted. done: lines of the program that are not repeated.
+
+    Raises JournalError when one of them cannot be written; then nothing has moved, and only the old one can be resumed.
+    """
+    further.write(replace(cut_off.story.last, sent=done, acknowledged=done, executed=done))
+    try:
+        if trouble := further.settle():
+            raise JournalError(f"{trouble}; nothing was moved or heated")
+        mark_resumed(cut_off.journal, cut_off.story, further.path)
+    except JournalError:
+        further.abandon()
+        raise
+
+
+def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> Profile:
+    """The journal's own profile, homed and after a restart believed as the machine says that was named.
+
+    Raises JournalError when that is another machine, or when the journal's profile is not valid.
+    """
+    try:
+        profile = profile_of_tables(heading.profile)
+    except ProfileError as error:
+        raise JournalError(f"journal {journal} holds a profile that is not valid: {error}") from None
+    if named is None:
+        return profile
+    old, new = profile.machine, named.machine
+    homed = {name: getattr(old, name).model_copy(update={"home_mm": getattr(new, name).home_mm}) for name in ("x", "y", "z")}
+    homed |= {name: getattr(old, name).model_copy(update={"home_deg": getattr(new, name).home_deg}) for name in ("tilt", "turn")}
+    machine = old.model_copy(update=homed | {"gcode": old.gcode.model_copy(update={"resume": new.gcode.resume})})
+    if named.machine != machine:
+        raise JournalError(
+            f"journal {journal} is of a print on {profile.machine.name}; --machine gives another machine ({named.machine.name}), "
+            "or one whose profile has changed since"
+        )
+    return profile.model_copy(update={"machine": machine})
+
+
+def _program(journal: Path, story: JournalContents) -> GcodeFile:
+    """The program, as it was printed. Raises JournalError."""
+    if story.continued_in is not None:
+        raise JournalError(f"journal {journal}: this print was resumed already, what became of it is in {story.continued_in}")
+    if story.finished:
+        raise JournalError(f"journal {journal}: this print ran to its end, there is nothing to resume")
+    program = GcodeFile(Path(story.heading.program))
+    if not isfile(program.path):
+        raise JournalError(f"journal {journal}: its program {program.path} is gone")
+    if program.sha256() != story.heading.sha256:
+        raise JournalError(f"journal {journal} is of another program: {program.path} has changed since it was printed")
+    return program
+
+
+def _height_question(point: InterruptedPrint) -> str:
+    """At which height the tip stands; Z is not homed, so that all that follows lies by as much too high or too low."""
+    heights = " or ".join(f"Z {z:.2f}" for z in heights_mm(point))
+    return f"the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
+
+
+def _question(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> str:
+    """What is going to be done, and what the person must make sure of."""
+    reason = f"it goes on with line {way.start.line}: {way.reason}"
+    if not way.homes:
+        return reason
+    (x, y, z), pose = position_at_interruption(point, profile)
+    tilt, turn, machine = pose.tilt_deg, pose.turn_deg, profile.machine
+    tip = f"tip at X {x:.1f} Y {y:.1f} Z {z:.2f}"
+    heights = heights_mm(point)
+    if point.checkpoint.state not in PARKED and len(heights) > 1:
+        tip += f" (or up to {heights[-1] - heights[0]:.2f} mm higher)"
+    if hypot(tilt, turn) > 0:
+        turns = f", {int(turn // 360)} whole turns and {turn % 360:.3f}" if abs(turn) >= 360 else ""
+        tip += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"
+    if machine.gcode.resume:
+        return f"{reason}\nit was cut off with the {tip}\nthen: machine.gcode.resume homes the axes, bed and nozzle heat"
+    return (
+        f"{reason}\nlook first: all must stand as it was cut off, {tip}\n"
+        "if anything was moved since, answer no, for only X and Y will be homed, Z and the table will not\n"
+        "then: bed and nozzle heat where the tip stands, the tip rises, X and Y are homed"
+    )

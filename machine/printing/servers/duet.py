@@ -1,0 +1,214 @@
+"""A Duet's rr_ requests: RepRapFirmware 3 alone, or behind DuetSoftwareFramework, whose web server answers them, too.
+
+Read in RepRapFirmware (src/Networking/HttpResponder.cpp, GCodes/GCodeInput.cpp, "HTTP requests.md" and the object model of
+PrintMonitor.cpp) and in DuetSoftwareFramework (RepRapFirmwareController.cs); never tried on a board. A session ends after 8 s
+without a request, so a 401 begins a new one. The file is written as NAME.part and renamed when length and CRC are right. M112
+is recognised as its characters come in, whatever waits. A print can only be cancelled while it is paused (M25, then M0).
+"""
+
+import json
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from machine.printing.servers.answers import entry, number, table, temperature, whole
+from machine.printing.servers.credentials import how_to_give_a_key
+from machine.printing.servers.gcode_upload import GcodeUpload, Sent
+from machine.printing.servers.http import HttpSession, Reply, plain
+from machine.printing.servers.server import ACTIVE, JobStatus, Phase, PrintServer, ServerIdentity
+from profiles.errors import ServerError
+
+FOLDER = "0:/gcodes/"
+DEFAULT_PASSWORD = "reprap"  # of a board on which none was set; its name must be sent all the same
+WRITTEN_S = 120.0
+START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
+MOST_PAGES = 16
+SETTINGS_ARRAYS = ("move.axes", "move.extruders", "tools", "sensors.probes")
+SETTINGS_KEYS = ("boards[0]", "heat", "move.kinematics", "network")
+STOPPED = frozenset({Phase.PAUSING, Phase.PAUSED, Phase.CANCELLING})
+STATES = {
+    "idle": Phase.READY,
+    "processing": Phase.PRINTING,
+    "simulating": Phase.PRINTING,
+    "pausing": Phase.PAUSING,
+    "paused": Phase.PAUSED,
+    "resuming": Phase.RESUMING,
+    "cancelling": Phase.CANCELLING,
+    **dict.fromkeys(("halted", "off", "updating", "starting", "disconnected"), Phase.OFFLINE),
+}
+
+
+class Duet(PrintServer):
+    """PrintServer of a Duet."""
+
+    def __init__(self, http: HttpSession) -> None:
+        super().__init__(http)
+        self._nozzle, self._bed = 1, 0  # heaters
+        self._connected = False
+        self._last: Phase | None = None  # of the print, for idle says nothing of how it ended
+        self._up_s = 0.0  # since the board was reset
+
+    def greet(self) -> ServerIdentity:
+        """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
+        self._connect()
+        board = table(self._model("boards[0]"))
+        name, version = str(board.get("firmwareName") or "RepRapFirmware"), str(board.get("firmwareVersion") or "")
+        axes = [table(axis) for axis in self._array("move.axes")]
+        limits = {str(axis.get("letter")): (number(axis.get("min")), number(axis.get("max"))) for axis in axes}
+        known = {letter: (low, high) for letter, (low, high) in limits.items() if low is not None and high is not None}
+        nozzle = whole(entry(table(entry(self._array("tools"), 0)).get("heaters"), 0))
+        bed = whole(entry(table(self._model("heat")).get("bedHeaters"), 0))
+        self._nozzle, self._bed = self._nozzle if nozzle is None else nozzle, -1 if bed is None else bed
+        return ServerIdentity(f"{name} {version}".strip(), f"{name} {version}".strip(), "".join(limits), known)
+
+    def _connect(self) -> None:
+        password = self._http.credentials.key or DEFAULT_PASSWORD
+        now = time.strftime("%Y-%m-%dT%H:%M:%S")
+        reply = self._http.get("/rr_connect", {"password": password, "time": now, "sessionKey": "yes"}, secret=True)
+        value = table(self._http.check(reply, "a session"))
+        if value.get("err") == 1:
+            wrong = "refuses the password" if self._http.credentials.key else "wants a password"
+            raise ServerError(f"{self.name} {wrong}: {how_to_give_a_key(self._http.address)}")
+        if value.get("err") == 2:
+            raise ServerError(f"{self.name} serves as many others as it can: close a web page or program that is connected to it")
+        if value.get("err") != 0:
+            raise ServerError(f"{self.name} is no Duet: it does not answer rr_connect as one")
+        self._connected = True
+        key = whole(value.get("sessionKey"))
+        if key:  # firmware from 3.5 on; before that, and from DuetSoftwareFramework, a session is this computer's address
+            self._http.set_header("X-Session-Key", str(key))
+
+    def status(self) -> JobStatus:
+        """From what the object model calls frequently changing, and what the firmware has said since."""
+        before = self._last  # an answer that was on its way when the print began is none of its end
+        model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
+        job, machine_state = table(model.get("job")), table(model.get("state"))
+        state, up_s = str(machine_state.get("status") or ""), number(machine_state.get("upTime"))
+        if up_s is not None:
+            if up_s < self._up_s:  # reset since (Platform/RepRap.cpp): idle is not the end of the print
+                before = self._last = None
+            self._up_s = up_s
+        elapsed_s = number(job.get("duration"))
+        under_way = Phase.READY if elapsed_s is None else Phase.PRINTING  # busy, changingTool: within a print or without one
+        phase = STATES.get(state, under_way)
+        heaters, said = table(model.get("heat")).get("heaters"), self._get("/rr_reply")
+        words = plain(said.body.decode("utf-8", "replace")) if said.status == 200 else ""
+        return JobStatus(
+            self._since_start(phase, before),
+            bytes_read=whole(job.get("filePosition")),
+            elapsed_s=elapsed_s,
+            temperature=temperature(entry(heaters, self._nozzle), entry(heaters, self._bed), "current", "active"),
+            message=words or (f"it is {state}" if phase is Phase.OFFLINE else ""),
+        )
+
+    def file_in_print(self) -> str:
+        """From the object model: job.file.fileName is not among its frequently changing values."""
+        path = self._model("job.file.fileName")
+        return path.removeprefix(FOLDER) if isinstance(path, str) else ""
+
+    def _since_start(self, phase: Phase, before: Phase | None) -> Phase:
+        """The phase, with idle after a print as its end: a cancelled one was paused before. before: what it was last, as it was
+        asked."""
+        if phase in ACTIVE:
+            self._last = phase
+        if phase is not Phase.READY or before is None or self._last is None:
+            return phase
+        return Phase.CANCELLED if self._last in STOPPED else Phase.DONE
+
+    def has(self, file: str) -> bool:
+        return table(self._value("/rr_fileinfo", {"name": FOLDER + file})).get("err") == 0
+
+    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+        self._connect()  # the one before may have ended while the program was made
+        params = {"name": FOLDER + upload.name, "crc32": upload.crc32}
+        reply = self._http.upload("/rr_upload", params, upload.read_by(sent), answer_s=WRITTEN_S)
+        if table(self._http.check(reply, "the file")).get("err") != 0:
+            said = plain(self._get("/rr_reply").body.decode("utf-8", "replace"))
+            raise ServerError(f"{self.name} has not kept the file ({said or 'no reason given'}): is the card full or damaged?")
+        return upload.name
+
+    def start(self, file: str) -> None:
+        self._last = None
+        self.command(f'M32 "{FOLDER}{file}"')
+        deadline_s = time.monotonic() + START_S
+        while time.monotonic() < deadline_s:
+            try:
+                status = self.status()
+            except ServerError:  # it has the order: whether it prints is seen when it answers again
+                return
+            if "Error" in status.message:
+                raise ServerError(f"{self.name} cannot start it now: {status.message}")
+            if status.phase in ACTIVE:
+                return
+            time.sleep(LOOK_S)
+
+    def pause(self) -> None:
+        """Pause the print: the firmware runs pause.g."""
+        self.command("M25")
+
+    def resume(self) -> None:
+        self.command("M24")
+
+    def cancel(self) -> None:
+        """Pause, which the firmware insists on, then end: it runs cancel.g, or switches heaters off where there is none."""
+        self.command("M25")
+        deadline_s = time.monotonic() + PAUSE_S
+        while (phase := self.status().phase) in (Phase.PRINTING, Phase.PAUSING, Phase.RESUMING):
+            if time.monotonic() > deadline_s:
+                raise ServerError(f"{self.name} has not paused within {PAUSE_S:g} s, and cancels only then: look at it")
+            time.sleep(LOOK_S)
+        if phase is Phase.PAUSED:
+            self.command("M0")
+
+    def command(self, line: str) -> None:
+        value = table(self._value("/rr_gcode", {"gcode": line}))
+        if value.get("err", 0) != 0:
+            raise ServerError(f"{self.name} has not taken {line}: it is busy")
+
+    def settings(self) -> str:
+        """Those keys of its object model, as M409 answers them."""
+        lines = [{"key": key, "result": self._array(key)} for key in SETTINGS_ARRAYS]
+        lines += [{"key": key, "result": self._model(key)} for key in SETTINGS_KEYS]
+        return "\n".join(json.dumps(line) for line in lines)
+
+    def emergency_stop(self) -> None:
+        """M112: the board halts until it is reset."""
+        self.command("M112")
+
+    def close(self) -> None:
+        """End the session, so that others find room, and leave."""
+        try:
+            if self._connected:
+                self._http.get("/rr_disconnect")
+        except ServerError:
+            pass
+        finally:
+            super().close()
+
+    def _model(self, key: str) -> Any:
+        return table(self._value("/rr_model", {"key": key, "flags": "d99vn"})).get("result")
+
+    def _array(self, key: str) -> list[Any]:
+        """An array of the object model, which comes in pages."""
+        entries: list[Any] = []
+        flags = "d99vn"
+        for _ in range(MOST_PAGES):
+            page = table(self._value("/rr_model", {"key": key, "flags": flags}))
+            entries += page["result"] if isinstance(page.get("result"), list) else []
+            next_page = whole(page.get("next"))
+            if not next_page:
+                break
+            flags = f"d99vna{next_page}"
+        return entries
+
+    def _value(self, path: str, params: Mapping[str, str]) -> Any:
+        sentence = {503: f"{self.name} is short of memory just now: try again"}
+        return self._http.check(self._get(path, params), "to answer", sentence)
+
+    def _get(self, path: str, params: Mapping[str, str] | None = None) -> Reply:
+        """The reply; a session that has ended is begun again."""
+        reply = self._http.get(path, params)
+        if reply.status == 401:
+            self._connect()
+            reply = self._http.get(path, params)
+        return reply

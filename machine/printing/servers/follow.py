@@ -1,0 +1,264 @@
+"""Follow: a print on a server watched to its end, while a person asks for a pause, the end, or the emergency stop.
+
+The server prints without this program. What it is asked may be answered late: polls and orders have threads of their own, so
+that the emergency stop never waits for them.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import partial
+
+from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
+from machine.link.progress import last_known
+from machine.link.protocol.events import Temperature
+from machine.printing.servers.server import ACTIVE, JobStatus, Phase, PrintServer
+from profiles.errors import NoAnswerError, ServerError
+
+POLL_S, TURN_S = 1.0, 0.05
+SHOW_S = 0.25  # what is shown is drawn again: a question to the person stands beside it
+JOIN_S = 0.5  # an order that still waits for its answer is left to the server
+BEGIN_S = 15.0  # a server that has taken the order to start shows it by then
+QUIET_S = 15.0  # without an answer or an error for so long, it is said
+LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
+UNKNOWN = "whether the print goes on there is not known"
+UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
+OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
+
+
+class End(Enum):
+    """How following a print ended."""
+
+    DONE = "done"
+    CANCELLED = "cancelled"  # by the person here
+    LEFT = "left"  # the print goes on
+    STOPPED = "stopped"  # by the emergency stop
+
+
+@dataclass
+class _Heard:
+    """What the polling thread has heard last, and how long it has heard nothing."""
+
+    status: JobStatus | None = None
+    error: ServerError | None = None
+    answered_s: float = field(default_factory=time.monotonic)
+
+
+def follow_print(
+    server: PrintServer,
+    file: str,
+    size: int,
+    *,
+    on_status: OnStatus,
+    control: Control,
+    left: Callable[[], bool],
+    running: JobStatus | None = None,
+) -> End:
+    """Have a file printed that a server holds, and follow that to its end.
+
+    size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
+    the server is at already, which is not to be started. Raises ServerError when it is refused, fails or is lost, or when the
+    server no longer prints it and nobody here has cancelled it.
+    """
+    return _Follower(server, file, size, on_status, control, left, running).run()
+
+
+@dataclass
+class _Follower:
+    server: PrintServer
+    file: str
+    size: int
+    on_status: OnStatus
+    control: Control
+    left: Callable[[], bool]
+    running: JobStatus | None
+
+    def __post_init__(self) -> None:
+        self._heard, self._over = _Heard(), threading.Event()
+        self._orders: deque[Callable[[], None]] = deque()
+        self._message = ""
+        self._last_active: Phase | None = self.running.phase if self.running else None
+        self._read, self._heat = 0, Temperature()
+        self._cancels = False  # the server has the order, or may have it
+        self._began_s: float | None = None  # since when the server has been told to start
+        self._failed: Exception | None = None  # of the start, or of a thread
+        self._shown: tuple[JobStatus | None, str] = (None, "")
+        self._shown_s = 0.0
+        self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
+
+    def run(self) -> End:
+        """A stop that is asked for before the start leaves nothing to start, and one that comes as the following ends is given
+        all the same."""
+        if self._take_requests():
+            return End.STOPPED
+        try:
+            end = self._followed()
+        except ServerError:
+            if self._take_requests():
+                return End.STOPPED
+            raise
+        return End.STOPPED if end is not End.STOPPED and self._take_requests() else end
+
+    def _followed(self) -> End:
+        works = (self._poll, self._carry_out)
+        threads = [threading.Thread(target=self._guard, args=(work,), name="print server", daemon=True) for work in works]
+        for thread in threads:
+            thread.start()
+        try:
+            while True:
+                if self._take_requests():
+                    return End.STOPPED
+                if self.left():
+                    return End.LEFT
+                end = self._look()
+                if end is not None:
+                    return end
+                time.sleep(TURN_S)
+        finally:
+            self._over.set()
+            for thread in threads:
+                thread.join(JOIN_S)
+
+    def _guard(self, work: Callable[[], None]) -> None:
+        """Have a thread's error raised where the print is followed: nobody would miss the thread."""
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 - raised again by _look()
+            self._failed = error
+
+    def _look(self) -> End | None:
+        """Tell the newest status; how the print has ended, None while it goes on."""
+        if self._failed is not None:
+            raise self._failed
+        heard = self._heard
+        silent_s = time.monotonic() - heard.answered_s
+        if silent_s > LOST_S:
+            where = heard.error or self.server.name
+            heat = last_known(self._heat, silent_s)
+            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer{heat}")
+        if heard.status is None:
+            return None
+        quiet = heard.error is not None or silent_s > QUIET_S
+        message = self._message or (f"no answer for {silent_s:.0f} s: {UNKNOWN}" if quiet else "")
+        if heard.status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
+            self._shown, self._shown_s = (heard.status, message), time.monotonic()
+            self.on_status(heard.status, message)
+        return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
+
+    def _end_of(self, status: JobStatus) -> End | None:
+        if self._began_s is None:
+            return None
+        heat = status.temperature
+        self._heat = heat if heat.words else self._heat
+        if status.phase in ACTIVE:
+            if self._last_active is not None and status.file not in ("", self.file):
+                raise ServerError(f"{self.server.name} prints {status.file} now: what became of {self.file} is not known")
+            self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
+            return None
+        if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):
+            where = f" at {self._reached}" if self._reached else ""
+            raise ServerError(f"{self.server.name}: the print has failed{where}: {status.message or status.phase.value}")
+        if self._last_active is None:
+            return self._end_unseen(status, time.monotonic() - self._began_s)
+        if status.phase is not Phase.DONE and not self._cancels:
+            raise ServerError(self._ended_there(status))
+        return End.DONE if status.phase is Phase.DONE else End.CANCELLED
+
+    @property
+    def _reached(self) -> str:
+        """How far the server has read, in words; "" where it is not known."""
+        return f"{100 * self._read / self.size:.0f} %" if self._read and self.size else ""
+
+    def _ended_there(self, status: JobStatus) -> str:
+        """A server that has died and come back, or somebody else who has cancelled: the heaters may still be on."""
+        known = ", ".join(filter(None, (f"{self._reached} read" if self._reached else "", self._heat.words)))
+        return (
+            f"{self.server.name} no longer prints {self.file or 'its file'} ({status.message or status.phase.value})"
+            f"{f'; last known: {known}' if known else ''}: look at the printer"
+        )
+
+    def _end_unseen(self, status: JobStatus, waited_s: float) -> End | None:
+        """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
+        if waited_s < BEGIN_S:
+            return None
+        if status.phase is Phase.DONE and status.file in ("", self.file):
+            return End.DONE
+        raise ServerError(
+            f"{self.server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
+        )
+
+    def _poll(self) -> None:
+        while not self._over.is_set():
+            before = self._heard
+            try:
+                self._heard = _Heard(self._with_percents(self.server.status()))
+            except ServerError as error:
+                self._heard = _Heard(before.status, error, before.answered_s)
+            self._over.wait(POLL_S)
+
+    def _take_requests(self) -> bool:
+        """Hand on what a person has asked for; True after an emergency stop."""
+        while (request := self.control.take()) is not None:
+            if request.command is Command.EMERGENCY_STOP:
+                try:
+                    self.server.emergency_stop()
+                except ServerError as error:
+                    raise ServerError(UNCONFIRMED.format(server=self.server.name, error=error)) from None
+                return True
+            if order := self._order(request):
+                self._orders.append(order)
+        return False
+
+    def _order(self, request: PendingCommand) -> Callable[[], None] | None:
+        server, value = self.server, request.value
+        if request.command in (Command.FEED, Command.FLOW):
+            limits = FEED_PERCENT if request.command is Command.FEED else FLOW_PERCENT
+            self._message = percent_refusal(value, limits) or ""
+            return None if self._message else partial(self._set_percent, request.command, value)
+        orders = {Command.PAUSE: server.pause, Command.RESUME: server.resume, Command.CANCEL: self._cancel}
+        return orders.get(request.command)
+
+    def _cancel(self) -> None:
+        """What ends from now on was cancelled here, unless the order was refused."""
+        self._cancels = True
+        try:
+            self.server.cancel()
+        except NoAnswerError:
+            raise
+        except ServerError:
+            self._cancels = False
+            raise
+
+    def _set_percent(self, command: Command, value: float) -> None:
+        self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
+        self._percents[command] = value
+
+    def _with_percents(self, status: JobStatus) -> JobStatus:
+        feed, flow = status.feed_percent, status.flow_percent
+        return replace(
+            status,
+            feed_percent=self._percents.get(Command.FEED) if feed is None else feed,
+            flow_percent=self._percents.get(Command.FLOW) if flow is None else flow,
+        )
+
+    def _carry_out(self) -> None:
+        """The start, then orders one after the other; what a server refuses of these is told, and following goes on.
+
+        A start without an answer may have been taken: whether it was is seen by the status.
+        """
+        if self.running is None:
+            with suppress(NoAnswerError):
+                self.server.start(self.file)
+        self._began_s = time.monotonic()
+        while not self._over.wait(TURN_S):
+            while self._orders:
+                order = self._orders.popleft()
+                try:
+                    order()
+                    self._message = ""
+                except ServerError as error:
+                    self._message = str(error)

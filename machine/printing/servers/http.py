@@ -1,0 +1,263 @@
+"""HTTP: requests to one print server, and every way in which they fail as one sentence.
+
+Redirects are not followed and no proxy of the environment is used: either would carry the key to somebody else. Certificates
+are verified; nothing turns that off.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import socket
+import ssl
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from machine.printing.servers.address import NAMES, ServerAddress
+from machine.printing.servers.credentials import Credentials, how_to_give_a_key, servers_file
+from profiles.errors import NoAnswerError, ServerError, causes
+
+if TYPE_CHECKING:
+    import httpx
+
+CONNECT_S, ANSWER_S, WRITE_S = 5.0, 10.0, 30.0
+WHOLE_S = 30.0  # from the first byte of an answer to its last: ANSWER_S is between any two of them
+ERRNO = re.compile(r"^\[errno -?\d+\] ")
+MOST_BYTES = 16_000_000  # of an answer
+FILE_TYPE = "application/octet-stream"
+MOST_PICTURE, PICTURES = 8_000_000, ("image/jpeg", "image/png", "image/webp")  # of a camera
+WORDS = 160  # characters of a server's own words in a message
+Tell = Callable[[str, bytes], None]  # direction and what went over the line, as a log takes it
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What a server has answered. path: what was asked for, for messages."""
+
+    status: int
+    body: bytes
+    path: str
+    location: str = ""
+
+    def json(self) -> Any:
+        """The body's value; None when it is none."""
+        try:
+            return json.loads(self.body)
+        except (ValueError, RecursionError):
+            return None
+
+
+class HttpSession:
+    """get() and post() below a server's address; from any thread. Raises ServerError with a sentence for a person, NoAnswerError
+    where the request may have been taken. key_refused: statuses that are about the key.
+    """
+
+    key_refused: tuple[int, ...] = (401, 403)
+
+    def __init__(self, address: ServerAddress, credentials: Credentials, tell: Tell | None = None) -> None:
+        import httpx
+
+        for name in ("httpx", "httpcore"):  # they would log addresses, and a Duet's password is part of one
+            logging.getLogger(name).setLevel(logging.WARNING)
+        self.address, self.credentials = address, credentials
+        self._tell = tell or (lambda direction, data: None)
+        self._log_lock = threading.Lock()
+        self._httpx = httpx
+        try:
+            self._client = httpx.Client(
+                base_url=address.url,
+                verify=_certificates(address, credentials),
+                trust_env=False,
+                follow_redirects=False,
+                headers={"User-Agent": "tiltprint", "Accept": "application/json"},
+                timeout=httpx.Timeout(ANSWER_S, connect=CONNECT_S),
+            )
+        except (httpx.InvalidURL, UnicodeError) as error:
+            raise ServerError(f"server address {address.text!r} names no host: {plain(str(error)).lower()}") from None
+
+    @property
+    def name(self) -> str:
+        """The server as the user names it."""
+        return self.address.text
+
+    def close(self) -> None:
+        """End all connections."""
+        self._client.close()
+
+    def set_header(self, name: str, value: str) -> None:
+        """Send a header with every further request."""
+        self._client.headers[name] = value
+
+    def get(self, path: str, params: Mapping[str, str] | None = None, secret: bool = False) -> Reply:
+        """GET. secret: the parameters are not logged."""
+        return self._request("GET", path, params=params, note=path if secret else _shown(path, params))
+
+    def post(self, path: str, value: Any = None, answer_s: float = ANSWER_S) -> Reply:
+        """POST a value as JSON, or nothing."""
+        note = path + ("" if value is None else f" {json.dumps(value)}")
+        timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S)
+        return self._request("POST", path, json=value, timeout=timeout, note=note)
+
+    def upload_form(self, path: str, fields: Mapping[str, str], name: str, file: BinaryIO, *, answer_s: float) -> Reply:
+        """POST a file as `file` in a multipart form after the fields; the answer may take answer_s after its last byte."""
+        files = {"file": (name, file, FILE_TYPE)}
+        return self._request("POST", path, data=fields, files=files, timeout=self._of_upload(answer_s), note=f"{path} ({name})")
+
+    def upload(self, path: str, params: Mapping[str, str], file: BinaryIO, *, answer_s: float) -> Reply:
+        """The same as the body itself of a request."""
+        headers, note = {"Content-Type": FILE_TYPE}, _shown(path, params)
+        timeout = self._of_upload(answer_s)
+        return self._request("POST", path, params=params, content=file, headers=headers, timeout=timeout, note=note)
+
+    def _of_upload(self, answer_s: float) -> httpx.Timeout:
+        return self._httpx.Timeout(answer_s, connect=CONNECT_S, write=WRITE_S)
+
+    def _request(self, method: str, path: str, note: str, **request: Any) -> Reply:
+        self._log(">", f"{method} {note}")
+        given = {key: value for key, value in request.items() if value is not None}
+        try:
+            with self._client.stream(method, path, **given) as answer:
+                body = self._body(answer)
+        except self._httpx.TransportError as error:
+            sentence = _transport_sentence(error, self.address, self._httpx)
+            self._log("#", sentence)
+            reached = not isinstance(error, self._httpx.ConnectError | self._httpx.ConnectTimeout)
+            raise (NoAnswerError if reached else ServerError)(sentence) from None
+        except UnicodeError as error:  # idna's errors are of this kind, here and above
+            raise ServerError(f"server address {self.name!r} names no host: {plain(str(error)).lower()}") from None
+        except (self._httpx.InvalidURL, self._httpx.DecodingError) as error:
+            raise ServerError(f"what answers at {self.address.url} speaks no proper HTTP: {plain(str(error))}") from None
+        except RuntimeError:
+            if not self._client.is_closed:
+                raise
+            raise ServerError(f"{self.name}: the session is over") from None
+        reply = Reply(answer.status_code, body, path, answer.headers.get("location", ""))
+        self._log("<", f"{reply.status} {self.words(reply)}")
+        return reply
+
+    def _body(self, answer: httpx.Response) -> bytes:
+        """All of an answer, which is small from every such server. Raises ServerError."""
+        body, until_s = b"", time.monotonic() + WHOLE_S
+        for piece in answer.iter_bytes():
+            body += piece
+            if time.monotonic() > until_s:
+                raise NoAnswerError(f"{self.name} does not come to the end of its answer: it is no print server")
+            if len(body) > MOST_BYTES:
+                raise ServerError(f"{self.name} answers with more than {MOST_BYTES // 1_000_000} MB: it is no print server")
+        return body
+
+    def _log(self, direction: str, text: str) -> None:
+        with self._log_lock:
+            self._tell(direction, f"{self._without_key(text)}\n".encode())
+
+    def _without_key(self, text: str) -> str:
+        key = self.credentials.key
+        return text.replace(key, "***") if key else text
+
+    def check(self, reply: Reply, purpose: str, refusals: Mapping[int, str] | None = None) -> Any:
+        """The value of a good reply. Raises ServerError; purpose: what was wanted, as `starting the print`; refusals: what a
+        status means to this request, where that is not what it usually means.
+        """
+        status, address = reply.status, self.address
+        if 200 <= status < 300:
+            return reply.json()
+        words = self.words(reply)
+        if refusals and status in refusals:
+            raise ServerError(refusals[status].format(words=words or f"status {status}"))
+        if 300 <= status < 400:  # behind a question mark a Duet's password may be repeated
+            where = plain(self._without_key(reply.location.partition("?")[0])) or "nowhere"
+            raise ServerError(f"{self.name} redirects to {where}: give that server's address, no key is carried there")
+        if status in self.key_refused:
+            known = bool(self.credentials.key)
+            refused = f"refuses the key or what its user may do ({words or status})" if known else "wants a key"
+            raise ServerError(f"{self.name} {refused}: {how_to_give_a_key(address)}")
+        if status == 404:
+            raise ServerError(f"{address.url} is no {NAMES[address.kind].removeprefix('a ')}: it knows no {reply.path}")
+        if status in (413, 507):
+            raise ServerError(f"{self.name} has no room for it ({words or status}): delete files there")
+        raise ServerError(f"{self.name} refuses {purpose}: {words or f'status {status}'}")
+
+    def words(self, reply: Reply) -> str:
+        """A server's own words on what it refuses, short and without the key; "" when it has none."""
+        value = reply.json()
+        error = value.get("error", value.get("message")) if isinstance(value, dict) else None
+        if isinstance(error, dict):
+            error = error.get("message")
+        if isinstance(value, str):
+            error = value
+        if error is None and not reply.body.lstrip().startswith(b"<"):  # a page says nothing in a line
+            error = reply.body[: 4 * WORDS].decode("utf-8", "replace")
+        return plain(self._without_key(str(error or "")))
+
+
+def fetch_picture(url: str) -> tuple[bytes, str]:
+    """A picture and its type. Raises ServerError where nothing, or no picture, is there."""
+    import httpx
+
+    try:
+        with httpx.stream("GET", url, timeout=CONNECT_S, trust_env=False, follow_redirects=False) as answer:
+            kind, body = answer.headers.get("content-type", "").partition(";")[0].strip().lower(), b""
+            if answer.status_code != 200 or kind not in PICTURES:
+                raise ServerError(f"the camera gives no picture: status {answer.status_code}, {plain(kind) or 'of no type'}")
+            for piece in answer.iter_bytes():
+                body += piece
+                if len(body) > MOST_PICTURE:
+                    raise ServerError(f"the camera gives more than {MOST_PICTURE // 1_000_000} MB: it is no picture")
+    except (httpx.HTTPError, httpx.InvalidURL, UnicodeError, OSError) as error:
+        raise ServerError(f"the camera does not answer: {plain(str(error)).lower()}") from None
+    return body, kind
+
+
+def plain(text: str) -> str:
+    """Words of a server as part of one line: nothing in them can act on a terminal."""
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return line if len(line) <= WORDS else line[: WORDS - 3] + "..."
+
+
+def _shown(path: str, params: Mapping[str, str] | None) -> str:
+    return path + ("?" + "&".join(f"{key}={value}" for key, value in params.items()) if params else "")
+
+
+def _certificates(address: ServerAddress, credentials: Credentials) -> ssl.SSLContext:
+    if address.scheme == "http":
+        return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trusts nobody, and need not: there is no TLS on this way
+    try:
+        return ssl.create_default_context(cafile=credentials.ca_file)
+    except OSError as error:  # ssl.SSLError is one
+        raise ServerError(
+            f"ca_file {credentials.ca_file} for {address.text} holds no certificates: {error.strerror or error}"
+        ) from None
+
+
+def _transport_sentence(error: httpx.TransportError, address: ServerAddress, httpx_: Any) -> str:
+    """What went wrong below HTTP, and what to look at."""
+    where, chain = f"{address.host} at port {address.port}", causes(error)
+    if any(isinstance(cause, socket.gaierror) for cause in chain):
+        return f"{address.text}: no computer of the name {address.host} is known here: an IP address will do, too"
+    if trust := next((cause for cause in chain if isinstance(cause, ssl.SSLCertVerificationError)), None):
+        return (
+            f"{address.text}: its certificate cannot be trusted ({plain(trust.verify_message)}): for one of your own name "
+            f'its authority as ca_file below [servers."{address.host}"] in {servers_file()}'
+        )
+    if any(isinstance(cause, ssl.SSLError) for cause in chain):
+        return f"{address.text}: {where} speaks no TLS: is it http:// instead of https://?"
+    if any(isinstance(cause, ConnectionRefusedError) for cause in chain):
+        return f"{address.text}: nothing listens on {where}: is {NAMES[address.kind]} switched on and the port right?"
+    if isinstance(error, httpx_.ConnectTimeout):
+        doubt = ", and does it speak TLS" if address.scheme == "https" else ""
+        return f"{address.text}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{doubt}?"
+    if isinstance(error, httpx_.ConnectError):
+        return f"{address.text}: {where} cannot be reached: {_reason(error)}"
+    if isinstance(error, httpx_.TimeoutException):
+        return f"{address.text}: {where} has stopped answering"
+    if isinstance(error, httpx_.RemoteProtocolError):
+        return f"{address.text}: what answers on {where} breaks off or speaks no HTTP ({_reason(error)})"
+    return f"{address.text}: the connection to {where} broke off ({_reason(error)})"
+
+
+def _reason(error: Exception) -> str:
+    return ERRNO.sub("", plain(str(error)).lower()) or type(error).__name__

@@ -1,0 +1,170 @@
+"""Moonraker's HTTP API (moonraker.readthedocs.io/en/latest/external_api, read in the sources of 0.11), which drives Klipper.
+
+A wrong key is 401; 403 of an upload is a file that is being printed. Klipper works on orders one after the other: a pause or a
+cancellation waits for the command under way, a heating included, and is answered when it is done (docs/API_Server.md); the
+emergency stop is not.
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from machine.printing.servers.answers import entry, number, table, temperature, whole
+from machine.printing.servers.gcode_upload import GcodeUpload, Sent
+from machine.printing.servers.http import HttpSession
+from machine.printing.servers.server import JobStatus, Phase, PrintServer, ServerIdentity
+from machine.printing.servers.webcam import picture_address
+from profiles.errors import ServerError
+
+READ_S = 300.0  # the server reads a whole file for its metadata before it answers
+ORDERED_S = 120.0
+STEPPER = "manual_stepper "
+STATES = {
+    "standby": Phase.READY,
+    "printing": Phase.PRINTING,
+    "paused": Phase.PAUSED,
+    "complete": Phase.DONE,
+    "cancelled": Phase.CANCELLED,
+    "error": Phase.FAILED,
+}
+REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed", "gcode_move")
+
+
+class Moonraker(PrintServer):
+    """PrintServer of a Moonraker."""
+
+    key_header = "X-Api-Key"
+
+    def __init__(self, http: HttpSession) -> None:
+        super().__init__(http)
+        http.key_refused = (401,)
+
+    def greet(self) -> ServerIdentity:
+        """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
+        server = table(self._get("/server/info"))
+        if "klippy_state" not in server:
+            raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
+        text = f"Moonraker {server.get('moonraker_version') or ''}".strip()
+        if server["klippy_state"] != "ready":
+            return ServerIdentity(text, "Klipper")
+        version = str(table(self._get("/printer/info")).get("software_version") or "")
+        objects = table(self._get("/printer/objects/list")).get("objects")
+        names = frozenset(name for name in objects if isinstance(name, str)) if isinstance(objects, list) else frozenset()
+        steppers = frozenset(name.removeprefix(STEPPER) for name in names if name.startswith(STEPPER))
+        limits = self._limits() if "toolhead" in names else {}
+        commands = self._commands() if "gcode" in names else None
+        klipper = f"Klipper {version}".strip()
+        return ServerIdentity(f"{text}, {klipper}", klipper, "XYZ", limits, steppers, commands)
+
+    def _commands(self) -> frozenset[str] | None:
+        """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""
+        commands = table(self._query(("gcode",)).get("gcode")).get("commands")
+        return frozenset(name.upper() for name in commands) if isinstance(commands, dict) else None
+
+    def _limits(self) -> dict[str, tuple[float, float]]:
+        toolhead = table(self._query(("toolhead",)).get("toolhead"))
+        pairs = ((number(entry(toolhead.get(f"axis_{end}"), k)) for end in ("minimum", "maximum")) for k in range(3))
+        limits = zip("XYZ", (tuple(pair) for pair in pairs), strict=True)
+        return {letter: (low, high) for letter, (low, high) in limits if low is not None and high is not None}
+
+    def webcam(self) -> str:
+        reply = self._http.get("/server/webcams/list")
+        cameras = table(table(reply.json()).get("result")).get("webcams") if reply.status == 200 else None
+        told = (table(camera) for camera in cameras) if isinstance(cameras, list) else ()
+        pictures = (
+            picture_address(camera.get("snapshot_url"), self._http.address) for camera in told if camera.get("enabled", True)
+        )
+        return next(filter(None, pictures), "")
+
+    def status(self) -> JobStatus:
+        """From the objects that Klipper reports; where it does not run, from what Moonraker says of it."""
+        server = table(self._get("/server/info"))
+        if server.get("klippy_state") != "ready":
+            return JobStatus(Phase.OFFLINE, message=self._trouble(server))
+        objects = self._query(REPORTED)
+        job, card, moves = (table(objects.get(name)) for name in ("print_stats", "virtual_sdcard", "gcode_move"))
+        feed, flow = number(moves.get("speed_factor")), number(moves.get("extrude_factor"))
+        return JobStatus(
+            STATES.get(str(job.get("state")), Phase.READY),
+            str(job.get("filename") or ""),
+            whole(card.get("file_position")),
+            number(job.get("total_duration")),
+            temperature(objects.get("extruder"), objects.get("heater_bed"), "temperature", "target"),
+            None if feed is None else 100.0 * feed,
+            None if flow is None else 100.0 * flow,
+            str(job.get("message") or ""),
+            number(card.get("progress")),
+        )
+
+    def _trouble(self, server: Mapping[str, Any]) -> str:
+        """Why Klipper cannot print."""
+        if not server.get("klippy_connected"):
+            return "Klipper does not run there"
+        words = table(self._http.get("/printer/info").json()).get("result")
+        return f"Klipper is in the state {server.get('klippy_state')}: {table(words).get('state_message') or 'no reason given'}"
+
+    def has(self, file: str) -> bool:
+        """Whether it holds a file of this name, by what lies in its folder.
+
+        /server/files/metadata answers 404 for a file that it has not scanned (file_manager.py, _handle_metadata_request).
+        """
+        reply = self._http.get("/server/files/directory", {"path": "gcodes"})
+        files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
+        return any(table(item).get("filename") == file for item in files) if isinstance(files, list) else False
+
+    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+        """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
+        fields, file = {"root": "gcodes", "checksum": upload.sha256}, upload.read_by(sent)
+        reply = self._http.upload_form("/server/files/upload", fields, upload.name, file, answer_s=READ_S)
+        sentences = {
+            400: f"{self.name} does not take the file: {{words}}; it takes files up to max_upload_size of its [server]",
+            403: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})",
+            422: f"{self.name} has received another file than was sent ({{words}}): send it again",
+        }
+        value = table(self._http.check(reply, "the file", sentences))
+        path = table(value.get("item")).get("path")
+        if not isinstance(path, str):
+            raise ServerError(f"{self.name} has not said that it holds the file: send it again")
+        return path
+
+    def start(self, file: str) -> None:
+        sentence = {400: f"{self.name} cannot start it now: {{words}}"}
+        self._order("/printer/print/start", {"filename": file}, sentence)
+
+    def pause(self) -> None:
+        self._order("/printer/print/pause")
+
+    def resume(self) -> None:
+        self._order("/printer/print/resume")
+
+    def cancel(self) -> None:
+        """End it: Klipper's CANCEL_PRINT macro says what that means."""
+        self._order("/printer/print/cancel")
+
+    def command(self, line: str) -> None:
+        """Have a line of G-code executed, after the one under way."""
+        self._order("/printer/gcode/script", {"script": line})
+
+    def settings(self) -> str:
+        """Its Klipper's configuration and version (docs/Status_Reference.md, configfile)."""
+        version = str(table(self._get("/printer/info")).get("software_version") or "")
+        return json.dumps({"software_version": version, **self._query(("configfile",))})
+
+    def emergency_stop(self) -> None:
+        """Klipper shuts down at once."""
+        self._value(self._http.post("/printer/emergency_stop"), "the emergency stop")
+
+    def _query(self, names: tuple[str, ...]) -> Mapping[str, Any]:
+        reply = self._http.post("/printer/objects/query", {"objects": dict.fromkeys(names)})
+        return table(table(table(self._value(reply, "to tell of its printer")).get("result")).get("status"))
+
+    def _get(self, path: str) -> Any:
+        return table(self._value(self._http.get(path), "to say who it is")).get("result")
+
+    def _order(self, path: str, value: Mapping[str, Any] | None = None, sentences: Mapping[int, str] | None = None) -> None:
+        reply = self._http.post(path, value, answer_s=ORDERED_S)
+        self._http.check(reply, f"{path.rpartition('/')[2]}", sentences)
+
+    def _value(self, reply: Any, purpose: str) -> Any:
+        sentence = {503: f"{self.name} has lost its Klipper: {{words}}"}
+        return self._http.check(reply, purpose, sentence)

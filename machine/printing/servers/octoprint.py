@@ -1,0 +1,114 @@
+"""OctoPrint's REST API (docs.octoprint.org/en/master/api, read in octoprint/server/api of 1.11.8).
+
+Any refusal for want of a key is 403. The file is kept under temporary names until it is whole. `printing` among the flags of
+/api/printer is true in all the phases of a print, so the others are asked first.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from machine.printing.servers.answers import number, table, temperature, whole
+from machine.printing.servers.gcode_upload import GcodeUpload, Sent
+from machine.printing.servers.server import JobStatus, Phase, PrintServer, ServerIdentity
+from machine.printing.servers.webcam import picture_address
+from profiles.errors import ServerError
+
+STORED_S = 120.0  # the server copies and reads a file before it answers
+FLAGS = (
+    ("cancelling", Phase.CANCELLING),
+    ("pausing", Phase.PAUSING),
+    ("resuming", Phase.RESUMING),
+    ("finishing", Phase.FINISHING),
+    ("paused", Phase.PAUSED),
+    ("printing", Phase.PRINTING),
+)
+
+
+class OctoPrint(PrintServer):
+    """PrintServer of an OctoPrint."""
+
+    key_header = "X-Api-Key"
+
+    def greet(self) -> ServerIdentity:
+        """Its version; what it drives is not told by the API."""
+        value = self._get("/api/version", "to say who it is")
+        text = value.get("text") if isinstance(value, dict) else None
+        if not isinstance(text, str) or not text.startswith("OctoPrint"):
+            raise ServerError(f"{self.name} is no OctoPrint: it does not answer /api/version as one")
+        if "moonraker" in text.lower():
+            raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
+        return ServerIdentity(text)
+
+    def webcam(self) -> str:
+        reply = self._http.get("/api/settings")  # some keys may not read them
+        settings = table(reply.json()) if reply.status == 200 else {}
+        return picture_address(table(settings.get("webcam")).get("snapshotUrl"), self._http.address)
+
+    def status(self) -> JobStatus:
+        """From /api/job, and from /api/printer where its printer is connected."""
+        job = table(self._get("/api/job", "to tell of its print"))
+        progress, file = table(job.get("progress")), table(table(job.get("job")).get("file"))
+        reply = self._http.get("/api/printer", {"exclude": "sd"})
+        printer = {} if reply.status == 409 else table(self._http.check(reply, "to tell of its printer"))
+        heaters, done = table(printer.get("temperature")), number(progress.get("completion"))
+        return JobStatus(
+            _phase(table(table(printer.get("state")).get("flags")), progress),
+            str(file.get("path") or ""),
+            whole(progress.get("filepos")),
+            number(progress.get("printTime")),
+            temperature(heaters.get("tool0"), heaters.get("bed"), "actual", "target"),
+            message=str(job.get("error") or ("" if printer else f"its printer is not connected ({job.get('state')})")),
+            share=None if done is None else done / 100.0,
+        )
+
+    def has(self, file: str) -> bool:
+        reply = self._http.get(f"/api/files/local/{file}")
+        return reply.status != 404 and self._http.check(reply, "to tell of its files") is not None
+
+    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+        """Hand over a file; the name is the one that the server has made of it."""
+        reply = self._http.upload_form("/api/files/local", {}, upload.name, upload.read_by(sent), answer_s=STORED_S)
+        sentence = {409: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})"}
+        value = table(self._http.check(reply, "the file", sentence))
+        local = table(table(value.get("files")).get("local"))
+        if not value.get("done") or not isinstance(local.get("path"), str):
+            raise ServerError(f"{self.name} has not said that it holds the whole file: send it again")
+        return str(local["path"])
+
+    def start(self, file: str) -> None:
+        sentence = {409: f"{self.name} cannot start it now: {{words}}"}
+        self._order(f"/api/files/local/{file}", {"command": "select", "print": True}, "to start it", sentence)
+
+    def pause(self) -> None:
+        self._order("/api/job", {"command": "pause", "action": "pause"}, "to pause")
+
+    def resume(self) -> None:
+        self._order("/api/job", {"command": "pause", "action": "resume"}, "to resume")
+
+    def cancel(self) -> None:
+        """End it: OctoPrint's own script for it switches heaters off."""
+        self._order("/api/job", {"command": "cancel"}, "to cancel")
+
+    def command(self, line: str) -> None:
+        self._order("/api/printer/command", {"command": line}, f"{line}")
+
+    def emergency_stop(self) -> None:
+        """M112, which OctoPrint sends ahead of its queue."""
+        self.command("M112")
+
+    def _get(self, path: str, purpose: str) -> Any:
+        return self._http.check(self._http.get(path), purpose)
+
+    def _order(self, path: str, value: Mapping[str, Any], purpose: str, refused: Mapping[int, str] | None = None) -> None:
+        sentences = refused or {409: f"{self.name} refuses {purpose}: {{words}}"}
+        self._http.check(self._http.post(path, value), purpose, sentences)
+
+
+def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> Phase:
+    if not flags.get("operational"):
+        return Phase.OFFLINE
+    for flag, phase in FLAGS:
+        if flags.get(flag):
+            return phase
+    done = number(progress.get("completion"))
+    return Phase.DONE if done is not None and done >= 100.0 else Phase.READY

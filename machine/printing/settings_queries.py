@@ -1,0 +1,109 @@
+"""Settings queries: what a printer at a port or behind a print server tells of its settings, as the text that is read from.
+
+Only questions are asked: nothing moves, nothing heats. A printer that prints is left alone.
+"""
+
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack
+from math import inf
+from time import monotonic
+
+from machine.firmware import identify
+from machine.link.identification import GRBL_SAYS, Kind, ask_at_any_rate
+from machine.link.port import Port, open_port
+from machine.pipeline.requests import SIMULATED
+from machine.printing.compatibility import check_answer
+from machine.printing.server_checks import check_idle
+from machine.printing.servers.address import is_server_address
+from machine.printing.servers.duet import SETTINGS_ARRAYS, SETTINGS_KEYS
+from machine.printing.servers.servers import open_server
+from machine.setup.detect.found import ConfigText
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import PrinterError, SilenceError
+from profiles.machine import Machine
+
+ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
+OK = re.compile(r"ok\b.*")
+QUIET_S = 0.25  # what still comes of the questions before is over
+# Answers Marlin's M27 while it prints a file of its own (sd/cardreader.cpp), RepRapFirmware's object model, and grblHAL.
+WORK = "processing|simulating|pausing|paused|resuming|cancelling|busy|changingTool"
+AT_WORK = re.compile(rf'.*(?:SD printing byte|"state\.status".*"result":"(?:{WORK})").*')
+CUT = re.compile(r'"next":([1-9]\d*)\}$')
+MOST_PAGES = 16
+QUESTIONS = {
+    "Marlin": ("M27", "M115", "M503", "M203", "M211"),
+    "RepRapFirmware": tuple(f'M409 K"{key}" F"d99vn"' for key in ("state.status", *SETTINGS_ARRAYS, *SETTINGS_KEYS)),
+    "grblHAL": ("$I", "$$"),
+}
+OTHERWISE = {
+    "Klipper": "Klipper tells its settings over the network, to --port moonraker:HOST, and in its file printer.cfg",
+}
+
+
+def text_of_port(port: str, baud: int, simulated: Machine) -> ConfigText:
+    """What answers at a port; simulated: the machine behind the port sim. Raises PrinterError."""
+    if is_server_address(port):
+        return _text_of_server(port)
+    with ExitStack() as stack:
+        path = stack.enter_context(SimulatedPrinter(simulated, inf)).path if port == SIMULATED else port
+        wire = stack.enter_context(open_port(path, baud))
+        return ConfigText(port, _conversation(wire, baud))
+
+
+def _conversation(wire: Port, baud: int) -> str:
+    answer, rate = ask_at_any_rate(wire, baud)
+    if answer.kind is Kind.STRANGER and rate == baud and GRBL_SAYS.fullmatch(answer.words):
+        name = "grblHAL"
+    else:
+        check_answer(answer, wire.name, baud, rate)
+        firmware = identify(answer.words)
+        name = firmware.name if firmware is not None else ""
+    if name not in QUESTIONS:
+        words, known = answer.firmware or "of no firmware that it names", ", ".join(QUESTIONS)
+        unknown = f"the printer at {wire.name} is {words}, whose settings cannot be asked for over a port: those of {known} can"
+        raise PrinterError(OTHERWISE.get(name, unknown))
+    _hear_out(wire)
+    return "\n".join(line for question in QUESTIONS[name] for line in _pages(wire, question))
+
+
+def _hear_out(wire: Port) -> None:
+    """Read what still comes, so that no answer is taken for that of the next question."""
+    quiet_s, end_s = monotonic() + QUIET_S, monotonic() + ANSWER_S
+    while (now_s := monotonic()) < min(quiet_s, end_s):
+        if wire.read():
+            quiet_s = now_s + QUIET_S
+
+
+def _pages(wire: Port, question: str) -> Iterator[str]:
+    """The lines of an answer, and of those to the same question behind where an array of RepRapFirmware's model was cut."""
+    for _ in range(MOST_PAGES):
+        answer = list(_ask(wire, question))
+        yield from answer
+        if not (cut := CUT.search(answer[-1] if answer else "")):
+            return
+        question = f'{question.partition(" F")[0]} F"d99vna{cut[1]}"'
+
+
+def _ask(wire: Port, question: str) -> Iterator[str]:
+    """The lines of an answer until its ok. Raises SilenceError."""
+    wire.write(f"{question}\n".encode("ascii"))
+    half, end_s = b"", monotonic() + ANSWER_S
+    while monotonic() < end_s:
+        *lines, half = (half + wire.read()).replace(b"\r", b"\n").split(b"\n")
+        for line in lines:
+            text = line.decode("utf-8", "replace").strip()
+            if OK.fullmatch(text):
+                return
+            if AT_WORK.fullmatch(text) or GRBL_SAYS.fullmatch(text):
+                raise PrinterError(f"the printer at {wire.name} is at work ({text[:80]}): ask it when that is done")
+            if text:
+                yield text
+    raise SilenceError(f"the printer at {wire.name} does not answer {question} within {ANSWER_S:g} s: try it again")
+
+
+def _text_of_server(port: str) -> ConfigText:
+    with open_server(port) as server:
+        server.greet()
+        check_idle(server.name, server.status())
+        return ConfigText(port, server.settings())

@@ -1,0 +1,94 @@
+"""Pads: the parts of a printed calibration piece that lie on its roofs, each laid there at a pose of its own.
+
+How a pad lies tells how far the axes are from where the program took them to be: it should be laid at a place of the workpiece,
+and was laid where the true machine had its tip then. The roof below it was laid at the level pose.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pose_runs
+from machine.kinematics.table import machine_points, workpiece_path, workpiece_points
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose, rotation, unit
+from profiles.errors import ProfileError
+from profiles.machine import Machine
+
+PADS = 4
+LEAST_LEAN_DEG = 10.0
+EVEN_DEG = 1.0
+WAYS = ("right", "up", "height")  # seen from outside, the pad's holes above
+
+
+@dataclass(frozen=True, eq=False)
+class Pad:
+    """A pad by its number (that of its holes), the pose at which it was laid, the middle of its underside, and what is right, up
+    and away from its roof: (3, 3) unit vectors, all in the workpiece frame."""
+
+    number: int
+    pose: Pose
+    middle_mm: Floats
+    ways: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A printed piece: the machine that its program was made for, the pose of its roofs, its pads in order."""
+
+    machine: Machine
+    base: Pose
+    pads: tuple[Pad, ...]
+
+    def laid_aside_mm(self, true: Machine) -> Floats:
+        """(pads, 3) how far each pad lies from its place on its roof along its `ways`, where a machine is truly another one."""
+        errors = [self._error_mm(true, pad, pad.pose) - self._error_mm(true, pad, self.base) for pad in self.pads]
+        return np.array([pad.ways @ error for pad, error in zip(self.pads, errors, strict=True)])
+
+    def _error_mm(self, true: Machine, pad: Pad, pose: Pose) -> Floats:
+        told = machine_points(self.machine, pose, pad.middle_mm[None])
+        error: Floats = workpiece_points(true, pose, told)[0] - pad.middle_mm
+        return error
+
+
+def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
+    """The piece of a program that was made for a machine. Raises ProfileError for a program of anything else."""
+    poses, middles = _laid(program, machine)
+    if sorted(poses) != list(range(1, PADS + 2)):
+        raise ProfileError(f"{name} prints {len(poses)} parts: a program of demo:calibration has {PADS + 1}")
+    pads = tuple(_pad(part - 1, poses[part], middles[part], machine) for part in range(2, PADS + 2))
+    heading = [np.degrees(np.arctan2(pad.ways[2, 1], pad.ways[2, 0])) for pad in pads]
+    quarters = np.diff(heading) % 360.0
+    level = float(rotation(machine, poses[1])[2] @ UP)
+    if level < np.cos(np.radians(EVEN_DEG)) or (np.abs(quarters - 90.0) > EVEN_DEG).any() or not _alike(pads):
+        raise ProfileError(f"{name} is no program of demo:calibration: its parts lie otherwise")
+    return Piece(machine, poses[1], pads)
+
+
+def _alike(pads: Sequence[Pad]) -> bool:
+    """Whether all pads lean by the same, enough to be those of a piece."""
+    leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
+    return bool(leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG)
+
+
+def _laid(program: ParsedProgram, machine: Machine) -> tuple[dict[int, Pose], dict[int, Floats]]:
+    """By part the pose of its beads, and the middle of the lowest of them."""
+    poses: dict[int, Pose] = {}
+    middles: dict[int, Floats] = {}
+    parts = program.part
+    for run, pose in pose_runs(program):
+        rows = run.start + np.flatnonzero(program.kind[run] == MoveKind.EXTRUDE)
+        for part in np.unique(parts[rows]).tolist():
+            own = rows[parts[rows] == part]
+            lowest = own[program.end[own, 2] <= program.end[own, 2].min() + 1e-3]
+            if part > 0 and poses.setdefault(part, pose) == pose and part not in middles:
+                points = workpiece_path(machine, program.end[lowest])
+                middles[part] = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return poses, middles
+
+
+def _pad(number: int, pose: Pose, middle_mm: Floats, machine: Machine) -> Pad:
+    away = rotation(machine, pose)[2]
+    right = unit(np.cross(UP, away)) if abs(away @ UP) < 1.0 - 1e-6 else np.array([1.0, 0.0, 0.0])
+    return Pad(number, pose, middle_mm, np.array([right, np.cross(away, right), away]))

@@ -1,0 +1,282 @@
+"""Measure: the ball's centre at pose after pose, each planned with what the poses before have told."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import asin, degrees
+from typing import Protocol
+
+import numpy as np
+
+from machine.kinematics.table import machine_points
+from machine.setup.calibration.fit import Touch, estimate
+from machine.setup.calibration.probing.ball import Ball, ball_centre, contact_heights
+from machine.setup.calibration.probing.clear import find_in_the_way
+from machine.setup.calibration.program import TILTS_DEG, safe_z_mm, turns_deg
+from mdp.mesh import Floats
+from mdp.pose import Pose, level
+from profiles.errors import MoveError, PrinterError
+from profiles.frozen import Vector
+from profiles.machine import Machine
+
+FAR_MM = 6.0  # a contact so far from where it is expected is of something else
+LIFT_MM = 2.0  # over the last contact, from where the next one is sought
+AT_ONCE_MM = 0.05  # a contact so near to where it was sought from is none
+AGREE_MM, MOST_TIMES = 0.03, 4  # how well two contacts at one place must agree, and the most contacts
+NEAR, WIDE = 0.2, 0.5  # of the ball's radius: how far around its middle it is sought, and measured
+DROP = 1.0 - (1.0 - WIDE**2) ** 0.5  # by which the ball is lower there than at its top
+CENTRED = 0.1  # of the radius: a centre so near to where it was expected is measured well
+STEP = 0.3  # of the radius: how far the ball may be moved while a sign is unknown
+SMALL = 0.2  # sine of the greatest such tilt
+ROUGHLY = 3  # touches, with which others are not yet expected well
+TELLING_MM = 0.5  # by which the better sign must be nearer
+AROUND = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+
+
+class Prober(Protocol):
+    """A machine that moves, and senses what the tip, or the probe beside it, meets from above. Raises PrinterError."""
+
+    def turn(self, pose: Pose) -> None:
+        """Turn the table, the head standing still."""
+
+    def rise(self, z_mm: float) -> None:
+        """Bring the tip to a height; also downwards, where nothing is."""
+
+    def cross(self, x_mm: float, y_mm: float) -> None:
+        """Bring the tip over a place, its height unchanged."""
+
+    def seek(self, low_mm: float) -> float | None:
+        """Bring the tip down, slowly, until contact: the tip's Z then; None when there was none down to a height."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """offset_mm: from the nozzle's tip to what touches, 0 where the nozzle senses itself; flat_mm: radius of its flat end."""
+
+    offset_mm: Vector = (0.0, 0.0, 0.0)
+    flat_mm: float = 0.0
+
+    @property
+    def is_nozzle(self) -> bool:
+        """Whether the nozzle's own end touches."""
+        return self.offset_mm[:2] == (0.0, 0.0)
+
+
+@dataclass
+class Measuring:
+    """One measurement. machine: as far as it is known; touches: of the ball's centre so far; tell: is told what is done next."""
+
+    machine: Machine
+    ball: Ball
+    prober: Prober
+    probe: Probe = Probe()
+    tell: Callable[[str], None] = lambda text: None
+    touches: list[Touch] = field(default_factory=list)
+    contacts: int = 0
+    _start: Machine = field(init=False)  # as the profile has it, with the signs that are known
+    _mark: Vector = field(init=False)
+    _above: float = field(init=False, default=0.0)  # height from which contact is sought
+
+    def __post_init__(self) -> None:
+        self._start, self._mark = self.machine, self.ball.centre_mm
+
+    def run(self) -> list[Touch]:
+        """All touches. Raises MoveError where no pose can be measured, PrinterError where probing has failed."""
+        home, turns = level(self.machine), turns_deg(self.machine)
+        self._first(home)
+        self._tell_sign("turn", self._small_turn(home), np.array(self.touches[0].at_mm))
+        across = Pose(home.tilt_deg, self._across_tilt(home))
+        before = next((touch for touch in self.touches if touch.pose == across), None) or self._touch(across)
+        self._tell_sign("tilt", self._small_tilt(before), np.array(before.at_mm))
+        met = [touch.pose for touch in self.touches]
+        for pose in (Pose(home.tilt_deg, turn_deg) for turn_deg in turns):
+            if pose not in met:
+                self._touch(pose)
+        for tilt_deg in self._tilts():
+            for pose in (Pose(tilt_deg, turn_deg) for turn_deg in turns):
+                if obstacle := self._find_in_the_way(self.machine, pose):  # better known by now than when the tilt was chosen
+                    self.tell(f"{self._name(pose)} is left out: {obstacle}")
+                else:
+                    self._touch(pose)
+        self._rise(home)
+        self.prober.turn(home)
+        return self.touches
+
+    def _first(self, home: Pose) -> None:
+        """The level table: where the ball really stands."""
+        self._check(home, (self.machine,))
+        self._add(home, self._visit(home, self._expected(home), NEAR))
+
+    def _tell_sign(self, axis: str, pose: Pose, before: Floats) -> None:
+        """A small step of one axis from where the ball was before, and the sign that explains it."""
+        given: Machine = self._start
+        letter = getattr(given, axis).letter
+        turned = [given.model_copy(update={axis: getattr(given, axis).model_copy(update={"sign": sign})}) for sign in (1, -1)]
+        machines = [estimate(machine, self.touches, self._mark) for machine in turned]
+        self._check(pose, [machine for machine, _ in machines])
+        seen = self._visit(pose, before, NEAR)
+        places = [machine_points(machine, pose, np.array([mark]))[0] for machine, mark in machines]
+        off = [float(np.linalg.norm(place - seen)) for place in places]
+        if abs(off[0] - off[1]) < TELLING_MM:
+            raise PrinterError(
+                f"a small step of {letter} does not tell its sign, the ball has moved by {np.linalg.norm(seen - before):.2f} mm: "
+                "does the axis turn, and does the ball stand away from it?"
+            )
+        self._start = turned[int(off[1] < off[0])]
+        self._add(pose, seen)
+
+    def _small_turn(self, home: Pose) -> Pose:
+        """So far that the ball is still met where it was, whichever way it goes."""
+        step = degrees(STEP * self.ball.radius_mm / float(np.hypot(*self.ball.centre_mm[:2])))
+        return Pose(home.tilt_deg, home.turn_deg + (step if home.turn_deg + step <= self.machine.turn.reach_deg[1] else -step))
+
+    def _small_tilt(self, before: Touch) -> Pose:
+        home, arm = before.pose, np.array(before.at_mm) - np.array(self.machine.tilt.point_mm)
+        step = degrees(asin(min(SMALL, STEP * self.ball.radius_mm / float(np.linalg.norm(arm)))))
+        above = home.tilt_deg + step <= self.machine.tilt.reach_deg[1]
+        return Pose(home.tilt_deg + (step if above else -step), home.turn_deg)
+
+    def _across_tilt(self, home: Pose) -> float:
+        """The turn at which the ball stands farthest from the tilt axis, so that a tilt lifts or lowers it."""
+        along, point = np.array(self.machine.tilt.axis), np.array(self.machine.tilt.point_mm)
+        arms = {turn: self._expected(Pose(home.tilt_deg, turn)) - point for turn in turns_deg(self.machine)}
+        return max(arms, key=lambda turn: abs(float(np.cross(along, arms[turn])[2])))
+
+    def _tilts(self) -> list[float]:
+        """The steepest tilts that can be measured, one to each side where that is possible, gentler ones before them."""
+        zero = self.machine.tilt.zero_deg
+        steepest = [next((side * t for t in TILTS_DEG if self._reachable(zero + side * t)), None) for side in (1.0, -1.0)]
+        able = [zero + tilt for tilt in steepest if tilt is not None]
+        if not able:
+            raise MoveError(
+                f"no tilt of {TILTS_DEG[-1]:g} deg or more can be measured on {self.machine.name} with a ball whose centre is "
+                f"{self.ball.centre_mm[2]:g} mm high: {self._obstacle(TILTS_DEG[-1])}; a higher post, nearer to the middle, helps"
+            )
+        shares = (0.5, 1.0) if len(able) == 2 else (1.0 / 3.0, 2.0 / 3.0, 1.0)
+        return [zero + share * (tilt - zero) for share in shares for tilt in able]
+
+    def _obstacle(self, tilt_deg: float) -> str:
+        """Why a tilt cannot be measured, the nearest to level to either side."""
+        zero, turns = self.machine.tilt.zero_deg, turns_deg(self.machine)
+        found = [self._find_in_the_way(self.machine, Pose(zero + s * tilt_deg, turn)) for s in (1.0, -1.0) for turn in turns]
+        return next(obstacle for obstacle in found if obstacle)
+
+    def _reachable(self, tilt_deg: float) -> bool:
+        return not any(self._find_in_the_way(self.machine, Pose(tilt_deg, turn)) for turn in turns_deg(self.machine))
+
+    def _find_in_the_way(self, machine: Machine, pose: Pose) -> str | None:
+        """What keeps the ball from being measured at a pose by a machine; None: nothing does."""
+        least, most = machine.tilt.reach_deg
+        if not least <= pose.tilt_deg <= most:
+            return f"{machine.tilt.letter} goes from {least:g} to {most:g}"
+        centre = machine_points(machine, pose, np.array([self.ball.centre_mm]))[0]
+        places = centre[:2] + WIDE * self.ball.radius_mm * AROUND
+        heights = contact_heights(centre, self.ball.radius_mm, self.probe.flat_mm, places)
+        tips = np.column_stack([places, heights]) - self.probe.offset_mm
+        above = np.column_stack([tips[:, :2], np.full(len(tips), self._safe_z(machine, pose))])
+        return find_in_the_way(machine, pose, self.ball, np.vstack([tips, above]), self.probe.is_nozzle)
+
+    def _check(self, pose: Pose, machines: Sequence[Machine]) -> None:
+        """Refuse a pose at which one of the machines that it may be would meet something."""
+        for machine in machines:
+            if obstacle := self._find_in_the_way(machine, pose):
+                raise MoveError(f"the ball cannot be measured at {self._name(pose)}: {obstacle}")
+
+    def _touch(self, pose: Pose) -> Touch:
+        """The ball's centre at a pose where it is expected well enough."""
+        self._check(pose, (self.machine,))
+        return self._add(pose, self._visit(pose, self._expected(pose), WIDE if len(self.touches) > ROUGHLY else NEAR))
+
+    def _add(self, pose: Pose, centre: Floats) -> Touch:
+        x, y, z = centre.tolist()
+        self.touches.append(Touch(pose, (x, y, z)))
+        self.machine, mark = estimate(self._start, self.touches, self._mark)
+        self.ball = replace(self.ball, centre_mm=mark)
+        self.tell(f"{len(self.touches)}: {self._name(pose)}, the ball's centre at X{x:.3f} Y{y:.3f} Z{z:.3f}")
+        return self.touches[-1]
+
+    def _name(self, pose: Pose) -> str:
+        return f"{self.machine.tilt.letter}{pose.tilt_deg:.4g} {self.machine.turn.letter}{pose.turn_deg:.4g}"
+
+    def _expected(self, pose: Pose) -> Floats:
+        """(3,) X Y Z of the ball's centre."""
+        place: Floats = machine_points(self.machine, pose, np.array([self.ball.centre_mm]))[0]
+        return place
+
+    def _visit(self, pose: Pose, expected: Floats, share: float) -> Floats:
+        """(3,) the ball's centre at a pose, gone to by way of a height over everything that turns."""
+        self._rise(pose)
+        self.prober.turn(pose)
+        self.prober.cross(*(expected[:2] - self.probe.offset_mm[:2]))
+        return self._centre(pose, expected, share)
+
+    def _rise(self, pose: Pose) -> None:
+        self.prober.rise(self._safe_z(self._start, pose))
+
+    def _safe_z(self, machine: Machine, pose: Pose) -> float:
+        """Tip's Z over all that turns, from where the table stands to a pose, whichever way the axes go."""
+        x, y, z = self.ball.centre_mm
+        mark = (float(np.hypot(x, y)) + self.ball.radius_mm, 0.0, z + self.ball.radius_mm)
+        tilts = [pose.tilt_deg, *(touch.pose.tilt_deg for touch in self.touches[-1:])]
+        tilt_deg = max(abs(value - machine.tilt.zero_deg) for value in tilts)
+        return safe_z_mm(machine, mark, tilt_deg) + max(0.0, -self.probe.offset_mm[2])
+
+    def _centre(self, pose: Pose, expected: Floats, share: float) -> Floats:
+        """The ball's centre, sought around where it is expected, then measured around where it is."""
+        radius, flat = self.ball.radius_mm, self.probe.flat_mm
+        centre, top = expected, expected[2] + radius + FAR_MM - LIFT_MM
+        for _ in range(MOST_TIMES):
+            exact = share == WIDE
+            contacts = []
+            places = centre[:2] + share * radius * AROUND
+            for place, height in zip(places, contact_heights(centre, radius, flat, places).tolist(), strict=True):
+                contacts.append(self._contact(pose, place, height, float(top) + LIFT_MM, exact))
+                if exact:  # the ball's top is no farther above a contact than this, wherever its middle is
+                    top = max(centre[2] + radius, max(z for _, _, z in contacts) + DROP * radius)
+            before, centre = centre, ball_centre(np.array(contacts), radius, flat, seek_flat=exact)
+            near = float(np.hypot(*(centre - before)[:2])) <= CENTRED * radius
+            if near and exact:
+                return centre
+            share = WIDE if near else share
+        raise PrinterError(f"at {self._name(pose)} the ball's centre is not found: it comes to lie elsewhere each time")
+
+    def _contact(self, pose: Pose, place: Floats, expected: float, above_mm: float, exact: bool) -> Floats:
+        """(3,) where something is met at a place, expected at a height, from another above; exact: two contacts must agree."""
+        self._above = above_mm
+        self.prober.rise(self._tip_z(self._above))
+        self.prober.cross(*(place - self.probe.offset_mm[:2]))
+        heights: list[float] = []
+        while len(heights) < MOST_TIMES:
+            heights.append(self._seek(pose, expected))
+            self._above = min(max(heights[-1], expected) + LIFT_MM, above_mm)
+            self.prober.rise(self._tip_z(self._above))
+            if not exact:
+                return np.array([*place, heights[-1]])
+            for low, high in pairwise(sorted(heights)):
+                if high - low <= AGREE_MM:
+                    return np.array([*place, 0.5 * (low + high)])
+        apart = min(high - low for low, high in pairwise(sorted(heights)))
+        raise PrinterError(
+            f"at {self._name(pose)} {MOST_TIMES} contacts at one place lie {apart:.3f} mm apart and more, {AGREE_MM:g} mm is "
+            "allowed: is the ball firm, the nozzle clean and the probe reliable?"
+        )
+
+    def _seek(self, pose: Pose, expected: float) -> float:
+        """Height of one contact; refuses what cannot be the ball."""
+        name, low = self._name(pose), self._tip_z(expected - FAR_MM)
+        self.contacts += 1
+        met = self.prober.seek(low)
+        near = f"contact is expected near Z{self._tip_z(expected):.1f}"
+        if met is None:
+            raise PrinterError(f"at {name} the probe met nothing down to Z{low:.1f}, {near}: does it sense, is the ball there?")
+        height = met + self.probe.offset_mm[2]
+        if height > self._above - AT_ONCE_MM:
+            raise PrinterError(
+                f"at {name} the probe triggered at once, at Z{met:.1f}, {near}: is it deployed and its signal right?"
+            )
+        if abs(height - expected) > FAR_MM:
+            raise PrinterError(f"at {name} the probe met something at Z{met:.1f}, {near}: is the ball where it should be?")
+        return height
+
+    def _tip_z(self, height: float) -> float:
+        return float(height) - self.probe.offset_mm[2]

@@ -1,0 +1,195 @@
+"""Plate: where the bars of a coupon stand, and the parts that they are printed in.
+
+The jointed bars lean outwards on a ring, by turns low and high. Part 1 is what lies below all joints, with the bars in one piece,
+level. Then the table tilts by a bar's lean and turns it upright; the bar is printed on along its axis: one part a bar, the low
+ones first. Nothing may stand above the base plane of a part, which decides how much higher the high ones are.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from math import cos, degrees, pi, radians, sin, sqrt
+
+import manifold3d as m3
+import numpy as np
+
+from machine.setup.coupon.bars import Shape, bar, least_height_mm, stand
+from machine.setup.coupon.design import JOINTS, KINDS
+from mdp.clearance import allowed_poses, find_obstacle
+from mdp.cut import Solid, cut, mesh_of
+from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, Part
+from mdp.mesh import Floats
+from mdp.plane import PLATFORM, Plane
+from mdp.pose import least_rotation, level, poses, rotation, shift
+from profiles.errors import MoveError
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+LEANS_DEG = (45.0, 40.0, 35.0, 30.0, 25.0, 20.0)
+HEIGHTS_MM = (0.0, 4.0, 9.0, 14.0, 19.0)  # over the least at which the lower end of a bar is whole
+RISES_MM = tuple(float(rise) for rise in range(31))
+GAP_MM = 3.0  # between bars, and to the plate's edge
+PITCH = 2.0 * pi / JOINTS
+LOW_MM = 1.0  # what of a bar lies lower stands on the plate
+FLAT = (0.0, 0.0), (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Ring:
+    """How the jointed bars stand: their lean, the heights of the low and of the high joints, and their radii."""
+
+    lean_rad: float
+    heights_mm: tuple[float, float]
+    radii_mm: tuple[float, float]
+
+    def place(self, joint: int) -> tuple[float, float, float]:
+        """Turn (radians), radius and height of a joint, counted from 0 in print order: the low ones first."""
+        high, of_level = divmod(joint, JOINTS // 2)
+        return PITCH * (2 * of_level + high + 0.5), self.radii_mm[high], self.heights_mm[high]
+
+    def base(self, joint: int) -> Plane:
+        """The plane of a joint, its normal the bar's axis."""
+        turn, radius, height = self.place(joint)
+        out, up = sin(self.lean_rad), cos(self.lean_rad)
+        return Plane(np.array([out * cos(turn), out * sin(turn), up]), out * radius + up * height)
+
+
+def coupon(shape: Shape, profile: Profile) -> Decomposition:
+    """The plate's bars in parts. Raises MoveError for a machine that cannot print them, saying what stands in the way."""
+    machine = profile.machine
+    if not machine.tilts:
+        raise MoveError(f"{machine.name} has three axes: the joints of a coupon are made on a table that tilts")
+    ring, whole = _ring(shape, profile), _in_one_piece(shape)
+    bars = [_jointed(shape, ring, joint) for joint in range(JOINTS)]
+    tops, stubs = zip(*(cut(jointed, ring.base(joint)) for joint, jointed in enumerate(bars)), strict=True)
+    pieces = [mesh_of(m3.Manifold.compose([*stubs, *whole])), *(mesh_of(top) for top in tops)]
+    bases = [PLATFORM, *(ring.base(joint) for joint in range(JOINTS))]
+    options = [allowed_poses(machine, base.normal, mesh.vertices) for base, mesh in zip(bases, pieces, strict=True)]
+    chosen = least_rotation(machine, [[level(machine)], *options[1:]])
+    parts = tuple(
+        Part(k + 1, mesh, base, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
+        for k, (mesh, base, pose) in enumerate(zip(pieces, bases, chosen, strict=True))
+    )
+    model = mesh_of(m3.Manifold.compose([*bars, *whole]))
+    return Decomposition(f"coupon of {shape.name} bars", model, parts, 1, "none", 0.0, 0.0, 0, 0, 0.0)
+
+
+def _jointed(shape: Shape, ring: Ring, joint: int) -> Solid:
+    """A jointed bar as a whole."""
+    turn, radius, height = ring.place(joint)
+    return stand(bar(shape, ring.lean_rad, height, joint + 1), shape, turn, radius)
+
+
+def _in_one_piece(shape: Shape) -> list[Solid]:
+    """Two bars upright beside the plate's middle, two lying along X before and behind them."""
+    height = least_height_mm(shape, 0.0)
+    upright = [stand(bar(shape, 0.0, height, JOINTS + k), shape, 0.0, 0.0) for k in (1, 2)]
+    lying = [bar(shape, 0.0, height, JOINTS + k, True).rotate((0.0, 0.0, -90.0)) for k in (3, 4)]
+    (wide, deep), across = _size(upright[0]), _size(lying[0])[1]
+    beside, before = 0.5 * (wide + GAP_MM), 0.5 * (deep + across) + GAP_MM
+    places = ((-beside, 0.0), (beside, 0.0), (0.0, -before), (0.0, before))
+    return [_centred(solid).translate((x, y, 0.0)) for solid, (x, y) in zip([*upright, *lying], places, strict=True)]
+
+
+def _size(solid: Solid) -> tuple[float, float]:
+    x0, y0, _, x1, y1, _ = solid.bounding_box()
+    return x1 - x0, y1 - y0
+
+
+def _centred(solid: Solid) -> Solid:
+    x0, y0, _, x1, y1, _ = solid.bounding_box()
+    return solid.translate((-0.5 * (x0 + x1), -0.5 * (y0 + y1), 0.0))
+
+
+def _ring(shape: Shape, profile: Profile) -> Ring:
+    """The steepest lean, then the lowest joints, at which table, head and bars let each other be. Raises MoveError with what
+    stands in the way of the one that comes nearest to it."""
+    machine = profile.machine
+    leans = [lean for lean in LEANS_DEG if lean <= profile.process.self_supporting_angle_deg]
+    if not leans:
+        allowed = f"at least {LEANS_DEG[-1]:g} deg, by which bars lean, is allowed"
+        raise MoveError(f"process.self_supporting_angle_deg is {profile.process.self_supporting_angle_deg:g}: {allowed}")
+    reached = [lean for lean in leans if all(poses(machine, Ring(radians(lean), *FLAT).base(k).normal) for k in range(JOINTS))]
+    if not reached:
+        raise MoveError(
+            f"{machine.name} cannot tilt its table by {LEANS_DEG[-1]:g} deg towards all sides: the joints of a coupon are made so"
+        )
+    nearest: tuple[int, str] = (0, "")
+    whole, halves = _in_one_piece(shape), cache(partial(_halves, shape))
+    for lean_deg in reached:
+        for ring in _rings(shape, radians(lean_deg), machine):
+            problem = _problem(shape, ring, whole, halves, machine)
+            if problem is None:
+                return ring
+            nearest = max(problem, nearest, key=lambda told: told[0])  # of the last ones, which lean least
+    raise MoveError(f"no coupon of {shape.name} bars can be printed on {machine.name}: {nearest[1]}")
+
+
+def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
+    """Rings as far out as the plate and the level table's X and Y allow, low and narrow ones first."""
+    table = machine.table
+    edge = (table.radius_mm if table.size_mm is None else 0.5 * min(table.size_mm)) - GAP_MM
+    middle = shift(machine, level(machine))
+    reach = min(abs(limit - middle[k]) for k, axis in enumerate((machine.x, machine.y)) for limit in axis.limits_mm)
+    farthest = float(reach) - 0.5 * shape.depth_mm * cos(lean_rad)
+
+    @cache
+    def radius(height: float) -> float:
+        _, _, z0, x1, _, z1 = bar(shape, lean_rad, height).trim_by_plane((0.0, -1.0, 0.0), -LOW_MM).bounding_box()
+        return min(farthest, sqrt(max(0.0, edge**2 - (0.5 * (z1 - z0)) ** 2)) - float(x1))
+
+    for low in (least_height_mm(shape, lean_rad) + more for more in HEIGHTS_MM):
+        for rise in RISES_MM:
+            yield Ring(lean_rad, (low, low + rise), (radius(low), radius(low + rise)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Halves:
+    """A bar whose joint stands over the plate's middle and that leans along x: the corners (n, 3) of what lies above its joint
+    and below, and the outline of the latter, a gap around it."""
+
+    top: Floats
+    stub: Floats
+    around: m3.CrossSection
+
+
+def _halves(shape: Shape, lean_rad: float, height_mm: float) -> _Halves:
+    base = Plane(np.array([sin(lean_rad), 0.0, cos(lean_rad)]), height_mm * cos(lean_rad))
+    top, stub = cut(stand(bar(shape, lean_rad, height_mm), shape, 0.0, 0.0), base)
+    return _Halves(mesh_of(top).vertices, mesh_of(stub).vertices, _around(stub))
+
+
+def _around(solid: Solid) -> m3.CrossSection:
+    return solid.project().offset(0.5 * GAP_MM - 1e-3, m3.JoinType.Miter)
+
+
+def _problem(
+    shape: Shape, ring: Ring, whole: Sequence[Solid], halves: Callable[[float, float], _Halves], machine: Machine
+) -> tuple[int, str] | None:
+    """What stands in the way of a ring, and how near it comes to being printed; None: nothing."""
+    places = [ring.place(joint) for joint in range(JOINTS)]
+    bars = [halves(ring.lean_rad, height) for _, _, height in places]
+    around = [each.around.translate((r, 0.0)).rotate(degrees(turn)) for each, (turn, r, _) in zip(bars, places, strict=True)]
+    around += [_around(solid) for solid in whole]
+    if sum(area.area() for area in around) > m3.CrossSection.batch_boolean(around, m3.OpType.Add).area() + 0.01:
+        return 1, f"its plate, {machine.table.radius_mm:g} mm in radius, has no room for {len(KINDS)} bars side by side"
+    stubs = [_turned(each.stub, turn, r) for each, (turn, r, _) in zip(bars, places, strict=True)]
+    below = np.vstack([*stubs, *(mesh_of(solid).vertices for solid in whole)])
+    obstacle = find_obstacle(machine, level(machine), below)
+    if obstacle is not None:
+        return 1, obstacle
+    for joint, (each, (turn, r, _)) in enumerate(zip(bars, places, strict=True)):
+        base, vertices = ring.base(joint), _turned(each.top, turn, r)
+        if float(base.heights_mm(below).max()) > ORDER_TOLERANCE_MM:
+            return 2, f"bars {shape.above_mm:g} mm long above their joints would stand in the head's way on so small a plate"
+        if not allowed_poses(machine, base.normal, vertices):
+            pose = poses(machine, base.normal)[0]
+            return 3, find_obstacle(machine, pose, vertices) or ""
+        below = np.vstack([below, vertices])
+    return None
+
+
+def _turned(corners: Floats, turn_rad: float, radius_mm: float) -> Floats:
+    """Corners (n, 3) moved out along x, then turned about z."""
+    x, y = corners[:, 0] + radius_mm, corners[:, 1]
+    return np.column_stack([x * cos(turn_rad) - y * sin(turn_rad), x * sin(turn_rad) + y * cos(turn_rad), corners[:, 2]])

@@ -1,0 +1,129 @@
+"""Marlin: the answers to M115, M503 and M211, as a saved log has them or as they came.
+
+gcode/config/M200-M205.cpp, gcode/control/M211.cpp and module/settings.cpp of Marlin 2.1: M203 gives units/s, M201 and M204
+units/s2, under the letters of AXIS4_NAME and so on; in inches after G20. M205 gives jerk by axis, or J, the junction deviation.
+M211 gives the software end stops in mm. M115 has capabilities, and the reach of the axes in a build with M115_GEOMETRY_REPORT,
+the fourth axis and those after it as i, j, k (gcode/host/M115.cpp).
+"""
+
+import re
+
+from machine.gcode.words import NUMBER
+from machine.link.identification import KEY, VERSION
+from machine.link.protocol.events import AREA, NAME, REACH
+from machine.setup.detect.found import (
+    ABC,
+    ACCELERATION,
+    LIMITS,
+    PRINTING,
+    SPEED,
+    AxisReadings,
+    ConfigText,
+    Found,
+    Reading,
+    corner_speed,
+    limits,
+)
+from profiles.errors import ProfileError
+
+REPORT = re.compile(  # behind echo: and what a host's log adds; a command and nothing but its words, so no sentence about it
+    rf"(?:^|[:>])[ \t]*(M92|M20[0-5]|M211|M851|G20)((?:[ \t]+[A-Z]{NUMBER})*)[ \t]*(?:[;(#].*)?$", re.MULTILINE
+)
+WORD = re.compile(rf"([A-Z])({NUMBER})")
+SOFT_LIMITS = re.compile(r"Min:(.*?)Max:(.*)")
+PLACE = re.compile(rf"([A-Z])[: ]*({NUMBER})")
+CAPABILITY = re.compile(r"Cap:(\w+):1")
+KEYS = {"M203": SPEED, "M201": ACCELERATION}
+OF_FILAMENT = {"extruder_speed_mm_s": SPEED, "extruder_acceleration_mm_s2": ACCELERATION}
+
+
+def recognise(text: str) -> bool:
+    """Whether a text is such a log."""
+    reports = {command for command, words in REPORT.findall(text) if words}
+    return {"M92", "M203"} <= reports and ("echo:" in text or "M205" in reports)
+
+
+def read(config: ConfigText) -> Found:
+    """What a log says. Raises ProfileError."""
+    words = _words(config)
+    axes = _axes(config, words)
+    capabilities = set(CAPABILITY.findall(config.text))
+    settings, remarks = _corner(words), []
+    if words.get("M200", {}).get("S", 0.0) > 0.0:
+        remarks.append("the printer counts filament in mm3 (M200 S1): its speed is left as it is")
+    else:
+        filament = axes.get("E", {})
+        settings |= {key: filament[word] for key, word in OF_FILAMENT.items() if word in filament}
+    if "ARCS" in capabilities:
+        settings["arcs"] = Reading(True, "Cap:ARCS of M115")
+    others = [letter for letter in axes if letter not in (*PRINTING, "E")]
+    doubtful = {letter: f"{config.name}: M203 does not say whether {letter} turns" for letter in others if letter not in ABC}
+    rotary = "".join(letter for letter in others if letter in ABC)
+    firmware, name = _identity(config.text)
+    probe = "a Z probe" if "M851" in words or "Z_PROBE" in capabilities else ""
+    return Found(firmware, "marlin", axes, rotary, doubtful, settings, name=name, probe=probe, remarks=remarks)
+
+
+def _words(config: ConfigText) -> dict[str, dict[str, float]]:
+    """Command -> its letters; of several extruders the first."""
+    words: dict[str, dict[str, float]] = {}
+    for command, rest in REPORT.findall(config.text):
+        if command == "G20":
+            raise ProfileError(f"{config.name}: the printer tells inches (G20): send it G21 first, then it tells mm")
+        letters = {letter: float(number) for letter, number in WORD.findall(rest)}
+        if letters.get("T", 0.0) == 0.0 or command not in KEYS:
+            words[command] = words.get(command, {}) | letters
+    return words
+
+
+def _axes(config: ConfigText, words: dict[str, dict[str, float]]) -> dict[str, AxisReadings]:
+    axes: dict[str, AxisReadings] = {letter: {} for letter in words.get("M203", {}) if letter != "T"}
+    for command, key in KEYS.items():
+        for letter, value in words.get(command, {}).items():
+            if letter in axes:
+                axes[letter][key] = Reading(value, command)
+    for letter, (low, high, source) in (_area(config.text, axes) | _soft_limits(config.text)).items():
+        if letter in axes:
+            axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, source)
+    return axes
+
+
+def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
+    """The answer to M211: `Min:  X0.00 Y0.00 Z0.00   Max:  X200.00 ...`."""
+    line = SOFT_LIMITS.search(text)
+    if line is None:
+        return {}
+    least, most = ({letter: float(number) for letter, number in PLACE.findall(side)} for side in line.groups())
+    return {letter: (low, most[letter], "M211") for letter, low in least.items() if letter in most}
+
+
+def _area(text: str, letters: dict[str, AxisReadings]) -> dict[str, tuple[float, float, str]]:
+    """The answer to M115, whose axes are in the order of M203."""
+    area = AREA.search(text)
+    if area is None:
+        return {}
+    least, most = ([float(number) for _, number in REACH.findall(side)] for side in area.groups())
+    named = [letter for letter in letters if letter != "E"]
+    return {letter: (low, high, "M115, area") for letter, low, high in zip(named, least, most, strict=False)}
+
+
+def _corner(words: dict[str, dict[str, float]]) -> dict[str, Reading]:
+    """The lesser jerk of X and Y, or the speed that a junction deviation gives at the acceleration of printing moves."""
+    told = words.get("M205", {})
+    jerks = [told[letter] for letter in "XY" if letter in told]
+    if jerks:
+        return {"junction_speed_mm_s": Reading(min(jerks), "M205")}
+    printing = words.get("M204", {}).get("P", 0.0)
+    if told.get("J", 0.0) <= 0.0 or printing <= 0.0:
+        return {}
+    source = f"M205 J{told['J']:g}, at the {printing:g} mm/s2 of M204 P"
+    return {"junction_speed_mm_s": Reading(corner_speed(told["J"], printing), source)}
+
+
+def _identity(text: str) -> tuple[str, str]:
+    """The firmware with its version, and the name of the machine."""
+    line = next((line for line in text.splitlines() if NAME in line), "")
+    words = line[line.index(NAME) + len(NAME) :].strip() if line else ""
+    version, machine = VERSION.search(line), re.search(r"MACHINE_TYPE:(.*?)\s+[A-Z_]+:", line)
+    firmware = KEY.split(words)[0] or "Marlin"
+    return (f"{firmware} {version[1]}" if version else firmware), (machine[1] if machine else "")

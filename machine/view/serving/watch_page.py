@@ -1,0 +1,150 @@
+"""Watch page: the page and the state of a running print, served to this computer alone while the print lasts.
+
+Its buttons ask of the print what keys in the terminal do. Who is answered: see `machine.view.serving.guard`.
+"""
+
+import json
+import secrets
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Any
+
+from machine.cli.terminal.progress import say
+from machine.link.pending_commands import Command, Control
+from machine.link.progress import Progress
+from machine.pipeline.programs import LoadedProgram
+from machine.view.page import print_page
+from machine.view.serving.browser import lead_browser
+from machine.view.serving.guard import HOST, UNKNOWN, Guard
+from profiles.errors import OutputError, reason
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp
+
+LAST_WORD_S = 2.0  # a page that is open asks twice in this time, so it sees how the print ended
+GRACE_S = 1  # for answers under way when the print ends
+TOLD = ("acknowledged", "total", "share", "elapsed_s", "left_s", "part", "layer", "message", "warning")
+FRAMED = {"Content-Security-Policy": "frame-ancestors 'none'"}
+ORDERS = {
+    "pause": Command.PAUSE,
+    "resume": Command.RESUME,
+    "stop": Command.CANCEL,
+    "emergency": Command.EMERGENCY_STOP,
+}
+
+
+def state_of(progress: Progress | None, state: str = "") -> dict[str, Any]:
+    """What the page asks for; progress: None before the first. state: how it ended, else what the progress says."""
+    if progress is None:
+        return {"state": state or "waiting"}
+    return {
+        "state": state or progress.state,
+        "line": progress.file_line,
+        **{key: getattr(progress, key) for key in TOLD},
+        **asdict(progress.temperature),
+        "heat_is_old": bool(state) or progress.heat_is_old,
+    }
+
+
+class Watched:
+    """A running print as it is told to those who watch. follow() from the thread that prints, state() from any."""
+
+    def __init__(self, page: bytes = b"") -> None:
+        self.page = page
+        self.address = ""
+        self.token = secrets.token_urlsafe(16)
+        self._progress: Progress | None = None
+        self._ended = ""
+        self._asked, self._end_reported = Event(), Event()
+
+    def follow(self, progress: Progress) -> None:
+        """Take note of where the print stands."""
+        self._progress = progress
+
+    def state(self) -> bytes:
+        """The state as JSON."""
+        self._asked.set()
+        if self._ended:
+            self._end_reported.set()
+        return json.dumps(state_of(self._progress, self._ended)).encode()
+
+    def end(self, state: str) -> None:
+        """Say once how the print ended, and wait a moment for those who have asked before to hear it."""
+        self._ended = self._ended or state
+        if self._asked.is_set():
+            self._end_reported.wait(LAST_WORD_S)
+
+
+@contextmanager
+def serve_watch_page(job: LoadedProgram, port: int | None, control: Control, browser: bool = True) -> Iterator[Watched]:
+    """Serve the page of a print on a port of this computer, 0: on any free one; None: nobody watches. control: of the print,
+    asked by the page's buttons; browser: open it there. Raises OutputError."""
+    if port is None:
+        yield Watched()
+        return
+    page = print_page(job.name, job.program, job.profile, live=True)
+    with serve(page, port, control) as watched, ExitStack() as until_end:
+        say(f"watch the print at {watched.address}")
+        if browser:
+            lead_browser(watched.address, until_end)
+        yield watched
+
+
+@contextmanager
+def serve(page: bytes, port: int = 0, control: Control | None = None) -> Iterator[Watched]:
+    """Serve the page on a port of this computer, 0: any free one, until the block ends. control: of the print; None: nothing can
+    be asked of it. Raises OutputError for a port in use."""
+    from uvicorn import Config, Server
+
+    watched = Watched(page)
+    try:
+        own = socket.create_server((HOST, port))
+    except OSError as error:
+        raise OutputError(f"--watch-port {port} cannot be used: {reason(error)}") from None
+    there = own.getsockname()[1]
+    watched.address = f"http://{HOST}:{there}/{watched.token}/"
+    guarded = Guard(_application(watched, control), watched.token, there)
+    config = Config(guarded, log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=GRACE_S)
+    server = Server(config)
+    thread = Thread(target=server.run, args=([own],), daemon=True)
+    thread.start()
+    try:
+        yield watched
+    except BaseException:
+        watched.end("stopped")
+        raise
+    else:
+        watched.end("done")
+    finally:
+        server.should_exit = True
+        thread.join()
+        own.close()
+
+
+def _application(watched: Watched, control: Control | None) -> "ASGIApp":
+    """The page, the state and what may be asked of the print, below the token."""
+    from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import Response
+    from starlette.routing import Route
+
+    async def page(request: Request) -> Response:
+        return Response(watched.page, 200, FRAMED, "text/html")
+
+    async def state(request: Request) -> Response:
+        return Response(watched.state(), 200, FRAMED, "application/json")
+
+    async def order(request: Request) -> Response:
+        command = ORDERS.get(request.path_params["name"])
+        if command is None or control is None:
+            return Response(UNKNOWN, 404)
+        control.ask(command)
+        return Response(status_code=204)
+
+    asked = [] if control is None else [Route("/{token}/order/{name}", order, methods=["POST"])]
+    app = Starlette(routes=[Route("/{token}/", page), Route("/{token}/state", state), *asked])
+    app.router.redirect_slashes = False
+    return app

@@ -1,0 +1,203 @@
+"""Settings: the profile as a page shows it, by the meanings and ranges of its own models, and what a person changes."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from machine.gcode.blocks import block_problems, block_values
+from machine.pipeline.requests import Given
+from machine.workbench.bench.part_settings import own_values
+from profiles.errors import ProfileError
+from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
+from profiles.machine import GCODE
+from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
+from profiles.places import KINDS, OF_KIND, known
+from profiles.profile import SECTIONS, Profile, load, with_part_settings
+from profiles.toml_text import read_value, rows_text, value_text
+
+BLOCKS_OF = "machine.gcode."
+ORDER = ("process", "material", "search", "machine")  # what is changed most comes first
+BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
+
+
+USUAL = Given()
+
+
+def with_setting(given: Given, key: str, value: str | None) -> Given:
+    """The same with another value for a key, spelled in one line; None: as the profile has it."""
+    others = tuple(setting for setting in given.settings if setting.partition("=")[0].strip() != key)
+    return replace(given, settings=others if value is None else (*others, f"{key}={_in_one_line(value)}"))
+
+
+def with_given(given: Given, inside: Given) -> Given:
+    """The same with another material and further settings, which replace those of the same keys."""
+    keys = {setting.partition("=")[0].strip() for setting in inside.settings}
+    others = (setting for setting in given.settings if setting.partition("=")[0].strip() not in keys)
+    return replace(given, material=inside.material, settings=(*others, *inside.settings))
+
+
+def with_typed(given: Given, key: str, value: str | None, before: Profile) -> Given:
+    """The same for what a person types: what the profile has without it is no change. Raises ProfileError."""
+    changed, unchanged = (with_setting(given, key, new) for new in (value, None))
+    typed = profile_as_given(changed, before)
+    try:
+        return unchanged if typed == profile_as_given(unchanged, before) else changed
+    except ProfileError:  # what is typed mends the profile
+        return changed
+
+
+def _in_one_line(value: str) -> str:
+    """A value as it is best typed at a terminal: text without quotation marks where it is text without them, too."""
+    meant = read_value(value.strip())
+    if isinstance(meant, str):
+        plain = "\n" not in meant and meant == meant.strip() and read_value(meant) == meant
+        return meant if plain else value_text(meant)
+    return value_text(meant) if "\n" in value else value.strip()
+
+
+def without_settings(given: Given, kind: str | None) -> Given:
+    """The same with none of what is set for a machine, a material or a process; None: for all three. Raises ProfileError."""
+    if kind is not None and kind not in KINDS:
+        raise ProfileError(f"{kind!r} is no profile: {', '.join(KINDS)} are known")
+    gone = given.settings if kind is None else settings_of(given, kind)
+    return replace(given, settings=tuple(setting for setting in given.settings if setting not in gone))
+
+
+def settings_of(given: Given, kind: str) -> list[str]:
+    """Those of a machine, a material or a process alone."""
+    return [setting for setting in given.settings if setting.partition(".")[0].strip() in OF_KIND[kind]]
+
+
+def with_name(given: Given, kind: str, name: str) -> Given:
+    """The same with another machine, material or process. Raises ProfileError for one that is not known."""
+    if kind not in KINDS or name not in known(kind):
+        allowed = ", ".join(known(kind)) if kind in KINDS else ", ".join(KINDS)
+        raise ProfileError(f"{name!r} is no {kind if kind in KINDS else 'profile'}: {allowed} are known")
+    return named(given, kind, name)
+
+
+def named(given: Given, kind: str, name: str) -> Given:
+    """The same with another machine, material or process, by its name or its file."""
+    change: dict[str, Any] = {kind: name}
+    return replace(given, **change)
+
+
+def profile_as_given(given: Given, before: Profile) -> Profile:
+    """The profile, with the settings of single parts that the one before had. Raises ProfileError."""
+    profile = load(given.machine, given.material, given.process, given.settings)
+    return with_part_settings(profile, before.parts)
+
+
+def check_block(profile: Profile, key: str) -> None:
+    """Raises ProfileError where the key is that of a G-code block that cannot be written, or of a dialect not the blocks'."""
+    blocks = [key.removeprefix(BLOCKS_OF)] if key.startswith(BLOCKS_OF) else []
+    problems = block_problems(profile, *blocks) if blocks or key == "machine.dialect" else []
+    if problems:
+        raise ProfileError("; ".join(problems))
+
+
+def allowed_keys(part: int) -> set[str]:
+    """The keys of the process that a part may have of its own."""
+    return set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
+
+
+def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[str, Any]]:
+    """Every key in its group (a matter, or a table of a machine): its label, level, unit, meaning, kind, range or choices, value,
+    whether a person has changed it, and then what the profile has. part: of this part alone, what it may have of its own; 0: of
+    all."""
+    if part == 0:
+        changed = {setting.partition("=")[0].strip() for setting in given.settings}
+        unchanged = {row["key"]: row["value"] for row in _all_rows(_unchanged(given))} if changed else {}
+        return [
+            {
+                **row,
+                "changed": row["key"] in changed,
+                "unchanged": unchanged.get(row["key"]) if row["key"] in changed else None,
+                "placeholders": _placeholders(row["key"], profile),
+            }
+            for row in _all_rows(profile)
+        ]
+    own, allowed = own_values(profile, part), allowed_keys(part)
+    rows, of_all = (_process_rows(sliced) for sliced in (profile.of_part(part), profile))
+    return [
+        {**row, "changed": name in own, "unchanged": of_all[name]["value"] if name in own else None}
+        for name, row in rows.items()
+        if name in allowed
+    ]
+
+
+def _unchanged(given: Given) -> Profile | None:
+    """The profiles as they are named; None where they are right only with what is set."""
+    try:
+        return load(given.machine, given.material, given.process)
+    except ProfileError:
+        return None
+
+
+def _all_rows(profile: Profile | None) -> Iterator[dict[str, Any]]:
+    for section in ORDER if profile is not None else ():
+        yield from _rows(section, SECTIONS[section], getattr(profile, section).model_dump(mode="json"))
+
+
+def _process_rows(profile: Profile) -> dict[str, dict[str, Any]]:
+    rows = _rows("process", SECTIONS["process"], profile.process.model_dump(mode="json"))
+    return {row["key"].removeprefix("process."): row for row in rows}
+
+
+def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str = "", about: str = "") -> Iterator[dict[str, Any]]:
+    """group, about: of the table that the model is, "" for the section itself, whose keys are in groups by their matters."""
+    schema = _schema(model)
+    for name, field in model.model_fields.items():
+        table = field.annotation
+        if isinstance(table, type) and issubclass(table, Frozen):
+            yield from _rows(f"{prefix}.{name}", table, values[name], f"{prefix}.{name}", field.description or _sentence(table))
+            continue
+        matter = next(kind for kind in reversed(model.__mro__) if issubclass(kind, Frozen) and name in kind.model_fields)
+        own = f"{prefix}: {matter.__name__.lower()}" if matter is not model else prefix
+        assert isinstance(field.json_schema_extra, dict)
+        yield {
+            "key": f"{prefix}.{name}",
+            "label": field.title,
+            **field.json_schema_extra,
+            "unit": unit_of(name),
+            "group": group or own,
+            "title": TITLES[group or own],
+            "about": about or _sentence(matter),
+            "meaning": field.description or "",
+            "optional": may_be_left_out(field.annotation),
+            **_kind(schema[name], values[name]),
+        }
+
+
+@cache
+def _schema(model: type[Frozen]) -> dict[str, Any]:
+    """What pydantic says of every key: it works that out anew each time, which takes longer than all the rest."""
+    properties: dict[str, Any] = model.model_json_schema()["properties"]
+    return properties
+
+
+def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
+    """How a page has a value typed or chosen. kind: `number`, `integer`, `boolean`, `choice`; `numbers`: several with commas
+    between; `text`: a line of it; `block`: lines of G-code; `rows`: a list or a table as TOML."""
+    way = next(way for way in schema.get("anyOf", [schema]) if way.get("type") != "null")
+    kind = "choice" if "enum" in way else str(way.get("type"))
+    numbers = kind == "array" and all(item.get("type") in ("number", "integer") for item in way.get("prefixItems", [{}]))
+    if kind == "string":
+        kind = "block" if way.get("format") == GCODE else "text"
+    elif numbers:
+        kind, value = "numbers", None if value is None else ", ".join(f"{number:.12g}" for number in value)
+    elif kind in ("array", "object"):
+        kind, value = "rows", rows_text(value)
+    least, most = (next((way[word] for word in words if word in way), None) for words in BOUNDS)
+    return {"kind": kind, "least": least, "most": most, "choices": way.get("enum", []), "value": value}
+
+
+def _placeholders(key: str, profile: Profile) -> list[str]:
+    """What a G-code block may name in braces; of any other key nothing."""
+    return list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
+
+
+def _sentence(model: type[Frozen]) -> str:
+    """The first sentence of what a table says of itself."""
+    return (model.__doc__ or "").strip().partition("\n\n")[0].replace("\n    ", " ").rstrip(".")

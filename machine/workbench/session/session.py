@@ -1,0 +1,401 @@
+"""Session: one bench, and the work under way for it."""
+
+import asyncio
+import shutil
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from weakref import finalize
+
+from machine.pipeline.file_settings import settings_inside
+from machine.pipeline.given_plan import with_plan_settings
+from machine.pipeline.project import Project, unpack
+from machine.pipeline.requests import Given
+from machine.workbench.bench.bench import (
+    Bench,
+    with_cuts,
+    with_model,
+    with_model_turned_as_read,
+    with_plan,
+    with_profile,
+    with_rotation,
+    with_rows,
+    with_scaled_model,
+)
+from machine.workbench.bench.effect import Effect, effect_of_change
+from machine.workbench.bench.model import Model
+from machine.workbench.bench.settings import check_block, profile_as_given, with_given, with_typed
+from machine.workbench.session.base import LONGEST_SENTENCE, SessionBase, asking
+from machine.workbench.session.comparing import Comparing
+from machine.workbench.session.finding import Finding
+from machine.workbench.session.keeping import Keeping
+from machine.workbench.session.marking import Marking
+from machine.workbench.session.pricing import Pricing
+from machine.workbench.session.readiness import Readiness
+from machine.workbench.session.slicing import Slicing
+from machine.workbench.session.standing import StandingModel
+from machine.workbench.session.trials import PlaneTrials
+from machine.workbench.work.kept_work import new_folder
+from machine.workbench.work.models import Resting, Unscaled
+from machine.workbench.work.received import NAMES_KEPT, files_in
+from machine.workbench.work.worker_pool import WorkerPools
+from mdp.model_file import locate, plan_beside
+from mdp.pose import turned_by
+from mdp.read import MANY_FACES
+from mdp.search.plan_file import PlanFile, planned_parts
+from mdp.search.plan_reading import read_plan
+from mdp.zone import NO_ZONES
+from profiles.errors import MeshError, PlanError
+from profiles.profile import Profile
+
+READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a model is read
+
+
+@dataclass(frozen=True)
+class OpenBench:
+    """What the pages of all benches are told of each: its number, its model's name, how many parts that is cut into (0: not yet),
+    and the work under way in a word."""
+
+    number: int
+    name: str
+    parts: int
+    work: str
+
+
+@dataclass(frozen=True)
+class OfUnknownUnit:
+    """A model that waits for the word what its coordinates are in: the page that wanted it, its file and name, and the units that
+    may be, each with what it is scaled by then."""
+
+    page: str
+    path: Path
+    name: str
+    units: dict[str, float]
+
+
+class _UnscaledError(MeshError):
+    """The model on the bench, or that comes there, has a size that no printer makes."""
+
+    def __init__(self, unscaled: Unscaled) -> None:
+        super().__init__(unscaled.sentence)
+        self.unscaled = unscaled
+
+
+class Session(SessionBase):
+    """A bench with all work on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
+    this one too; unscaled: the model that waits for its unit; settings_note: key of a model, and the note on those taken from
+    its file."""
+
+    def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
+        super().__init__(Bench(profile, given=given), pools)
+        self.slicing, self.readiness = Slicing(self), Readiness(self)
+        self.trials = PlaneTrials(self, self.readiness)
+        self.finding = Finding(self)
+        self.comparing = Comparing(self, self.slicing)
+        self._pricing, self.standing = Pricing(self), StandingModel(self)
+        self._settling, self._drawing = asyncio.Lock(), asyncio.Lock()
+        self._pieces: tuple[Bench, Path] | None = None  # drawn last
+        self.marking = Marking(self, self.trials)
+        self.keeping = Keeping(self)
+        self._ranking: asyncio.Task[None] | None = None
+        self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
+        self.benches: tuple[OpenBench, ...] = ()
+        self.unscaled: OfUnknownUnit | None = None
+        self.settings_note = ("", "")
+        self._named: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What people have named themselves: models, plans, profiles, and their files."""
+        bench = self.bench
+        profile, given = bench.profile, bench.given
+        of_model = (
+            () if bench.model is None else (bench.model.name, bench.model.name.removeprefix("demo:"), str(bench.model.path))
+        )
+        of_profile = (profile.machine.name, profile.material.name, profile.process.name)
+        return (*of_model, *of_profile, given.machine, given.material, given.process, *self.received.names, *self._named)
+
+    def hear_name(self, name: str) -> None:
+        """Something is asked for by a name, which messages may repeat."""
+        if name not in self._named and len(name) <= LONGEST_SENTENCE:
+            self._named = (*self._named, name)[-NAMES_KEPT:]
+
+    async def close(self) -> str:
+        """End all work, tell the pages, and keep the last change. Then the files that pages have sent go; where the change could
+        not be kept they stay, and a sentence says why and where, else ""."""
+        self.closed = True
+        for task in self._tasks:
+            task.cancel()
+        for tasks in (self.quick, self.long, self.hand):
+            tasks.close()
+        self.notify()
+        trouble = await self.keeping.finish()
+        if not trouble or not files_in(self.received.path):
+            self.received.remove()
+            return f"the work on a bench could not be kept: {trouble}" if trouble else ""
+        self.received.leave()
+        return f"the work on a bench could not be kept: {trouble}; the files of its pages stay in {self.received.path} for a day"
+
+    def warm(self) -> None:
+        """Load the program's heavy parts while nobody waits."""
+        for tasks in (self.quick, self.hand, self.long):
+            self.start(tasks.warm())
+
+    async def open_model(self, path: Path, name: str, anew: bool = True, plate: int | None = None) -> None:
+        """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it;
+        plate: of a slicer file.
+
+        Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
+        """
+        self.hear_name(name)
+        self.hear_name(str(path))
+        self.readiness.load()
+        if self._ranking is not None and self.bench.model is not None and self.bench.model.faces > MANY_FACES:
+            self._ranking.cancel()  # it would be waited for
+        with self.waiting(f"reading {name}"):
+            gone, model = self._set_for_another(name) if anew else frozenset[str](), None
+            bench = self._bench_without(gone)
+            read_for: tuple[object, ...] = ()
+            while model is None or _reads(bench.profile) != read_for:  # another scale may be set meanwhile
+                read_for = _reads(bench.profile)
+                try:
+                    model = await self._read(path, name, bench.profile, plate)
+                except _UnscaledError as error:
+                    self.unscaled = OfUnknownUnit(asking.get(), path, name, error.unscaled.units)
+                    raise MeshError(error.unscaled.question if asking.get() else error.unscaled.sentence) from None
+                bench = self._bench_without(gone)
+            self.do(f"open {name}", with_model(bench, model))
+        self._begin_ranking(model)
+
+    def _set_for_another(self, name: str) -> frozenset[str]:
+        """What is set for the reading of a model on the bench that has another name."""
+        model, settings = self.bench.model, self.bench.given.settings
+        if model is None or model.name == name:
+            return frozenset()
+        return frozenset(setting for setting in settings if setting.partition("=")[0].strip() in READ_BY)
+
+    def _bench_without(self, gone: frozenset[str]) -> Bench:
+        """The bench without some of its settings."""
+        bench = self.bench
+        if not gone & set(bench.given.settings):
+            return bench
+        given = replace(bench.given, settings=tuple(setting for setting in bench.given.settings if setting not in gone))
+        return with_profile(bench, given, profile_as_given(given, bench.profile))
+
+    async def open_in_unit(self, unit: object) -> None:
+        """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
+        waits, bench = self.unscaled, self.bench
+        if waits is None or not isinstance(unit, str) or unit not in waits.units:
+            raise PlanError(
+                f"unit is {unit!r}: {', '.join(waits.units) if waits else 'nothing, for no model waits for one,'} is allowed"
+            )
+        unscaled = self._bench_without(self._set_for_another(waits.name))
+        given = with_typed(unscaled.given, "process.scale", f"{waits.units[unit]:g}", unscaled.profile)
+        scaled = with_profile(unscaled, given, profile_as_given(given, unscaled.profile))
+        with self.waiting(f"reading {waits.name}"):
+            model = await self._read(waits.path, waits.name, scaled.profile)
+        if self.bench is not bench:
+            raise PlanError(f"open {waits.name}: what lies on the workbench has changed meanwhile, so it was not done")
+        self.unscaled = None
+        self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
+        self._begin_ranking(model)
+
+    async def open_plate(self, plate: object) -> None:
+        """Put another plate of the slicer file on the bench there. Raises UserError."""
+        model = self.bench.model
+        numbers = [] if model is None else list(model.plates)
+        if model is None or not isinstance(plate, int) or isinstance(plate, bool) or plate not in numbers:
+            allowed = f"one of {', '.join(map(str, numbers))} is expected" if numbers else "the model has no plates"
+            raise PlanError(f"plate is {plate!r}: {allowed}")
+        await self.open_model(model.path, model.name, anew=False, plate=plate)
+
+    async def take_settings_inside(self) -> None:
+        """Print by the settings that the slicer file on the bench keeps; what was set before stays where it says nothing.
+
+        Raises UserError.
+        """
+        model = self.bench.model
+        assert model is not None
+        inside, note = await asyncio.to_thread(settings_inside, model.path, model.name)
+        await self.take_given(f"take the settings of {model.name}", lambda given: with_given(given, inside))
+        self.settings_note = model.key, note
+
+    async def open_demo(self, name: str) -> None:
+        """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""
+        if not name.startswith("demo:"):
+            raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
+        await self.open_model(locate(name), name)
+        if (plan := plan_beside(name)) is not None:
+            await self.open_plan(plan)
+
+    async def open_project(
+        self, path: Path, name: str, taken_over: Callable[[Project], Project] = lambda project: project
+    ) -> None:
+        """Put a project file on the bench. taken_over: makes of the project what the bench takes. Raises UserError."""
+        folder = new_folder()
+        try:
+            project = await asyncio.to_thread(unpack, path, folder)
+            await self.open_folder(folder, taken_over(project), f"open {name}")
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+
+    async def open_folder(self, folder: Path, project: Project, word: str) -> None:
+        """Put a project that lies in a folder on the bench, and keep it there from now on.
+
+        Raises UserError; the folder stays as it is then.
+        """
+        async with self.keeping.opening(folder):
+            bench = await self._bench_of(project)
+            self.do(word, bench)
+        if bench.model is not None:
+            self._begin_ranking(bench.model)
+
+    async def _bench_of(self, project: Project) -> Bench:
+        """A bench with a project on it. Raises UserError."""
+        self.hear_name(project.name)
+        self.readiness.load()
+        profile = profile_as_given(project.given, self.bench.profile.of_all_parts)
+        check_block(profile, "")
+        plan = None if project.plan is None else _read_plan(project.plan)
+        with self.waiting(f"reading {project.name}"):
+            path = locate(project.name) if project.model is None else self.received.new_file(project.name)
+            if project.model is not None:
+                await asyncio.to_thread(shutil.copyfile, project.model, path)
+            model = await self._read(path, project.name, profile, project.plate)
+            uncut = with_model(Bench(profile, given=project.given), model)
+            bench = with_rotation(uncut, project.rotation)
+            if plan is not None:
+                marks = NO_ZONES if project.marks_in_plan else bench.zones
+                rows = await self.quick.run("measure_plan", uncut, plan)
+                bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
+                bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
+        bench = bench if project.parts else replace(bench, cuts=None)
+        locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
+        return replace(bench, locked=locked, stops=project.stops, copies=project.copies)
+
+    async def open_plan(self, path: Path) -> None:
+        """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""
+        self.hear_name(str(path))
+        await self.take_plan(_read_plan(path))
+
+    async def take_plan(self, plan: PlanFile) -> None:
+        """The same for a plan that is read already."""
+        self.hear_name(plan.name)
+        self.hear_name(plan.model)
+        with self.waiting(f"cutting by {plan.name}"):
+            bench = None
+            while bench is not self.bench:  # another model or setting may be there meanwhile
+                bench = self.bench
+                if bench.model is None:
+                    wanted = plan.model or "its model"
+                    raise PlanError(f"plan {plan.name}: there is no model on the workbench to cut by it: open {wanted} first")
+                profile = with_plan_settings(bench.profile.of_all_parts, plan)
+                rows = await self.quick.run("measure_plan", bench, plan)
+            self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
+
+    async def make(self, word: str, task: str, *given: Any) -> Any:
+        """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
+        with self.waiting(word):
+            return await self.quick.run(task, self.bench, *given)
+
+    async def pieces(self) -> Path:
+        """The parts as bodies of their own, as `work.pieces` packs them, cut once for all that ask. Raises UserError where they
+        cannot be cut."""
+        bench = self.bench
+        async with self._drawing:
+            if self._pieces is None or self._pieces[0].shaped != bench.shaped:
+                out = self.new_file()
+                await self.quick.run("draw_pieces", bench, out)
+                if self._pieces is not None:
+                    self._pieces[1].unlink(missing_ok=True)
+                self._pieces = bench, out
+            return self._pieces[1]
+
+    def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> Coroutine[Any, Any, None]:
+        """The work of taking other names and settings; those of the bench by then, for several may be asked for at once. key: the
+        one that is set. Raises ProfileError."""
+        check_block(profile_as_given(change(self.bench.given), self.bench.profile), key)  # refused at once
+        return self._settle(word, change)
+
+    def slice(self) -> Coroutine[Any, Any, None] | None:
+        """Slice what lies on the bench, with the settings that were asked for before, which may still be settled."""
+        if self._settling.locked():
+            return self._slice_settled()
+        self.slicing.begin()
+        return None
+
+    async def _slice_settled(self) -> None:
+        async with self._settling:
+            self.slicing.begin()
+
+    async def _settle(self, word: str, change: Callable[[Given], Given]) -> None:
+        async with self._settling:
+            before = None
+            while before is not self.bench:
+                before = self.bench
+                given = change(before.given)
+                bench, refused = await self._with_profile(word, before, given)
+            if given != before.given:
+                self.do(word, bench, refused)
+
+    async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
+        """A bench with another profile; planes that it forbids go, with the reason, so do rows of the front that cannot be cut at
+        another place on the plate, and a model that it scales or turns otherwise is read again."""
+        bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
+        new, old = bench.profile.process, before.profile.process
+        if model is not None and _reads(bench.profile) != _reads(before.profile):
+            with self.waiting(f"reading {model.name}"):
+                model = await self._read(model.path, model.name, bench.profile, model.plate)
+            self._begin_ranking(model)
+            if new.rotate_deg != old.rotate_deg:
+                turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
+                return with_model_turned_as_read(bench, model, turn, new.scale / old.scale), ""
+            bench = with_scaled_model(bench, model, new.scale / old.scale)
+        effect = effect_of_change(before.profile, bench.profile)
+        if effect == Effect.REACH and bench.rows:
+            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).refused]
+            bench = with_rows(bench, rows)
+        if bench.cuts is not None and effect >= Effect.REACH:
+            trial = await self.trials.attempt(bench, bench.cuts)
+            if trial.refused:
+                why = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
+                return replace(with_cuts(bench, ()), cuts=None), why
+        return bench, ""
+
+    async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None) -> Model:
+        """The model of a file, whose mesh stays as long as anybody has it."""
+        model: Model | Unscaled = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file(), plate)
+        if isinstance(model, Unscaled):
+            raise _UnscaledError(model)
+        finalize(model, _remove_files, model.mesh_file, model.shapes_file)
+        return model
+
+    def _begin_ranking(self, model: Model) -> None:
+        """Rank the ways in which a model rests."""
+        self._ranking = self.start(self._rank(model))
+
+    async def _rank(self, model: Model) -> None:
+        await self.readiness.wait()
+        resting = await self.quick.run("rank_resting", model, self.bench.profile.of_all_parts)
+        self.resting = model.key, resting
+
+
+def _remove_files(*files: Path | None) -> None:
+    """Remove the files of a model that is not used any more."""
+    for file in filter(None, files):
+        file.unlink(missing_ok=True)
+
+
+def _read_plan(path: Path) -> PlanFile:
+    """The plan in a file. Raises PlanError, which names the file alone."""
+    try:
+        return read_plan(path)
+    except PlanError as error:
+        raise PlanError(str(error).replace(str(path), path.name)) from None
+
+
+def _reads(profile: Profile) -> tuple[object, ...]:
+    """The settings of a profile that decide how a model is read."""
+    return profile.process.scale, profile.process.rotate_deg

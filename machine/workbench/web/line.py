@@ -1,0 +1,101 @@
+"""Line: the websocket between a session and a page: state out, commands in."""
+
+import asyncio
+import json
+from collections.abc import Callable, Coroutine
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from machine.workbench.access.limits import DEVICE, check_bench_command
+from machine.workbench.session.base import hear_from
+from machine.workbench.session.commands import obey
+from machine.workbench.session.session import Session
+from machine.workbench.web.snapshot import snapshot
+from machine.workbench.work.observable import Observable
+from profiles.errors import PlanError
+
+MOST_COMMAND = 100_000  # characters
+_states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
+CLOSED = "this bench is not open any more"
+CLOSED_CODE = 4404  # of a websocket that is closed for that
+GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
+
+
+async def talk(session: Session, socket: WebSocket) -> None:
+    """State out, commands in, until either side goes. A page that reads nothing holds up nobody but itself."""
+    await socket.accept()
+    try:
+        await until_either_ends(tell(session, lambda: snapshot(session), socket), _hear(session, socket))
+    finally:
+        if not session.closed:
+            session.trials.settle()  # of a plane that the page had in its hand
+
+
+async def refuse_closed(socket: WebSocket) -> None:
+    """A line to a bench that is not there."""
+    await socket.accept()
+    await socket.close(CLOSED_CODE, CLOSED)
+
+
+async def until_either_ends(tell: Coroutine[Any, Any, None], hear: Coroutine[Any, Any, None]) -> None:
+    """The two directions of a line beside each other, of which neither outlives the other; that a page has gone is no fault."""
+    try:
+        async with asyncio.TaskGroup() as group:
+            hearing = group.create_task(hear)
+            group.create_task(tell).add_done_callback(lambda _: hearing.cancel())
+    except* WebSocketDisconnect:
+        pass
+
+
+async def send(socket: WebSocket, text: str) -> None:
+    """Say something to a page. Raises WebSocketDisconnect when it has gone."""
+    try:
+        await socket.send_text(text)
+    except RuntimeError as error:  # uvicorn's word for a line that it has closed itself and not told yet
+        raise WebSocketDisconnect(GONE_CODE) from error
+
+
+async def receive(socket: WebSocket) -> str:
+    """The next text of a page, "" for bytes, which are no command. Raises WebSocketDisconnect when it has gone."""
+    message = await socket.receive()
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message["code"])
+    return message.get("text") or ""
+
+
+async def tell(source: Observable, state: Callable[[], dict[str, Any]], socket: WebSocket) -> None:
+    """The newest state whenever there is one, put into words once for all pages; what came in between while a slow page was
+    reading is left out."""
+    while not source.closed:
+        seen, text = _states.get(source, (-1, ""))
+        if seen != source.version:
+            seen, text = _states[source] = source.version, json.dumps(state())
+        await send(socket, text)
+        await source.changed(seen)
+    await socket.close(CLOSED_CODE, CLOSED)
+
+
+async def _hear(session: Session, socket: WebSocket) -> None:
+    while True:
+        text, asked = await receive(socket), dict[str, Any]()
+        try:
+            asked = parsed(text, MOST_COMMAND)
+            hear_from(asked.get("page"))
+            if DEVICE in socket.scope:
+                check_bench_command(asked)
+            obey(session, asked)
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+            session.answer(asked.get("ask"), session.refuse(error))
+
+
+def parsed(text: str, most: int) -> dict[str, Any]:
+    """A command from a page, at most `most` characters long. Raises PlanError for anything else."""
+    try:
+        asked = json.loads(text) if len(text) <= most else None
+    except (ValueError, RecursionError):
+        asked = None
+    if not isinstance(asked, dict):
+        raise PlanError("what the page has sent is no command of the workbench")
+    return asked

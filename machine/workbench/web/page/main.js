@@ -1,0 +1,109 @@
+// Main: the line to the server, the picture and the panels put together.
+
+import { cameraOf, CORNERS, handle, viewButtons } from "../../../view/template/camera.js";
+import { onKeys, viewKeys } from "../../../view/template/keys.js";
+import { $, notice, themeSwitch } from "../../../view/template/page.js";
+import { tabsOf } from "../../../view/template/tabs.js";
+import { axesOf } from "./axes.js";
+import { benchesPanel } from "./benches.js";
+import { clicksOf, press } from "./clicks.js";
+import { devicesPanel } from "./devices.js";
+import { hide, listen, tell, toggle } from "./elements.js";
+import { elapsedTimes } from "./elapsed.js";
+import { facetsOf } from "./facets.js";
+import { handlesOf } from "./handles.js";
+import { keptLook } from "./kept-look.js";
+import { LINE_TOLD, openLine, send } from "./line.js";
+import { marksPanel } from "./marks-panel.js";
+import { modelPanel, sizePanel } from "./model-panel.js";
+import { fetchModel, modelOf, pedestalOf } from "./model.js";
+import { obstacleOf } from "./obstacle.js";
+import { partsList } from "./parts-list.js";
+import { partsPanel } from "./parts-panel.js";
+import { pictureOf } from "./picture.js";
+import { apartPanel } from "./pieces.js";
+import { placePanel } from "./place-panel.js";
+import { planesPanel } from "./planes-panel.js";
+import { printFrame } from "./print-frame.js";
+import { titleOfModel } from "./print-news.js";
+import { printPanel } from "./print-panel.js";
+import { problemLine } from "./problem.js";
+import { ringsOf } from "./rings.js";
+import { saveMenu } from "./save-menu.js";
+import { settingsPanel } from "./settings-panel.js";
+import { comparePanel, slicesPanel, stopsPanel } from "./slices-panel.js";
+import { onState, store, subscribe, update } from "./store.js";
+import { thumbnailsOf } from "./thumbnails.js";
+import { wallsOf } from "./walls.js";
+
+function main() {
+  const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
+  themeSwitch((dark) => update({ dark }));
+  const follow = async (state) => {
+    update({ state, turning: null });
+    await fetchModel(state.model, picture, () => follow(store.state));
+    look.restore();
+    if (store.state.version === state.version) root.dataset.version = state.version;
+  };
+  openLine(follow, (how) => {
+    root.dataset.line = how;
+    notice(LINE_TOLD[how], "line");
+  });
+  tabsOf((tab) => update({ tab }));
+  const look = keptLook(camera, picture);
+  onState(tellState);
+  onState(({ stopped }) => notice(stopped, "stopped"));
+  slicesPanel(printFrame(camera, picture).showFinding);
+  const panels = [problemLine, elapsedTimes, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
+  for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
+  if (picture) {
+    const ringPlaces = ringsOf(picture);
+    subscribe((now, before) => { if (now.dark !== before.dark || !before.state) picture.machine(now.state.machine, now.dark); });
+    for (const drawn of [wallsOf, obstacleOf, handlesOf, facetsOf, pedestalOf]) drawn(picture);
+    handle($("canvas"), camera, { changed: picture.ask, pressed: (event) => press(event, picture) });
+    listen("click", { fit: () => picture.fit(ringPlaces()) });
+    viewButtons(camera, CORNERS[0], picture.ask);
+    axesOf(camera, picture);
+  } else {
+    document.body.classList.add("no-picture");
+    $("show-rings").disabled = true;
+  }
+  keysOf(camera, picture);
+  for (const button of document.querySelectorAll("[data-do]")) button.addEventListener("click", () => send({ do: button.dataset.do }));
+  root.dataset.state = picture ? "ready" : "failed";
+}
+
+function tellState({ model, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
+  const root = document.documentElement;
+  titleOfModel(model ? model.name : "");
+  const summary = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`;
+  tell({ title: model ? model.name : "tiltprint", summary });
+  hide({ drop: Boolean(model) });
+  root.dataset.busy = busy;
+  root.toggleAttribute("data-searching", Boolean(search));
+  toggle("no-model", !model);
+  toggle("has-model", model);
+  for (const [id, word] of [["undo", undo], ["redo", redo]]) {
+    $(id).disabled = !word;
+    $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);
+  }
+}
+
+/** What keys do; undo and redo, but where what is typed has an undo of its own. */
+function keysOf(camera, picture) {
+  const click = (id) => () => $(id).click();
+  onKeys({
+    ...viewKeys(camera, picture ? picture.ask : () => {}), f: click("fit"), d: click("theme"), r: click("show-rings"), n: click("neck"), "?": () => $("keys").showModal(),
+    Escape: () => update({ clicks: "", corner: null, part: 0, hand: null }),
+  }, () => $("keys").open || document.activeElement?.closest("[data-typing]"));
+  listen("click", { "keys-button": () => $("keys").showModal() });
+  addEventListener("keydown", (event) => {
+    const key = event.key.toLowerCase();
+    if (!(event.ctrlKey || event.metaKey) || !["z", "y"].includes(key) || event.target.closest?.("[data-typing]")) return;
+    event.preventDefault();
+    send({ do: event.shiftKey || key === "y" ? "redo" : "undo" });
+  });
+}
+
+main();
+globalThis.$ = $; // for whoever tries the page from a console; modules["FOLDER/NAME"] has the rest

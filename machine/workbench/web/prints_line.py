@@ -1,0 +1,132 @@
+"""Prints line: a page's line to the prints: one of its own, so that a print's news, five a second, carry nothing else."""
+
+import asyncio
+import json
+import secrets
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.websockets import WebSocket
+
+from machine.crash import bug_in_words, log_bug
+from machine.printing.servers.http import fetch_picture
+from machine.workbench.access.limits import DEVICE, check_print_command
+from machine.workbench.bench.page_words import page_words, with_page_words
+from machine.workbench.bench.values import Asked
+from machine.workbench.printing.commands import PageOfPrints, Work, obey
+from machine.workbench.printing.prints import Prints
+from machine.workbench.session.workbench import Workbench
+from machine.workbench.web.line import parsed, receive, refuse_closed, send, tell, until_either_ends
+from machine.workbench.web.sessions_thread import SessionsThread
+from profiles.errors import PrinterError, ServerError, UserError
+
+MOST_COMMAND = 10_000  # characters
+SENTENCES = ("sentence", "question", "checks", "figures", "said", "upload")  # of a print's state
+
+
+def prints_line(prints: Prints, workbench: Workbench, sessions: SessionsThread) -> Callable[[WebSocket], Awaitable[None]]:
+    """What answers the websocket of a page of a session: state out, commands in. `?page=` names the page, so that a line that
+    comes back is known.
+
+    Each line has a task of its own that sends the newest state: one that reads nothing holds up itself alone. The session lives
+    in another event loop and is read there alone, but for its being there.
+    """
+
+    async def talk(socket: WebSocket) -> None:
+        session = workbench.sessions.get(socket.path_params["session"])
+        if session is None:
+            await refuse_closed(socket)
+            return
+        page = socket.query_params.get("page", "")[:40] or secrets.token_urlsafe(9)
+        await socket.accept()
+        with prints.page(page):
+            try:
+                hearing = _hear(socket, PageOfPrints(page, session, prints, sessions.call))
+                await until_either_ends(tell(prints, lambda: _told(prints), socket), hearing)
+            except ExceptionGroup as bugs:
+                log_bug(bugs.exceptions[0], ())
+
+    return talk
+
+
+def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
+    """What answers a request for the log of a print, as far as it is written."""
+
+    async def answer(request: Request) -> Response:
+        for job in prints.prints:
+            log = job.state["log"]
+            if job.number == request.path_params["print"] and log and Path(log).is_file():
+                return FileResponse(log, media_type="text/plain")
+        return Response("there is no log of this print\n", 404)
+
+    return answer
+
+
+def _told(prints: Prints) -> dict[str, Any]:
+    """What every page is told, in the page's own words; what the printer says stays."""
+    state, names = prints.snapshot(), prints.names
+    jobs = [with_page_words(job, SENTENCES, names) | {"webcam": bool(job["webcam"])} for job in state["prints"]]
+    ports = state["ports"] and [with_page_words(port, ("words", "trouble"), names) for port in state["ports"]]
+    return state | {"ports": ports, "prints": jobs}
+
+
+def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
+    """What answers a request for a picture of the camera at a print: the page may load nothing from elsewhere itself."""
+
+    async def answer(request: Request) -> Response:
+        for job in prints.prints:
+            if job.number == request.path_params["print"] and job.state["webcam"]:
+                try:
+                    picture, kind = await asyncio.to_thread(fetch_picture, job.state["webcam"])
+                except ServerError as error:
+                    return Response(f"{error}\n", 502)
+                return Response(picture, media_type=kind, headers={"cache-control": "no-store"})
+        return Response("there is no camera at this print\n", 404)
+
+    return answer
+
+
+async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
+    """An order that waits for the bench, which may be busy, holds up nothing that the page says after it: an emergency stop is
+    given at once."""
+    async with asyncio.TaskGroup() as tasks:
+        ordering: asyncio.Task[None] | None = None
+        while True:
+            text = await receive(socket)
+            asked = dict[str, Any]()
+            async with _refusals(socket, partial(_names, page, asked)):
+                asked |= parsed(text, MOST_COMMAND)
+                if DEVICE in socket.scope:
+                    check_print_command(asked, page.prints.ports_known, page.prints.journals_known)
+                with_bench = obey(page, asked)
+                if with_bench is not None and ordering is not None and not ordering.done():
+                    with_bench.close()
+                    raise PrinterError("what this page has ordered last still waits for its bench: wait for that first")
+                if with_bench is not None:
+                    ordering = tasks.create_task(_order(socket, page, with_bench))
+
+
+async def _order(socket: WebSocket, page: PageOfPrints, with_bench: Work) -> None:
+    async with _refusals(socket, lambda: page.on_bench(lambda: page.session.names)):
+        await with_bench
+
+
+async def _names(page: PageOfPrints, asked: Asked) -> tuple[str, ...]:
+    return (*page.prints.names, *(str(asked[key]) for key in ("port", "journal", "machine") if key in asked))
+
+
+@asynccontextmanager
+async def _refusals(socket: WebSocket, names: Callable[[], Awaitable[tuple[str, ...]]]) -> AsyncIterator[None]:
+    """Tell the page why what it has asked for cannot be done. names: what people have named themselves, for page_words()."""
+    try:
+        yield
+    except UserError as error:
+        problem = page_words(str(error), await names())
+        await send(socket, json.dumps({"problem": problem, "forcible": error.forcible}))
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
+        await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

@@ -1,0 +1,169 @@
+"""Serve: the workbench run from its address to Ctrl-C: nothing of it goes on afterwards."""
+
+import asyncio
+import gc
+import secrets
+import socket
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from machine.cli.terminal.interrupts import calling
+from machine.cli.terminal.progress import say
+from machine.pipeline.requests import UPLOAD_MIB
+from machine.view.serving.guard import HOST
+from machine.workbench.access.door import Door
+from machine.workbench.access.lan import Lan
+from machine.workbench.access.listening import listen_at_all
+from machine.workbench.printing.prints import Prints
+from machine.workbench.session.session import Session
+from machine.workbench.session.workbench import Workbench
+from machine.workbench.web.server import Served, application, lan_application
+from machine.workbench.web.sessions_thread import SessionsThread
+from machine.workbench.web.uploads import Uploads
+from machine.workbench.work.received import files_in, tidy_left
+from machine.workbench.work.worker_pool import WorkerPools
+
+GRACE_S = 1  # for answers under way when it ends, and for its processes
+KEEP_S = 20.0  # for the work on all benches to be kept, which takes less than a second unless a model is huge or a disk slow
+SWITCH_S = 0.0005  # between threads: usual are 5 ms, and a stop is waited for several times
+MOST_SENT = 1 << 20  # bytes of one message of a page; files come by another way
+
+
+class Server(uvicorn.Server):
+    """uvicorn's, with the interrupts left to the program."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Nothing: Ctrl-C calls `stop`."""
+        yield
+
+    def stop(self) -> None:
+        """End soon; asked again, at once."""
+        self.force_exit = self.should_exit
+        self.should_exit = True
+
+
+def serve_workbench(
+    make: Callable[[WorkerPools], Session],
+    begin: Callable[[Session], None],
+    announce: Callable[..., None],
+    port: int = 0,
+    upload_mib: int = UPLOAD_MIB,
+    lan: Lan | None = None,
+) -> None:
+    """Serve until Ctrl-C. make: a session; begin: given the first one when it is there, both in the event loop of the sessions;
+    announce: given its address when it answers, and those in the network; upload_mib: the largest file that is taken from a page;
+    lan: the network that it is open to, None: to none."""
+    with ExitStack() as sockets:
+        own, of_lan = listen_at_all(port, lan.addresses if lan else ())
+        for each in (own, *of_lan):
+            sockets.enter_context(each)
+        folders = tidy_left()
+        if folders:
+            names = f"{folders[0]} and {len(folders) - 1} more" if folders[1:] else str(folders[0])
+            left = f"workbenches that were killed have left the files of their benches in {names}"
+            say(f"{left}: the page offers them, and they go with a start in a day")
+        asyncio.run(_serve(make, begin, announce, own, Uploads(upload_mib, files_in(*folders)), lan, of_lan))
+
+
+async def _serve(
+    make: Callable[[WorkerPools], Session],
+    begin: Callable[[Session], None],
+    announce: Callable[..., None],
+    own: socket.socket,
+    uploads: Uploads,
+    lan: Lan | None,
+    of_lan: Sequence[socket.socket],
+) -> None:
+    number, token = own.getsockname()[1], secrets.token_urlsafe(24)
+    workbench, prints, loop = Workbench(make), Prints(), asyncio.get_running_loop()
+    sessions = SessionsThread()
+    served = Served(workbench, sessions, prints, uploads)
+    door = Door(say, lan.urls(number), lan.certificate is not None) if lan else None
+
+    async def open_first() -> int:
+        first = workbench.open()
+        begin(workbench.sessions[first])
+        return first
+
+    servers = [(_server(application(served, token, number, door)), [own])]
+    if lan and door:
+        servers.append((_server(lan_application(served, door, lan, number), lan), list(of_lan)))
+    ending = list[asyncio.Task[None]]()
+
+    def stop() -> None:
+        for server, _ in servers:
+            server.stop()
+
+    def end() -> None:
+        """First the prints end, heaters off; asked again, the workbench goes at once, and they end by themselves."""
+        if ending or not prints.running:
+            stop()
+        else:
+            ending.append(loop.create_task(_end_prints(prints, stop)))
+
+    def interrupt() -> None:
+        loop.call_soon_threadsafe(end)
+
+    try:
+        first = await sessions.run(open_first())
+        keep_stops_quick()
+        with calling(interrupt):
+            answering = asyncio.gather(*(server.serve(sockets=those) for server, those in servers))
+            while not all(server.started for server, _ in servers) and not answering.done():
+                await asyncio.sleep(0.01)
+            announce(f"http://{HOST}:{number}/{token}/{first}/", *(lan.urls(number) if lan else ()))
+            if door:
+                door.announce()
+            await answering
+    finally:
+        prints.close()
+        with suppress(TimeoutError):  # what hangs there ends with the program, and no file is deleted that is still read
+            async with asyncio.timeout(KEEP_S):
+                for trouble in await sessions.run(workbench.close_all()):
+                    say(trouble)
+        await sessions.end(GRACE_S)
+
+
+def _server(app: ASGIApp, lan: Lan | None = None) -> Server:
+    """lan: the network that it answers in, None: it answers this computer alone."""
+    certificate = lan.certificate if lan else None
+    settings = uvicorn.Config(
+        app,
+        log_config=None,
+        lifespan="off",
+        ws="websockets-sansio",
+        ws_max_size=MOST_SENT,
+        ws_per_message_deflate=False,  # what goes no further than this computer or its network is not worth it
+        timeout_graceful_shutdown=GRACE_S,
+        server_header=False,
+        proxy_headers=False,
+        ssl_certfile=certificate.chain if certificate else None,
+        ssl_keyfile=certificate.key if certificate else None,
+    )
+    return Server(settings)
+
+
+def keep_stops_quick() -> None:
+    """No thread holds up that of the prints for long: a full collection of all that is loaded does so for a tenth of a second, so
+    that is left out of it, and the interpreter changes from one thread to another more often than usual."""
+    gc.freeze()
+    sys.setswitchinterval(SWITCH_S)
+
+
+async def _end_prints(prints: Prints, then: Callable[[], None]) -> None:
+    there, here = ([job.state["port"] for job in prints.running if job.state["server"] is server] for server in (True, False))
+    if there:
+        say(f"the print on {' and '.join(there)} goes on there, an upload is broken off")
+    if here:
+        ports = " and ".join(here)
+        say(f"the print at {ports} is stopped and its heaters go off, wait for that; Ctrl-C again does not wait for it")
+    try:
+        for line in await prints.end_all():
+            say(line)
+    finally:
+        then()

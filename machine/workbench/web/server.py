@@ -1,0 +1,201 @@
+"""Server: the addresses of the workbench: its page, its sessions' models, files and lines."""
+
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, replace
+
+from starlette.applications import Starlette
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket
+
+from machine.view.serving.guard import NAMES, Guard
+from machine.workbench.access.door import Door
+from machine.workbench.access.gate import Gate
+from machine.workbench.access.lan import Lan
+from machine.workbench.bench.command_line import export_command
+from machine.workbench.bench.page_words import page_words
+from machine.workbench.bench.settings import settings_list
+from machine.workbench.bench.values import is_small_number
+from machine.workbench.printing.prints import Prints
+from machine.workbench.session.base import hear_from
+from machine.workbench.session.commands import Need, check_need
+from machine.workbench.session.session import Session
+from machine.workbench.session.workbench import Workbench
+from machine.workbench.web.benches import bench_routes
+from machine.workbench.web.devices_line import devices_line
+from machine.workbench.web.downloads import (
+    folder,
+    gcode,
+    pictures,
+    plan,
+    print_page,
+    print_text,
+    print_walls,
+    profile,
+    project,
+    shared_page,
+)
+from machine.workbench.web.line import CLOSED, refuse_closed, talk
+from machine.workbench.web.page import workbench_page
+from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
+from machine.workbench.web.profile_files import ProfileFiles
+from machine.workbench.web.sessions_thread import SessionsThread
+from machine.workbench.web.snapshot import marks_key
+from machine.workbench.web.uploads import Uploads
+from profiles.places import KINDS, known
+
+Act = Callable[[Session, Request], Awaitable[Response]]
+BELOW = "/{token}/{session:int}/"
+
+
+@dataclass(frozen=True)
+class Served:
+    """What all pages are served: the benches in their own event loop, the prints, the files that pages send."""
+
+    workbench: Workbench
+    sessions: SessionsThread
+    prints: Prints
+    uploads: Uploads
+
+
+def application(served: Served, token: str, port: int, door: Door | None = None) -> ASGIApp:
+    """The server of this computer, below `/TOKEN/`; the number of a session follows. door: of the network, where it is open."""
+    page = workbench_page((f"ws://{name}:{port}" for name in NAMES), "open" if door else "")
+    of_door = [WebSocketRoute(BELOW + "devices", devices_line(door))] if door else []
+    return Guard(_router(served, page, of_door), token, port)
+
+
+def lan_application(served: Served, door: Door, lan: Lan, port: int) -> ASGIApp:
+    """The server of paired devices, the same below `/paired/`."""
+    scheme = lan.scheme.replace("http", "ws")
+    page = workbench_page((f"{scheme}://{host}" for host in lan.hosts(port)), "paired")
+    return Gate(_router(served, page), door, lan, port)
+
+
+def _router(served: Served, page: tuple[bytes, str], further: Sequence[BaseRoute] = ()) -> ASGIApp:
+    """What is of the prints, and further, is answered in the server's own event loop, all else in that of the sessions."""
+    workbench, prints = served.workbench, served.prints
+    of_prints = [
+        Route(BELOW + "prints/{print:int}/log", print_log(prints)),
+        Route(BELOW + "prints/{print:int}/webcam", print_webcam(prints)),
+        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench, served.sessions)),
+    ]
+    others = served.sessions.application(_of_sessions(workbench, page, served.uploads))
+    return Router([*of_prints, *further], redirect_slashes=False, default=others)
+
+
+def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads) -> ASGIApp:
+
+    def route(path: str, act: Act, method: str = "GET", need: Need = Need.NOTHING) -> Route:
+        return Route(BELOW + path, _answering(workbench, act, need), methods=[method])
+
+    routes = [
+        route("", _page(*page)),
+        route("model/{key}", _model),
+        route("marks/{key}", _marks),
+        route("pedestal/{key}", _pedestal),
+        route("facets/{key}", _facets),
+        route("file", uploads.take, "POST"),
+        route("left", uploads.list_left),
+        route("left/{number:int}", uploads.open_left, "POST"),
+        route("kept", uploads.list_kept),
+        route("kept/{name}", uploads.open_kept, "POST"),
+        route("project.3mf", project, need=Need.MODEL),
+        route("plan.toml", plan, need=Need.PARTS),
+        route("profile/{kind}.toml", profile),
+        route("pieces", _pieces, need=Need.PARTS),
+        route("parts.zip", folder, need=Need.PARTS),
+        route("pictures.zip", pictures, need=Need.PARTS),
+        route("print/{key}", print_page),
+        route("print/{key}/text", print_text),
+        route("walls/{number:int}/{part:int}", print_walls),
+        route("print.html", shared_page),
+        route("print.gcode", gcode),
+        route("settings.json", _settings(uploads.profiles)),
+        WebSocketRoute(BELOW + "line", _line(workbench)),
+    ]
+    return Starlette(routes=[*bench_routes(workbench), *routes])
+
+
+def _page(content: bytes, policy: str) -> Act:
+    async def answer(session: Session, request: Request) -> Response:
+        return Response(content, media_type="text/html", headers={"content-security-policy": policy})
+
+    return answer
+
+
+def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request], Awaitable[Response]]:
+    async def answer(request: Request) -> Response:
+        session = workbench.sessions.get(request.path_params["session"])
+        if session is None:
+            return Response(f"{CLOSED}\n", 404)
+        hear_from(request.query_params.get("page"))
+        try:
+            check_need(session, need)
+            return await act(session, request)
+        except ClientDisconnect:  # the page has gone while it sent a file
+            return Response(status_code=400)
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+            return JSONResponse({"problem": page_words(session.refuse(error), session.names)}, status_code=422)
+
+    return answer
+
+
+def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
+    async def connect(socket: WebSocket) -> None:
+        session = workbench.sessions.get(socket.path_params["session"])
+        if session is None:
+            await refuse_closed(socket)
+            return
+        try:
+            await talk(session, socket)
+        except ExceptionGroup as bugs:  # each becomes a sentence for the other lines, and a log
+            session.refuse(bugs.exceptions[0])
+
+    return connect
+
+
+async def _model(session: Session, request: Request) -> Response:
+    model = session.bench.model
+    if model is None or model.key != request.path_params["key"]:
+        return Response(status_code=204)  # there is another one by now, which the page asks for next
+    return FileResponse(model.mesh_file, media_type="application/octet-stream")
+
+
+async def _pedestal(session: Session, request: Request) -> Response:
+    standing = session.standing.now
+    if standing is None or session.standing.pedestal_key != request.path_params["key"]:
+        return Response(status_code=204)
+    return Response(standing.pedestal, media_type="application/octet-stream")
+
+
+async def _facets(session: Session, request: Request) -> Response:
+    model = session.bench.model
+    if model is None or model.key != request.path_params["key"]:
+        return Response(status_code=204)
+    return Response(await session.quick.run("rest_facets", model), media_type="application/json")
+
+
+async def _pieces(session: Session, request: Request) -> Response:
+    return FileResponse(await session.pieces(), media_type="application/octet-stream")
+
+
+async def _marks(session: Session, request: Request) -> Response:
+    bench = session.bench
+    if not request.path_params["key"] or marks_key(bench) != request.path_params["key"]:
+        return Response(status_code=204)  # there are others by now, which the page asks for next
+    return Response(await session.quick.run("mark_faces", bench), media_type="application/octet-stream")
+
+
+def _settings(files: ProfileFiles) -> Act:
+    async def answer(session: Session, request: Request) -> Response:
+        given = files.as_shown(session.bench.given)
+        bench = replace(session.bench, given=given)
+        names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
+        part = request.query_params.get("part", "")
+        rows = settings_list(bench.profile, session.bench.given, int(part) if is_small_number(part) else 0)
+        return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
+
+    return answer

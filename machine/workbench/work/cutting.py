@@ -1,0 +1,193 @@
+"""Cutting: finding parts, cutting by planes and making the parts' files, as tasks of the workbench."""
+
+import zipfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+
+from machine.cli.terminal.advice import orientation_in_words, standing_in_words
+from machine.pipeline import compilers
+from machine.pipeline.given_plan import lies_freely, with_file_marks
+from machine.pipeline.pictures.picture import parts_together
+from machine.pipeline.pictures.png import png_bytes
+from machine.pipeline.pricing import pricing
+from machine.pipeline.project import PICTURE_PX, project_bytes, with_meshes_beside
+from machine.planning.stops import check_stop_parts
+from machine.workbench.bench.bench import Bench, locked_plan, plan_of_bench
+from machine.workbench.work.kept_work import work_of
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import standing_still
+from mdp.joint import is_sound
+from mdp.kernels.workers import Tell
+from mdp.mesh import Floats, Mesh
+from mdp.ranking.ranker import CLASSIC, ranker_named
+from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
+from mdp.search.orient import orient_and_decompose
+from mdp.search.plan_file import PlanFile, plan_of, planned_parts
+from mdp.search.plan_writing import plan_text
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
+from mdp.zone import NO_ZONES
+from profiles.errors import PlanError
+
+PLAN_NAME = "plan.toml"
+AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # the page's own words
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """How far a search is: a sentence, and the best so far as a row of the front; None: nothing is cut yet."""
+
+    text: str
+    best: FrontRow | None = None
+
+
+@dataclass(frozen=True)
+class SearchWay:
+    """How parts are sought, beside what the profile says. orient: lay the model down in the cheapest orientation, chosen with
+    them, unless a person has turned the model or locked or marked something on it; ranker: a name for `ranker_named`."""
+
+    orient: bool = True
+    ranker: str = CLASSIC
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The front of a search and what it says; turn: (3, 3) how the model on the bench is turned further for it."""
+
+    front: tuple[FrontRow, ...]
+    notes: tuple[str, ...]
+    turn: Floats | None = None
+
+
+def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
+    """What a search as `decompose` makes it has found. Raises UserError."""
+    ranker_named(way.ranker)
+    assert bench.model is not None
+    tell(Searched(f"reading {bench.model.faces:,} faces"))
+    mesh, name, profile, locked = turned_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
+    compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
+    price, best = pricing(profile.of_all_parts), None
+
+    def search(candidate: Mesh) -> Decomposition:
+        otherwise = "" if candidate is mesh else "laid down otherwise: "
+
+        def say(phase: str) -> None:
+            tell(Searched(f"{otherwise}{phase}", best))
+
+        def show(stage: int, beam: int, best_share: float, measure: Callable[[], FrontRow]) -> None:
+            nonlocal best
+            if stage == 0:
+                compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text, best)))
+                tell(Searched(f"{otherwise}looking for the first cut along {profile.search.directions:,} directions", best))
+                return
+            left = f"{100 * best_share:.1f} % of the overhangs left"
+            if candidate is mesh:
+                best = measure()  # planes of a model that lies otherwise are none of the one in the picture
+            tell(Searched(f"{otherwise}trying cut {stage}, {left}", best))
+
+        by_hand = with_shapes(bench, locked, candidate)
+        return decompose(
+            candidate, name, profile, SearchRequest(ranker=way.ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
+        )
+
+    untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
+    if way.orient and untouched and lies_freely(profile):
+        tell(Searched(f"weighing the ways in which {len(mesh.faces):,} faces may lie"))
+        oriented = orient_and_decompose(mesh, profile, pricing, search)
+        turn = None if oriented.orientation is None else oriented.orientation.rotation
+        decomposition = oriented.decomposition
+        return Found(decomposition.front, (*decomposition.notes, *orientation_in_words(oriented, AS_IT_STANDS)), turn)
+    decomposition = search(mesh)
+    return Found(decomposition.front, (*decomposition.notes, *standing_in_words(mesh, profile)))
+
+
+def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
+    """The front of a plan for the model on the bench, measured; PlanError where it cannot be cut."""
+    return cut_bench(bench, plan, prices=True).front
+
+
+def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
+    """A row of the front on the bench with its time and plastic; without where it cannot be cut any more, or is not
+    sound."""
+    row = bench.rows[number]
+    with suppress(PlanError):
+        parts = planned_parts(row)
+        cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts, front=()), prices=True)
+        by_hand = sum(1 for _ in takewhile(bench.locked.__contains__, reversed(parts)))
+        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile, by_hand) else replace(row, sound=False)
+    return row
+
+
+def make_plan(tell: Tell, bench: Bench) -> str:
+    """The plan of the parts as the bench has them, as text."""
+    return _plan_and_meshes(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)[0]
+
+
+def make_project(tell: Tell, bench: Bench, out: Path) -> None:
+    """The project file of what lies on the bench."""
+    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    check_stop_parts(bench.stops, len(decomposition.parts))
+    compilers.wait_for(compilers.PICTURES)
+    picture = png_bytes(parts_together(decomposition, bench.profile, PICTURE_PX))
+    plan = plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts)
+    out.write_bytes(project_bytes(work_of(bench), plan, decomposition.mesh, picture))
+
+
+def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
+    """The folder of `decompose -o` with the parts as the bench has them, as a zip."""
+    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    parts = [(part_file(part.index), stl(part.mesh)) for part in decomposition.parts]
+    model, _, plan, scene = FOLDER_FILES
+    text, meshes = _plan_and_meshes(decomposition, bench)
+    beside = [(name, file.read_bytes()) for name, file in meshes.items()]
+    write_zip(out, [*parts, *beside, (model, threemf(decomposition)), (plan, text.encode()), (scene, glb(decomposition))])
+
+
+def _plan_and_meshes(decomposition: Decomposition, bench: Bench) -> tuple[str, dict[str, Path]]:
+    """The plan as text, and the files of the meshes that it expects beside it, by their names there."""
+    plan, meshes = with_meshes_beside(plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts))
+    return plan_text(plan), meshes
+
+
+def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:
+    """Files by their names as a zip, the same bytes whenever it is made."""
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, text in files:
+            entry = zipfile.ZipInfo(name, ZIP_DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, text)
+
+
+def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
+    """The model on the bench cut by a plan; prices: the rows of its front measured, too."""
+    mesh, name = turned_mesh(bench, plan), _name(bench)
+    compilers.wait_for(compilers.JUDGE)
+    marked = with_shapes(bench, plan, mesh)
+    return cut_by_plan(
+        mesh, name, bench.profile, SearchRequest(plan=marked, price=pricing(bench.profile.of_all_parts) if prices else None)
+    )
+
+
+def with_shapes(bench: Bench, plan: PlanFile, mesh: Mesh) -> PlanFile:
+    """The plan with what the model's file marks that is no box, on the model as it lies now."""
+    assert bench.model is not None
+    shapes = bench.model.shapes()
+    return (
+        plan if shapes == NO_ZONES else with_file_marks(plan, shapes, bench.model.mesh(), mesh, bench.profile.search.pedestal_mm)
+    )
+
+
+def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
+    """The mesh as it is cut, turned as the plan says or else as the bench does."""
+    assert bench.model is not None
+    turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
+    return standing_still(bench.model.mesh(), turned)
+
+
+def _name(bench: Bench) -> str:
+    return "" if bench.model is None else bench.model.name

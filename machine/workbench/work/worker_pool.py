@@ -1,0 +1,133 @@
+"""Worker pool: processes that do the long work of all benches, a bounded number of them, each for one task at a time.
+
+A process stays warm for a while after its task, with what it has worked out for the bench. A task cannot be interrupted, so one
+that is cancelled is stopped at once by ending its process.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import aclosing, asynccontextmanager, suppress
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from machine.workbench.work.heard import heard
+from mdp.kernels.workers import CallError, KilledError, Tell, Worker
+from profiles.errors import UserError
+
+REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
+DO, LOAD = "machine.workbench.work.tasks:do", "machine.workbench.work.tasks:load"
+
+
+class WorkerPool:
+    """At most `most` processes. Every method is called from the event loop."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self._places = asyncio.Semaphore(most)
+        self._busy: list[Worker] = []
+        self._idle: list[Worker] = []  # the one that has rested longest first
+        self._had_by: WeakKeyDictionary[Worker, TaskQueue] = WeakKeyDictionary()  # the tasks that each was taken for last
+
+    @property
+    def full(self) -> bool:
+        """Whether a further task has to wait for another one's end."""
+        return self._places.locked()
+
+    @property
+    def may_start(self) -> bool:
+        """Whether there may be one more process."""
+        return len(self._busy) + sum(worker.ready for worker in self._idle) < self.most
+
+    @asynccontextmanager
+    async def worker(self, tasks: "TaskQueue") -> AsyncIterator[Worker]:
+        """A process for one of these tasks, in the order in which they are asked for. Whoever leaves with an error ends it."""
+        async with self._places:
+            tasks.check_open()
+            worker = self._take(tasks)
+            self._busy.append(worker)
+            try:
+                yield worker
+            except BaseException:
+                worker.end()
+                raise
+            else:
+                self._idle.append(worker)
+            finally:
+                self._busy.remove(worker)
+
+    def end(self, tasks: "TaskQueue | None" = None) -> None:
+        """End the processes that work for these tasks, or may hold what was worked out for them; None: all."""
+        for worker in (*self._busy, *self._idle):
+            if tasks is None or self._had_by[worker] is tasks:
+                worker.end()
+
+    def _take(self, tasks: "TaskQueue") -> Worker:
+        """The process that these tasks had last, else a new one, else the one that has rested longest."""
+        for worker in [worker for worker in self._idle if not worker.ready]:
+            self._idle.remove(worker)
+            worker.end()
+        own = [worker for worker in self._idle if self._had_by[worker] is tasks]
+        if own or not self.may_start:
+            worker = (own or self._idle)[0]
+            self._idle.remove(worker)
+        else:
+            worker = Worker(idle_s=REST_AFTER_S)
+        self._had_by[worker] = tasks
+        return worker
+
+
+class WorkerPools:
+    """Those of one run of the program. quick: for what a person waits for; long: for searches and slices; hand: for planes in
+    hand and a model that is turned; its processes keep what they have worked out for planes on the bench."""
+
+    def __init__(self) -> None:
+        self.quick, self.long, self.hand = WorkerPool(3), WorkerPool(2), WorkerPool(3)
+
+    def end(self) -> None:
+        """End all processes."""
+        for pool in (self.quick, self.long, self.hand):
+            pool.end()
+
+
+class TaskQueue:
+    """The tasks of one session in a pool, one after the other."""
+
+    def __init__(self, pool: WorkerPool) -> None:
+        self.pool = pool
+        self._lock = asyncio.Lock()
+        self._closed = False
+
+    async def warm(self) -> None:
+        """Start a process before it is needed, if there may be one more."""
+        async with self._lock:
+            if self.pool.may_start:
+                with suppress(CallError):  # whoever asks the next one gets the error
+                    await self._ask(LOAD)
+
+    async def run(self, task: str, *given: Any, tell: Tell = lambda value: None) -> Any:
+        """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
+        try:
+            async with self._lock:
+                value, trouble = await self._ask(DO, task, *given, tell=tell)
+        except KilledError:
+            raise UserError("the process that did this work has ended before it was done: try it again") from None
+        if trouble:
+            raise UserError(trouble)
+        return value
+
+    def check_open(self) -> None:
+        """Raises UserError when its session is closed."""
+        if self._closed:
+            raise UserError("this bench is closed: nothing is worked out for it any more")
+
+    def close(self) -> None:
+        """End the processes that work for it or hold anything of it; whatever still waits for one is refused."""
+        self._closed = True
+        self.pool.end(self)
+
+    async def _ask(self, task: str, *given: Any, tell: Tell = lambda value: None) -> Any:
+        async with self.pool.worker(self) as worker, aclosing(heard(worker.ask(task, *given))) as answers:
+            async for done, value in answers:
+                if not done:
+                    tell(value)
+            return value

@@ -1,0 +1,41 @@
+"""One layer's picture from the command line."""
+
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from machine.cli.cli import main
+from machine.cli.commands.export import draw_layer, parse_layer
+from profiles.errors import OutputError, SliceError
+from tests.machine.cli.test_cli import FAST
+from tests.machine.hand import printed
+
+
+def test_export_draws_the_layer_that_it_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    gcode, svg = tmp_path / "a.gcode", tmp_path / "a.svg"
+    whole = ["--as-is", "--set", "process.scale=0.3", "--set", "process.support=none", "--time-limit", "0"]
+    assert main(["export", "demo:bracket", *FAST, *whole, "-o", str(gcode), "--svg", str(svg), "--layer", "1:3"]) == 0
+    third = gcode.read_text().split(";LAYER_CHANGE")[3]
+    ids = {g.get("id") for g in ET.fromstring(svg.read_text()).iter("{http://www.w3.org/2000/svg}g")} - {None, "travels", "seams"}
+    assert ids == set(re.findall(r";TYPE:(.*)", third)) - {"Custom"}
+    assert "part 1, layer 3, z 0.9" in svg.read_text()
+
+
+def test_without_a_layer_the_first_one_is_drawn() -> None:
+    assert parse_layer(None, True) == (1, 1)
+    assert parse_layer("12:345", True) == (12, 345)
+
+
+@pytest.mark.parametrize("layer", ["3", "a:b", "1:2:3", "-1:2", "1:", ""])
+def test_what_is_no_layer_is_refused(layer: str) -> None:
+    with pytest.raises(OutputError, match="PART:LAYER is expected"):
+        parse_layer(layer, True)
+
+
+def test_a_part_or_layer_that_is_not_there_is_named() -> None:
+    with pytest.raises(OutputError, match=r"--layer 3:1: there is no part 3, the parts are 1 to 2"):
+        draw_layer(printed()[2], 3, 1)
+    with pytest.raises(SliceError, match=r"part 2 has no layer 4: its layers are 1 to 3"):
+        draw_layer(printed()[2], 2, 4)

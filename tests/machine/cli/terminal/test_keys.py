@@ -1,0 +1,222 @@
+"""Keys of a running print: what each asks for, and a terminal that is as before afterwards."""
+
+import os
+import pty
+import sys
+import termios
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from machine.cli.terminal.keys import HINT_S, MORE, SURE, Keyboard, Typing, can_type, typing
+from machine.link.pending_commands import Command, Control, PendingCommand
+from machine.link.progress import Progress
+from machine.link.protocol.events import Temperature
+from tests.machine.peers import PATIENCE_S
+
+MOMENT = Progress(0.0, Temperature())
+
+
+def asked(*keys: str, state: str = "printing") -> list[PendingCommand]:
+    """What a run of keys asks for."""
+    control = Control()
+    board = Keyboard(control)
+    board.follow(replace(MOMENT, state=state))
+    for key in keys:
+        board.press(key)
+    return list(iter(control.take, None))
+
+
+def hint_after(*keys: str) -> str:
+    board = Keyboard(Control())
+    for key in keys:
+        board.press(key)
+    return board.hint
+
+
+@pytest.mark.parametrize(("key", "state", "wish"), [
+    ("p", "printing", Command.PAUSE),
+    ("P", "printing", Command.PAUSE),
+    ("r", "paused", Command.RESUME),
+    (" ", "printing", Command.PAUSE),
+    (" ", "paused", Command.RESUME),
+    (" ", "pausing", Command.RESUME),
+    ("e", "printing", Command.EMERGENCY_STOP),
+    ("E", "paused", Command.EMERGENCY_STOP),
+])  # fmt: skip
+def test_a_key_asks_for_its_wish_at_once(key: str, state: str, wish: Command) -> None:
+    assert asked(key, state=state) == [PendingCommand(wish)]
+
+
+@pytest.mark.parametrize("keys", ["", "x", "\x1b", "q", "?", "1", "\r", "c", "cx", "cp", "c "])
+def test_other_keys_and_an_unsure_cancel_ask_for_nothing(keys: str) -> None:
+    assert asked(*keys) == []
+
+
+@pytest.mark.parametrize("keys", ["cc", "cy", "CY"])
+def test_cancelling_is_asked_once_more(keys: str) -> None:
+    assert hint_after(keys[0]) == SURE
+    assert asked(*keys) == [PendingCommand(Command.CANCEL)]
+
+
+def test_a_question_that_nobody_answers_is_void_after_a_while() -> None:
+    control, clock = Control(), [0.0]
+    board = Keyboard(control, lambda: clock[0])
+    board.press("c")
+    clock[0] = HINT_S
+    assert board.hint == ""
+    board.press("c")
+    assert (board.hint, control.take()) == (SURE, None)
+
+
+def test_the_question_goes_away_with_the_answer() -> None:
+    assert hint_after("c", "n") == ""
+
+
+def test_an_emergency_stop_is_never_an_answer_to_a_question() -> None:
+    assert asked("c", "e") == [PendingCommand(Command.EMERGENCY_STOP)]
+
+
+def test_q_is_explained() -> None:
+    assert hint_after("q") == MORE
+
+
+@pytest.mark.parametrize(("keys", "percent"), [
+    ("+", [110.0]), ("++", [110.0, 120.0]), ("=", [110.0]), ("-", [90.0]), ("+-", [110.0, 100.0]), ("_", [90.0]),
+])  # fmt: skip
+def test_the_feed_goes_in_steps(keys: str, percent: list[float]) -> None:
+    assert asked(*keys) == [PendingCommand(Command.FEED, value) for value in percent]
+
+
+def test_steps_begin_at_what_the_program_has_set() -> None:
+    control = Control()
+    board = Keyboard(control)
+    board.follow(replace(MOMENT, feed_percent=50.0, flow_percent=95.0))
+    board.press("+")
+    board.press("]")
+    assert [control.take(), control.take()] == [PendingCommand(Command.FEED, 60.0), PendingCommand(Command.FLOW, 105.0)]
+
+
+def test_overrides_stay_inside_what_the_stream_takes() -> None:
+    assert asked(*"-" * 50)[-1] == PendingCommand(Command.FEED, 10.0)
+    assert asked(*"+" * 50)[-1] == PendingCommand(Command.FEED, 300.0)
+    assert asked(*"]" * 50)[-1] == PendingCommand(Command.FLOW, 200.0)
+    assert asked(*"[" * 50)[-1] == PendingCommand(Command.FLOW, 10.0)
+
+
+class Pressed:
+    """Keys as they come in; wait_for() returns once there are enough."""
+
+    def __init__(self) -> None:
+        self.keys = ""
+        self._more = threading.Condition()
+
+    def __call__(self, key: str) -> None:
+        with self._more:
+            self.keys += key
+            self._more.notify()
+
+    def wait_for(self, count: int) -> str:
+        with self._more:
+            self._more.wait_for(lambda: len(self.keys) >= count, PATIENCE_S)
+        return self.keys
+
+
+@pytest.fixture
+def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A terminal as stdin; its other end, where a person's fingers are."""
+    fingers, terminal = pty.openpty()
+    with os.fdopen(terminal, "r") as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        yield fingers
+    os.close(fingers)
+
+
+def test_keys_come_as_they_are_pressed_and_arrows_are_none(keyboard: int) -> None:
+    pressed = Pressed()
+    with Typing(pressed):
+        os.write(keyboard, b"p")
+        assert pressed.wait_for(1) == "p"
+        os.write(keyboard, b"\x1b[C\x1bOP\x1b[15~r")
+        assert pressed.wait_for(2) == "pr"
+
+
+@pytest.mark.parametrize(("begin", "rest"), [(b"p\x1b", b"[Cr"), (b"p\x1b[", b"Cr"), (b"p\x1bO", b"Pr"), (b"p\x1b[15", b"~r")])
+def test_an_arrow_that_comes_in_pieces_is_no_key_either(keyboard: int, begin: bytes, rest: bytes) -> None:
+    pressed = Pressed()
+    with Typing(pressed):
+        os.write(keyboard, begin)
+        assert pressed.wait_for(1) == "p"
+        os.write(keyboard, rest)
+        assert pressed.wait_for(2) == "pr"
+
+
+def test_ctrl_c_still_interrupts_and_ctrl_z_does_nothing(keyboard: int) -> None:
+    with Typing(Pressed()):
+        settings = termios.tcgetattr(sys.stdin.fileno())
+    assert not settings[3] & (termios.ICANON | termios.ECHO)
+    assert settings[3] & termios.ISIG
+    assert settings[6][termios.VSUSP] == b"\x00"
+
+
+def _interrupted() -> None:
+    with Typing(Pressed()):
+        raise KeyboardInterrupt
+
+
+def test_the_terminal_is_as_before_on_every_way_out(keyboard: int) -> None:
+    before = termios.tcgetattr(sys.stdin.fileno())
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted()
+    assert termios.tcgetattr(sys.stdin.fileno()) == before
+
+
+def test_no_thread_is_left(keyboard: int) -> None:
+    before = set(threading.enumerate())
+    with Typing(Pressed()):
+        pass
+    assert set(threading.enumerate()) <= before
+
+
+def test_a_terminal_that_goes_away_ends_the_reading_of_keys_and_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    fingers, terminal = pty.openpty()
+    with os.fdopen(terminal, "r") as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        with Typing(Pressed()):
+            reader = next(thread for thread in threading.enumerate() if thread.name == "keys")
+            os.close(fingers)
+            reader.join(PATIENCE_S)
+            assert not reader.is_alive()
+
+
+class Console:
+    """Windows' module msvcrt, with what a person has typed."""
+
+    def __init__(self, typed: str) -> None:
+        self._typed = list(typed)
+
+    def kbhit(self) -> bool:
+        return bool(self._typed)
+
+    def getwch(self) -> str:
+        return self._typed.pop(0)
+
+
+def test_where_there_is_no_termios_keys_come_from_the_windows_console(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+    monkeypatch.setitem(sys.modules, "msvcrt", Console("p\xe0Kr\x00;+"))
+    monkeypatch.setitem(sys.modules, "termios", None)
+    pressed = Pressed()
+    assert can_type()
+    with typing(pressed):
+        assert pressed.wait_for(3) == "pr+"
+
+
+def test_where_keys_cannot_be_read_none_are_offered(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+    monkeypatch.setitem(sys.modules, "termios", None)
+    assert not can_type()
+
+
+def test_keys_are_read_from_a_terminal_in_the_foreground_only(keyboard: int) -> None:
+    assert not can_type()  # a terminal, but not the one that controls this process

@@ -1,0 +1,41 @@
+"""The processes that compile the kernels of a first run, and the command that waits for them."""
+
+import sys
+
+import pytest
+
+from machine.pipeline.compilers import Compilers
+from machine.pipeline.precompile import BUNDLES
+from mdp.kernels.cache import mark
+
+
+@pytest.fixture
+def unmarked(monkeypatch, tmp_path):
+    """Nothing is said to be cached, and what is noted is noted elsewhere."""
+    monkeypatch.setattr("mdp.kernels.cache.mark", lambda bundle: tmp_path / bundle)
+    return tmp_path
+
+
+def test_a_bundle_that_was_waited_for_is_not_compiled_again(unmarked, capsys):
+    compilers = Compilers()
+    compilers.wait_for(["dry-run"])
+    assert (unmarked / "dry-run").exists()
+    assert "compiling the kernels (only the first run that needs them does)" in capsys.readouterr().err
+    Compilers().wait_for(["dry-run"])
+    assert capsys.readouterr().err == ""
+
+
+def test_where_no_process_can_be_had_the_work_goes_on(unmarked, monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    Compilers().wait_for(["judge"])
+    assert not (unmarked / "judge").exists()
+
+
+def test_where_no_interpreter_is_found_the_work_goes_on(unmarked, monkeypatch):
+    monkeypatch.setattr(sys, "executable", str(unmarked / "python"))
+    Compilers().wait_for(["judge"])
+    assert not (unmarked / "judge").exists()
+
+
+def test_every_bundle_has_a_mark_of_its_own():
+    assert len({mark(bundle) for bundle in BUNDLES}) == len(BUNDLES)

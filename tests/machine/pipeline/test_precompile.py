@@ -1,0 +1,17 @@
+"""The process that compiles beside the work does not outlive it."""
+
+import pickle
+from pathlib import Path
+
+import pytest
+
+from machine.pipeline.compilers import COMPILE
+from mdp.kernels.workers import Worker, frame
+
+
+def test_the_process_that_compiles_ends_when_nobody_holds_its_pipe_any_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # so that it would compile for a minute
+    answers, _ = Worker(one_core=True).process.communicate(frame(pickle.dumps((COMPILE, ("slice",)))), timeout=60.0)
+    assert b"done" not in answers

@@ -1,0 +1,150 @@
+"""Addresses, names of files and the user's file of keys."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from machine.printing.servers.address import is_server_address, parse_server_address
+from machine.printing.servers.credentials import VARIABLE, Credentials, read_credentials, servers_file
+from machine.printing.servers.gcode_upload import GcodeUpload, server_name
+from machine.printing.servers.http import HttpSession
+from profiles.errors import ServerError
+
+
+@pytest.mark.parametrize(
+    ("text", "url"),
+    [
+        ("octoprint:octopi.local", "http://octopi.local:80"),
+        ("octoprint:192.168.1.20:5000", "http://192.168.1.20:5000"),
+        ("moonraker:voron", "http://voron:7125"),
+        ("Moonraker:https://voron.example/printer/", "https://voron.example:443/printer"),
+        ("duet:[fe80::1]", "http://[fe80::1]:80"),
+    ],
+)
+def test_an_address_names_kind_host_and_port(text: str, url: str) -> None:
+    assert is_server_address(text)
+    assert parse_server_address(text).url == url
+
+
+@pytest.mark.parametrize("text", ["/dev/ttyACM0", "COM3", "sim", "socket://host:1", "rfc2217://host:1", "octoprint"])
+def test_a_port_is_no_server(text: str) -> None:
+    assert not is_server_address(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("prusalink:host", "octoprint:HOST, moonraker:HOST or duet:HOST"),
+        ("octoprint:", "names no host"),
+        ("octoprint:ftp://host", "http:// or https:// is expected"),
+        ("octoprint:host:99999", "port out of range"),
+        ("octoprint:host:0", "port 0 is none"),
+        ("octoprint:host?apikey=1", "nothing may follow the path"),
+        ("octoprint:a b", "names no host"),
+        ("octoprint:ho\x1bst", "names no host"),
+        ("octoprint:a..b", "names no host"),
+        ("octoprint:" + "a" * 64, "names no host"),
+    ],
+)
+def test_an_address_that_names_no_server_is_refused(text: str, sentence: str) -> None:
+    with pytest.raises(ServerError, match=sentence) as refused:
+        parse_server_address(text)
+    assert str(refused.value).isprintable()
+
+
+@pytest.mark.parametrize("text", ["octoprint:me:secret@host", "octoprint:me:secret@host:80x", "octopi:me:secret@host"])
+def test_a_password_in_an_address_is_refused_and_not_repeated(text: str) -> None:
+    with pytest.raises(ServerError, match="names and passwords do not belong into it") as refused:
+        parse_server_address(text)
+    assert "secret" not in str(refused.value)
+
+
+@pytest.mark.parametrize("host", ["999.999.999.999", "\ufb01x", "xn--zz"])
+def test_a_host_that_cannot_be_is_refused_in_a_sentence(host: str) -> None:
+    with pytest.raises(ServerError, match="names no host"):
+        HttpSession(parse_server_address(f"octoprint:{host}"), Credentials()).get("/")
+
+
+@pytest.mark.parametrize(
+    ("name", "there"),
+    [
+        ("box.gcode", "box.gcode"),
+        ("demo:tree", "tree.gcode"),
+        ("Prüfstück Größe 1.gco", "Prufstuck_Groe_1.gco"),
+        ('a"b;c#d\n*.nc', "a_b_c_d.gcode"),
+        ("../../etc/passwd", "etc_passwd.gcode"),
+        ("日本.gcode", "print.gcode"),
+        ("x" * 300 + ".G", "x" * 80 + ".g"),
+        (".gcode", "print.gcode"),
+    ],
+)
+def test_a_file_gets_a_name_that_every_server_can_keep(name: str, there: str) -> None:
+    assert server_name(name) == there
+
+
+def test_an_upload_knows_its_lines_and_checksums() -> None:
+    upload = GcodeUpload("a.gcode", ("G28", "G1 X1"))
+    assert upload.content == b"G28\nG1 X1\n"
+    assert [upload.line_at(position) for position in (0, 3, 4, 10)] == [0, 0, 1, 2]
+    assert upload.crc32 == "077a1e05"
+
+
+def write_servers(text: str, mode: int = 0o600) -> Path:
+    file = servers_file()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text)
+    file.chmod(mode)
+    return file
+
+
+@pytest.fixture(autouse=True)
+def _own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    monkeypatch.delenv(VARIABLE, raising=False)
+
+
+def test_a_key_is_found_by_host_and_port_before_the_host_alone() -> None:
+    file = write_servers('[servers."octopi"]\nkey = "one"\nca_file = "ca.pem"\n[servers."octopi:5000"]\nkey = "two"\n')
+    assert read_credentials(parse_server_address("octoprint:octopi")).key == "one"
+    assert read_credentials(parse_server_address("octoprint:octopi")).ca_file == file.parent / "ca.pem"
+    assert read_credentials(parse_server_address("octoprint:octopi:5000")).key == "two"
+    assert read_credentials(parse_server_address("octoprint:other")).key == ""
+
+
+def test_a_host_is_the_same_in_capitals() -> None:
+    write_servers('[servers."OctoPi.local"]\nkey = "one"\n')
+    assert read_credentials(parse_server_address("octoprint:octopi.LOCAL")).key == "one"
+
+
+def test_the_variable_goes_before_the_file_and_no_key_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    write_servers('[servers."octopi"]\nkey = "one"\n')
+    monkeypatch.setenv(VARIABLE, "other")
+    credentials = read_credentials(parse_server_address("octoprint:octopi"))
+    assert credentials.key == "other"
+    assert "other" not in repr(credentials)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows keeps a user's folders to the user")
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620])
+def test_a_file_of_keys_that_others_can_read_is_refused(mode: int) -> None:
+    file = write_servers('[servers."octopi"]\nkey = "one"\n', mode)
+    with pytest.raises(ServerError, match=f"chmod 600 {file}"):
+        read_credentials(parse_server_address("octoprint:octopi"))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('[server."octopi"]\nkey = "x"', "'server' is not known"),
+        ('[servers."octopi"]\nkye = "x"', "'kye': key and ca_file are known"),
+        ('[servers."octopi"]\nkey = 1234', "must be a text in quotes"),
+        ("[servers]\nkey = 'x'", "must be tables of their own"),
+        ('[servers."octopi"]\nca_file = "~nobody-of-that-name/ca.pem"', "no home folder of that user is known"),
+        ('[servers."octopi"]\nkey = "a\\nb"', "has characters that no key has"),
+    ],
+)
+def test_a_wrong_file_of_servers_is_refused(text: str, sentence: str) -> None:
+    write_servers(text)
+    with pytest.raises(ServerError, match=sentence):
+        read_credentials(parse_server_address("octoprint:octopi"))

@@ -1,0 +1,244 @@
+"""The servers themselves, where they are installed: variables name the programs, as docs/network.md tells.
+
+TILTPRINT_OCTOPRINT=/path/to/octoprint          with its own virtual printer
+TILTPRINT_MOONRAKER=/path/to/moonraker          before a stub of Klipper's API server
+"""
+
+import os
+import socket
+import sqlite3
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from machine.link.pending_commands import Command, Control
+from machine.printing.servers.credentials import VARIABLE
+from machine.printing.servers.follow import End, follow_print
+from machine.printing.servers.gcode_upload import GcodeUpload
+from machine.printing.servers.server import JobStatus, Phase
+from machine.printing.servers.servers import open_server
+from profiles.errors import ServerError
+from tests.machine.printing.servers.klippy_stub import KlippyStub
+
+OCTOPRINT, MOONRAKER = os.environ.get("TILTPRINT_OCTOPRINT", ""), os.environ.get("TILTPRINT_MOONRAKER", "")
+KEY = "0123456789ABCDEF0123456789ABCDEF"
+PASSES = tuple(f"G1 X{20 * (k % 2)} Y{k % 20} F6000" for k in range(400))
+UPLOAD = GcodeUpload("passes.gcode", ("G28", *PASSES))
+OCTOPRINT_SETTINGS = f"""
+api: {{key: {KEY}}}
+server: {{firstRun: false, onlineCheck: {{enabled: false}}, pluginBlacklist: {{enabled: false}}}}
+plugins:
+  virtual_printer: {{enabled: true}}
+  _disabled: [softwareupdate, tracking, announcements, discovery, errortracking, backup, pluginmanager]
+serial: {{autoconnect: true, port: VIRTUAL, baudrate: 115200, additionalPorts: [VIRTUAL]}}
+"""
+MOONRAKER_SETTINGS = """
+[server]
+host: 127.0.0.1
+port: {port}
+klippy_uds_address: {socket}
+[authorization]
+enable_api_key: True
+[machine]
+provider: none
+validate_service: False
+"""
+pytestmark = [pytest.mark.slow]
+needs_octoprint = pytest.mark.skipif(not OCTOPRINT, reason="TILTPRINT_OCTOPRINT names no octoprint")
+needs_moonraker = pytest.mark.skipif(not MOONRAKER, reason="TILTPRINT_MOONRAKER names no moonraker")
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as held:
+        return int(held.getsockname()[1])
+
+
+@contextmanager
+def running(words: list[str], log: Path) -> Iterator[None]:
+    with log.open("wb") as out:
+        process = subprocess.Popen(words, stdout=out, stderr=out)
+        try:
+            yield
+        finally:
+            process.terminate()
+            process.wait(20)
+
+
+def wait_ready(address: str) -> None:
+    deadline = time.monotonic() + 90
+    while True:
+        try:
+            with open_server(address) as server:
+                server.greet()
+                if server.status().phase is Phase.READY:
+                    return
+        except ServerError:
+            if time.monotonic() > deadline:
+                raise
+        assert time.monotonic() < deadline
+        time.sleep(0.5)
+
+
+@pytest.fixture
+def octoprint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """The address of an OctoPrint whose virtual printer is connected."""
+    monkeypatch.setenv(VARIABLE, KEY)
+    base, port = tmp_path / "base", free_port()
+    base.mkdir()
+    program = [OCTOPRINT, "--basedir", str(base)]
+    subprocess.run([*program, "user", "add", "--password", "workshop", "--admin", "maker"], check=True, capture_output=True)
+    (base / "config.yaml").write_text(OCTOPRINT_SETTINGS)
+    serve = [*program, "serve", "--iknowwhatimdoing", "--host", "127.0.0.1", "--port", str(port)]
+    with running(serve, tmp_path / "octoprint.log"):
+        address = f"octoprint:127.0.0.1:{port}"
+        wait_ready(address)
+        yield address
+
+
+@pytest.fixture
+def moonraker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[str, KlippyStub]]:
+    """The address of a Moonraker and the Klipper behind it; the key is the one that it has made for itself."""
+    for folder in ("config", "gcodes", "logs", "database"):
+        (tmp_path / folder).mkdir()
+    port, uds = free_port(), tmp_path / "klippy.sock"
+    (tmp_path / "config" / "moonraker.conf").write_text(MOONRAKER_SETTINGS.format(port=port, socket=uds))
+    with KlippyStub(uds, tmp_path / "gcodes") as klippy, running([MOONRAKER, "-d", str(tmp_path)], tmp_path / "moonraker.log"):
+        address = f"moonraker:127.0.0.1:{port}"
+        monkeypatch.setenv(VARIABLE, wait_for_key(tmp_path / "database" / "moonraker-sql.db"))
+        wait_ready(address)
+        yield address, klippy
+
+
+def wait_for_key(database: Path) -> str:
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        time.sleep(0.5)
+        try:
+            with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
+                rows = connection.execute("SELECT password FROM authorized_users WHERE username = '_API_KEY_USER_'").fetchall()
+        except sqlite3.Error:
+            continue
+        if rows:
+            return str(rows[0][0])
+    raise AssertionError("Moonraker has made no key")
+
+
+Steps = Callable[[JobStatus, Control], None]
+
+
+def print_on(address: str, steps: Steps) -> tuple[End, list[Phase]]:
+    """How a print ends that is given orders on the way, and the phases it was seen in."""
+    phases: list[Phase] = []
+    control = Control()
+
+    def on_status(status: JobStatus, message: str) -> None:
+        if phases[-1:] != [status.phase]:
+            phases.append(status.phase)
+            steps(status, control)
+
+    with open_server(address) as server:
+        file = server.upload(UPLOAD, lambda count: None)
+        return follow_print(server, file, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False), phases
+
+
+def pause_resume_cancel() -> Steps:
+    orders = {Phase.PRINTING: [Command.PAUSE, Command.CANCEL], Phase.PAUSED: [Command.RESUME]}
+
+    def steps(status: JobStatus, control: Control) -> None:
+        if orders.get(status.phase):
+            control.ask(orders[status.phase].pop(0))
+
+    return steps
+
+
+def only_watch(status: JobStatus, control: Control) -> None:
+    """Ask for nothing."""
+
+
+def stop_at_once(status: JobStatus, control: Control) -> None:
+    if status.phase is Phase.PRINTING:
+        control.ask(Command.EMERGENCY_STOP)
+
+
+def check_broken_off(address: str) -> None:
+    """A person who interrupts an upload leaves nothing of it."""
+    large = GcodeUpload("broken.gcode", PASSES * 200)
+
+    def interrupt(count: int) -> None:
+        if count > 1_000_000:
+            raise KeyboardInterrupt
+
+    with open_server(address) as server:
+        with pytest.raises(KeyboardInterrupt):
+            server.upload(large, interrupt)
+        time.sleep(1.0)
+        assert not server.has("broken.gcode")
+
+
+def check_refusals(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "another-key")
+    with open_server(address) as server, pytest.raises(ServerError, match="refuses the key"):
+        server.greet()
+    monkeypatch.setenv(VARIABLE, "")
+    with open_server(address) as server, pytest.raises(ServerError, match="wants a key"):
+        server.greet()
+
+
+@needs_octoprint
+def test_octoprint_prints_pauses_cancels_and_halts(octoprint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_server(octoprint) as server:
+        assert server.greet().text.startswith("OctoPrint 1.")
+        assert not server.has("passes.gcode")
+    end, phases = print_on(octoprint, only_watch)
+    assert (end, phases[-1]) == (End.DONE, Phase.DONE)
+    with open_server(octoprint) as server:
+        assert server.has("passes.gcode")
+    check_pause_and_cancel(octoprint)
+    check_broken_off(octoprint)
+    assert print_on(octoprint, stop_at_once)[0] is End.STOPPED
+    check_refusals(octoprint, monkeypatch)
+
+
+@needs_moonraker
+def test_moonraker_prints_pauses_cancels_and_halts(moonraker: tuple[str, KlippyStub], monkeypatch: pytest.MonkeyPatch) -> None:
+    address, klippy = moonraker
+    with open_server(address) as server:
+        greeting = server.greet()
+        assert greeting.text.startswith("Moonraker")
+        assert greeting.limits["Z"] == (-5.0, 400.0)
+        assert greeting.steppers == {"stepper_a", "stepper_c"}
+        assert not server.has("passes.gcode")
+    end, phases = print_on(address, only_watch)
+    assert (end, phases[-1]) == (End.DONE, Phase.DONE)
+    with open_server(address) as server:
+        assert server.has("passes.gcode")
+        server.command("M220 S120")
+    assert klippy.scripts[-1] == "M220 S120"
+    check_pause_and_cancel(address)
+    check_while_printing(address)
+    check_broken_off(address)
+    assert print_on(address, stop_at_once)[0] is End.STOPPED
+    with open_server(address) as server:
+        assert server.status().phase is Phase.OFFLINE
+    check_refusals(address, monkeypatch)
+
+
+def check_pause_and_cancel(address: str) -> None:
+    end, phases = print_on(address, pause_resume_cancel())
+    assert end is End.CANCELLED
+    begin = [phase for phase in phases if phase in (Phase.PRINTING, Phase.PAUSED)][:3]
+    assert begin == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
+
+
+def check_while_printing(address: str) -> None:
+    with open_server(address) as server:
+        server.start("passes.gcode")
+        with pytest.raises(ServerError, match="printing a file of this name now"):
+            server.upload(UPLOAD, lambda count: None)
+        with pytest.raises(ServerError, match="cannot start it now: SD busy"):
+            server.start("passes.gcode")
+        server.cancel()

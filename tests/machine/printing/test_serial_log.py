@@ -1,0 +1,102 @@
+"""The serial log: whole lines with times, bounded, old ones deleted, and never in the way."""
+
+import re
+import threading
+from pathlib import Path
+
+import pytest
+
+from machine.link.stream import print_lines
+from machine.printing.serial_log import KEPT, PIECES, SerialLog, new_log, piece_of, tap
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.profile import load
+
+STAMP = re.compile(r"\d\d:\d\d:\d\d\.\d{3} ")
+
+
+def logged(file: Path) -> list[str]:
+    """The lines of a log without title and times."""
+    title, *lines = file.read_text().splitlines()
+    assert title.startswith("# tiltprint, 20")
+    assert all(STAMP.match(line) for line in lines)
+    return [line[13:] for line in lines]
+
+
+def test_chunks_become_whole_lines_in_the_order_of_their_ends(tmp_path: Path) -> None:
+    with SerialLog(tmp_path / "a.log", "to nowhere") as log:
+        log.note(">", b"N1 G28*18\nN2 G1")
+        log.note("<", b"ok N1\n")
+        log.note(">", b" X1*99\n")
+        log.remark("paused")
+    assert logged(tmp_path / "a.log") == ["> N1 G28*18", "< ok N1", "> N2 G1 X1*99", "# paused"]
+
+
+def test_the_title_tells_what_was_printed_where(tmp_path: Path) -> None:
+    with SerialLog(tmp_path / "a.log", "tree.gcode to /dev/ttyACM0"):
+        pass
+    assert (tmp_path / "a.log").read_text().endswith(", tree.gcode to /dev/ttyACM0\n")
+
+
+def test_rubbish_is_written_so_that_every_byte_can_be_read(tmp_path: Path) -> None:
+    with SerialLog(tmp_path / "a.log", "") as log:
+        log.note("<", b"\xff\x00ok\r\nwait")
+    assert logged(tmp_path / "a.log") == [r"< \xff\x00ok", "< wait (unfinished)"]
+
+
+def test_the_newest_line_is_on_disk_after_a_second_without_closing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = SerialLog(tmp_path / "a.log", "")
+    monkeypatch.setattr("machine.printing.serial_log.time.time", iter([100.0, 100.5, 101.5]).__next__)
+    for line in (b"one\n", b"two\n", b"three\n"):
+        log.note("<", line)
+    assert logged(tmp_path / "a.log") == ["< one", "< two", "< three"]
+
+
+def test_a_long_log_keeps_its_beginning_and_its_end(tmp_path: Path) -> None:
+    file, limit = tmp_path / "a.log", 200_000
+    with SerialLog(file, "", limit) as log:
+        for number in range(20_000):
+            log.note(">", b"N%d G1 X1\n" % number)
+    pieces = sorted(tmp_path.iterdir(), key=lambda piece: int(f"0{piece.stem[2:]}"))  # a.log, a.5.log, a.6.log
+    assert len(pieces) == PIECES
+    assert sum(piece.stat().st_size for piece in pieces) <= 1.5 * limit
+    assert "> N0 G1 X1" in file.read_text()
+    assert pieces[-1].read_text().endswith("> N19999 G1 X1\n")
+
+
+def test_the_newest_ten_logs_are_kept_each_with_its_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    files = []
+    for _ in range(KEPT + 3):
+        with new_log("print", "") as log:
+            files.append(log.file)
+            piece_of(log.file, 1).write_text("")
+    with new_log("console", "") as console:
+        pass
+    names = sorted(path.name for path in (tmp_path / "tiltprint" / "logs").iterdir())
+    assert oct(console.file.stat().st_mode & 0o777) == "0o600"  # what a person prints concerns nobody else
+    assert oct(console.file.parent.stat().st_mode & 0o777) == "0o700"
+    assert names == sorted([console.file.name, *(p.name for f in files[3:] for p in (f, piece_of(f, 1)))])
+
+
+def test_a_log_that_cannot_be_written_says_so_and_stays_silent(tmp_path: Path) -> None:
+    with SerialLog(tmp_path / "nowhere" / "a.log", "") as log:
+        log.note(">", b"G28\n")
+    assert log.trouble == "no such file or directory"
+
+
+def test_the_orders_of_a_safe_end_are_logged_too(tmp_path: Path) -> None:
+    stop = threading.Event()
+    with SerialLog(tmp_path / "a.log", "") as log, SimulatedPrinter(load().machine, speed=20.0) as printer:
+        lines = ["M104 S200", *["G1 X5 F60", "G1 X0"] * 99]
+        medium = tap(log.note)
+        print_lines(lines, printer.path, on_progress=lambda progress: progress.sent > 5 and stop.set(), stop=stop, medium=medium)
+    lines = logged(tmp_path / "a.log")
+    assert any(line.startswith("> N") and "M104 S200" in line for line in lines)
+    assert "> M104 S0" in lines
+    assert any(line.startswith("< ok T:") for line in lines)
+
+
+def test_a_full_disk_ends_the_log_not_the_print() -> None:
+    with SerialLog(Path("/dev/full"), "") as log:
+        log.note(">", b"G28\n")
+    assert log.trouble == "no space left on device"

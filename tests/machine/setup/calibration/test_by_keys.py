@@ -1,0 +1,172 @@
+"""Touches by keys: a machine at a port whose tip a person takes onto a mark, a step at a time."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machine.cli.cli import main
+from machine.cli.commands.measuring import calibrate_by_keys
+from machine.cli.commands.measuring.calibrate_by_keys import ENTER, KeyedTouches
+from machine.kinematics.table import machine_points
+from machine.printing.command_session import CommandSession
+from machine.setup.calibration.fit import Touch
+from machine.setup.calibration.jog import STEPS_MM, WAYS, Jog, begin_jog, pressed
+from machine.setup.calibration.program import plan_touches
+from machine.simulator.simulator import SimulatedPrinter
+from mdp.pose import Pose, level
+from profiles.errors import MoveError
+from profiles.machine import Machine
+from profiles.places import own_folder
+from profiles.profile import load
+from tests.machine.setup.calibration.touches import machine_of, really
+
+GENERIC = machine_of("generic_ac")
+MARK = (38.0, 2.0, 20.0)
+MOST_KEYS = 3000
+
+
+@pytest.fixture(autouse=True)
+def _folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+class Mover:
+    """Goes wherever it is sent, and keeps what it was told."""
+
+    def __init__(self) -> None:
+        self.at_mm, self.pose, self.turned_at_mm = [0.0, 0.0, 150.0], Pose(0.0, 0.0), list[float]()
+
+    def rise(self, z_mm: float) -> None:
+        self.at_mm[2] = z_mm
+
+    def cross(self, x_mm: float, y_mm: float) -> None:
+        self.at_mm[:2] = x_mm, y_mm
+
+    def turn(self, pose: Pose) -> None:
+        self.pose = pose
+        self.turned_at_mm.append(self.at_mm[2])
+
+    def arrive(self) -> None:
+        """It is always there."""
+
+
+def steady_hand(mover: Mover, real: Machine) -> Iterator[str]:
+    """Keys that take the tip onto the mark of a real machine, as near as the smallest step allows, again and again."""
+    for _ in range(MOST_KEYS):
+        away = machine_points(real, mover.pose, np.array([MARK]))[0] - np.array(mover.at_mm)
+        axis = int(np.abs(away).argmax())
+        if abs(away[axis]) <= 0.5 * STEPS_MM["4"]:
+            yield "\n"
+            continue
+        yield next((key for key, step in STEPS_MM.items() if step <= abs(away[axis])), "4")
+        yield next(key for key, way in WAYS.items() if way == (axis, int(np.sign(away[axis]))))
+    raise AssertionError(f"{away} mm from the mark at {mover.pose}, and no step leads nearer")
+
+
+def test_a_steady_hand_takes_twelve_touches_to_a_hundredth() -> None:
+    real, mover = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)}), Mover()
+    plan = plan_touches(GENERIC, MARK[2], float(np.hypot(*MARK[:2])))
+    touches = KeyedTouches(GENERIC, plan, mover, steady_hand(mover, real), lambda line: None).run()  # type: ignore[arg-type]
+    exact = [machine_points(real, touch.pose, np.array([MARK]))[0] for touch in touches]
+    assert len(touches) == 12
+    assert np.abs([touch.at_mm for touch in touches] - np.array(exact)).max() <= 0.5 * STEPS_MM["4"] + 1e-9
+    assert min(mover.turned_at_mm) == plan.safe_z_mm  # the table turns under a tip that is over all that turns
+
+
+def test_a_touch_is_left_out_and_one_is_taken_again() -> None:
+    plan, mover = plan_touches(GENERIC, 20.0), Mover()
+    keys = iter(["\n", "d", "b", "a", "\n", "n", *["\n"] * 10])
+    touches = KeyedTouches(GENERIC, plan, mover, keys, lambda line: None).run()  # type: ignore[arg-type]
+    x, y, _ = plan.expected_mm[0]
+    assert touches[0] == Touch(plan.poses[0], (x - 1.0, y, mover_height(plan.expected_mm[0][2])))
+    assert [touch.pose for touch in touches] == [plan.poses[0], *plan.poses[2:]]
+
+
+def mover_height(expected_z_mm: float) -> float:
+    """Where a touch begins: 8 mm over the mark."""
+    return expected_z_mm + 8.0
+
+
+@pytest.mark.parametrize(
+    ("at_mm", "key", "sentence"),
+    [
+        ((0.0, 0.0, 25.5), "f", "Z would be 24.50 mm: 25.00 to"),
+        ((-155.0, 0.0, 30.0), "a", "X would be -165.00 mm: -160.00 to 160.00"),
+    ],
+)
+def test_steps_that_are_too_deep_or_too_far_are_refused(at_mm: tuple[float, float, float], key: str, sentence: str) -> None:
+    with pytest.raises(MoveError, match=sentence):
+        pressed(Jog(at_mm, 25.0, 10.0), key, GENERIC, level(GENERIC))
+
+
+def test_a_long_step_down_is_a_short_one_where_the_mark_may_be() -> None:
+    near, far = Jog((0.0, 0.0, 30.0), 14.0, 10.0), Jog((0.0, 0.0, 60.0), 14.0, 10.0)
+    assert pressed(near, "f", GENERIC, level(GENERIC)).at_mm[2] == 29.0
+    assert pressed(far, "f", GENERIC, level(GENERIC)).at_mm[2] == 50.0
+
+
+def test_a_head_that_would_lean_over_the_plate_is_refused() -> None:
+    pose = Pose(60.0, 0.0)
+    at = machine_points(GENERIC, pose, np.array([[0.0, 30.0, 5.0]]))[0]
+    jog = Jog((float(at[0]), float(at[1]), float(at[2])), -500.0, 1.0)
+    for _ in range(5):
+        jog = pressed(jog, "r", GENERIC, pose)
+    with pytest.raises(MoveError, match="would meet the table"):
+        pressed(Jog((jog.at_mm[0], jog.at_mm[1], jog.at_mm[2] - 12.0), -500.0, 1.0), "f", GENERIC, pose)
+
+
+def test_where_a_sign_is_unknown_the_mark_may_be_as_deep_as_it_is_either_way() -> None:
+    unsure = GENERIC.model_copy(update={"uncalibrated": ("machine.tilt.sign",)})
+    plan = plan_touches(GENERIC, 20.0)
+    steep = max(range(12), key=lambda k: abs(plan.poses[k].tilt_deg))
+    assert begin_jog(unsure, plan, steep, 100.0).lowest_mm <= begin_jog(GENERIC, plan, steep, 100.0).lowest_mm
+
+
+def test_the_command_saves_what_a_hand_has_touched_and_leaves_the_machine_level_and_cold(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real, mover = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)}), Mover()
+
+    class Followed(calibrate_by_keys.PrinterMover):
+        """A mover at a real port of which the hand sees where it is."""
+
+        def rise(self, z_mm: float) -> None:
+            super().rise(z_mm)
+            mover.rise(z_mm)
+
+        def cross(self, x_mm: float, y_mm: float) -> None:
+            super().cross(x_mm, y_mm)
+            mover.cross(x_mm, y_mm)
+
+        def turn(self, pose: Pose) -> None:
+            super().turn(pose)
+            mover.turn(pose)
+
+    @contextmanager
+    def keys(session: CommandSession) -> Iterator[Iterator[str]]:
+        hand = steady_hand(mover, real)
+        yield iter(lambda: ENTER[0] if mover.turned_at_mm == [] else next(hand), None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(calibrate_by_keys, "PrinterMover", Followed)
+    monkeypatch.setattr(calibrate_by_keys, "keys_of_a_person", keys)
+    monkeypatch.setattr(calibrate_by_keys, "can_type", lambda: True)
+    with SimulatedPrinter(GENERIC, float("inf")) as printer:
+        radius = str(float(np.hypot(*MARK[:2])))
+        command = ["calibrate", "--port", printer.path, "--mark-height", "20", "--mark-radius", radius]
+        assert main(command) == 0
+        assert printer.record.end[-1, 3:5].tolist() == [0.0, 0.0]
+        assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
+    saved = load("generic_ac").machine
+    assert saved.turn.point_mm[:2] == pytest.approx((0.5, -0.4), abs=0.02)
+    assert saved.tilt.point_mm[1:] == pytest.approx((0.8, -13.0), abs=0.03)
+    assert "12, A" in capsys.readouterr().err.replace("touch 12 of 12, ", "12, ")
+
+
+def test_without_a_terminal_it_is_one_sentence_and_nothing_is_opened(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "--port", "/dev/nowhere"]) == 1
+    assert "--port without --probe takes keys from a terminal, and there is none" in capsys.readouterr().err
+    assert not own_folder("machine").exists()

@@ -1,0 +1,26 @@
+"""The calibration program is clear of everything on every machine that tilts."""
+
+import pytest
+
+from machine.dryrun.dryrun import dry_run
+from machine.setup.calibration.program import calibration_lines, plan_touches
+from profiles.errors import MoveError
+from profiles.profile import load, shipped
+from tests.machine.setup.calibration.touches import machine_of
+
+
+@pytest.mark.parametrize("name", [name for name in shipped("machine") if machine_of(name).tilts])
+def test_the_program_of_every_machine_is_clear_and_inside_its_limits(name: str) -> None:
+    profile = load(name)
+    touches = plan_touches(profile.machine, 30.0)
+    lines = list(calibration_lines(profile, touches))
+    table = profile.model_copy(update={"machine": profile.machine.model_copy(update={"coordinates": "table"})})
+    errors = [f for f in dry_run(lines, table).findings if f.severity == "error"]
+    assert errors == []
+    assert not any(line.startswith(("M104 S2", "M109", "M140", "M190")) for line in lines)
+    assert len(touches.poses) == 12
+
+
+def test_a_machine_with_three_axes_has_nothing_to_calibrate() -> None:
+    with pytest.raises(MoveError, match="there is no rotary axis"):
+        plan_touches(machine_of("three_axis"), 20.0)

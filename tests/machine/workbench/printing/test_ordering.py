@@ -1,0 +1,128 @@
+"""What is known of slices is not asked for again: a print of them is refused before a printer is asked, or begins sooner."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from zlib import crc32
+
+import pytest
+
+from machine.dryrun.dryrun import dry_run, summary
+from machine.dryrun.findings import Finding, KnownFindings, known_findings
+from machine.pipeline.requests import PrintRequest
+from machine.program import Alternative
+from machine.workbench.printing.at_page import AtPage
+from machine.workbench.printing.checks import program_of
+from machine.workbench.printing.order import PrintOrder
+from machine.workbench.printing.ordering import order_of
+from machine.workbench.printing.process import Checks, carry_out
+from machine.workbench.work.slices import Sliced
+from profiles.errors import PlanError, PrinterError, UserError
+from profiles.profile import Profile, load
+
+PROFILE = load()
+HEAT = ["G21", "G90", "M83", "G28", "G92 A0 C0", "M104 S210", "M109 S210"]
+GOOD, BAD = [*HEAT, "G1 X10 E1 F600", "M104 S0"], ["G28", "G1 X500 F600"]
+OTHER = Finding("warning", "told", 1, 0, 0, "was found before")
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def file(lines: list[str]) -> Path:
+    """A G-code file of these lines."""
+    content = ("\n".join(lines) + "\n").encode()
+    path = Path(f"{crc32(content)}.gcode")
+    path.write_bytes(content)
+    return path
+
+
+def session(lines: list[str], profile: Profile = PROFILE) -> Any:
+    """A bench whose slices are these lines, dry-run as slicing does it."""
+    known = known_findings(lines, profile, dry_run(lines, profile).findings)
+    sliced = Sliced(
+        Path("page.html"), file(lines), "key", 60.0, 1.0, known, Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
+    )
+    bench = SimpleNamespace(model=SimpleNamespace(name="box.stl"), profile=profile)
+    return SimpleNamespace(
+        closed=False, bench=bench, slicing=SimpleNamespace(needed=lambda: SimpleNamespace(bench=bench, sliced=sliced))
+    )
+
+
+class Silent:
+    """Says nothing."""
+
+    def tell(self, **values: Any) -> None:
+        """Nobody listens."""
+
+
+def refusal(given: Any, port: str, **further: Any) -> UserError:
+    with pytest.raises(UserError) as refused:
+        order_of(given, PrintRequest(port, **further), False)
+    return refused.value
+
+
+def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_in_the_sentence_of_print() -> None:
+    sentence = str(refusal(session(BAD), "/dev/no-such-port"))
+    silent: Any = Silent()
+    by_print = carry_out(PrintOrder("box.stl", file(BAD), PROFILE, PrintRequest("sim")), AtPage(silent), Checks(silent))
+    assert (sentence, by_print["end"]) == (by_print["sentence"], "refused")
+    assert sentence.startswith("the dry run found ")
+    assert "X goes to 500 mm" in sentence
+    assert order_of(session(BAD), PrintRequest("/dev/no-such-port"), True).force
+
+
+@pytest.mark.parametrize(("machine", "port", "further", "sentence"), [
+    ("linuxcnc_xyzac", "/dev/no-such-port", {}, "speaks linuxcnc, which opens files itself: use export"),
+    ("generic_ac", "duet:printer", {}, "generic A/C table writes for marlin, but a Duet prints reprapfirmware: "),
+    ("generic_ac", "/dev/no-such-port", {"baud": 7}, "baud rate 7 is not possible: "),
+    ("generic_ac", "sim", {"sim_speed": -1.0}, "--sim-speed is -1: "),
+])  # fmt: skip
+def test_what_the_machine_and_the_port_decide_is_refused_first(
+    machine: str, port: str, further: dict[str, Any], sentence: str
+) -> None:
+    refused = refusal(session(BAD, load(machine)), port, **further)
+    assert isinstance(refused, PrinterError)
+    assert sentence in str(refused)
+
+
+def test_stale_slices_are_refused_before_all_else() -> None:
+    def needed() -> Sliced:
+        raise PlanError("slice it again")
+
+    stale = session(BAD)
+    stale.slicing = SimpleNamespace(needed=needed)
+    assert str(refusal(stale, "/dev/no-such-port", baud=7)) == "slice it again"
+
+
+def program(lines: list[str], profile: Profile, known: KnownFindings | None) -> tuple[Finding, ...]:
+    return program_of(PrintOrder("box.stl", file(lines), profile, PrintRequest("sim"), known=known)).run.findings
+
+
+def test_what_is_known_of_the_very_lines_for_the_very_profile_is_not_looked_for_again() -> None:
+    known = known_findings(GOOD, PROFILE, [OTHER])
+    assert program(GOOD, PROFILE, known) == (OTHER,)
+    order = PrintOrder("box.stl", file(GOOD), PROFILE, PrintRequest("sim"), known=known)
+    anew = dry_run(GOOD, PROFILE)
+    looked_for = {"findings": [], "interfaces": []}
+    assert summary(program_of(order).run) | looked_for == summary(anew) | looked_for
+
+
+@pytest.mark.parametrize(("lines", "profile"), [
+    ([*GOOD[:-1], "M104 S1"], PROFILE),
+    ([*GOOD, ""], PROFILE),
+    (GOOD[1:], PROFILE),
+    (GOOD, load(settings=["machine.nozzle_limit_c=290"])),
+])  # fmt: skip
+def test_what_differs_by_a_byte_or_a_setting_is_dry_run_anew(lines: list[str], profile: Profile) -> None:
+    findings = program(lines, profile, known_findings(GOOD, PROFILE, [OTHER]))
+    assert findings == dry_run(lines, profile).findings
+    assert OTHER not in findings
+
+
+def test_a_line_that_would_be_two_when_the_text_is_read_again_is_dry_run_anew() -> None:
+    in_one = [*GOOD[:-2], "\n".join(GOOD[-2:])]
+    assert file(in_one) == file(GOOD)
+    assert OTHER not in program(GOOD, PROFILE, known_findings(in_one, PROFILE, [OTHER]))

@@ -1,0 +1,535 @@
+"""Prints of the workbench: that they end safely whoever dies, and are refused as `print` refuses."""
+
+import asyncio
+import os
+import re
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from machine.cli.terminal.plain import said_to
+from machine.cli.terminal.progress import say
+from machine.dryrun.timeline import UnknownTimeline
+from machine.link.journal import Journal, JournalHeading
+from machine.link.pending_commands import Command, Control
+from machine.link.progress import Progress
+from machine.link.protocol.events import Temperature
+from machine.pipeline.requests import PrintRequest
+from machine.printing.attendance import Observers
+from machine.printing.compatibility import refuse
+from machine.printing.serial_log import SerialLog
+from machine.printing.servers import follow
+from machine.printing.servers.credentials import VARIABLE
+from machine.simulator.simulator import SimulatedPrinter
+from machine.workbench.printing import running_print
+from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage
+from machine.workbench.printing.commands import COMMANDS, PageOfPrints, obey
+from machine.workbench.printing.order import FollowOrder, Order, PrintOrder, ResumeOrder
+from machine.workbench.printing.prints import Prints
+from machine.workbench.printing.process import Checks, carry_out
+from machine.workbench.printing.running_print import RunningPrint
+from mdp.kernels.workers import frame, listen
+from profiles.errors import PrinterError
+from profiles.profile import Profile, load
+from tests.machine.link.failing_disk import keep_notes_in
+from tests.machine.printing.servers.stand_ins import KEY, OctoPrintStandIn, stand_in
+
+PROFILE = load()
+_folder = tempfile.TemporaryDirectory()
+HEAT = ["G21", "G90", "M83", "G28", "G92 A0 C0", "M140 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
+STROKES = [f"G1 X{x} Y{y} E1.0 F60" for y in range(50) for x in (20, -20)]  # for an hour
+HOUR = "\n".join([*HEAT, *STROKES, "M104 S0", "M140 S0"]) + "\n"
+
+
+def order(port: str, gcode: str = HOUR, force: bool = True) -> PrintOrder:
+    return PrintOrder("hour", written(gcode), PROFILE, PrintRequest(port), force)
+
+
+@cache
+def written(gcode: str) -> Path:
+    """A file with G-code, which is there as long as the tests run."""
+    file = Path(_folder.name) / f"{len(gcode)}.gcode"
+    file.write_text(gcode)
+    return file
+
+
+def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable[[Prints, RunningPrint], None]) -> dict[str, Any]:
+    """The last state of a print that is ended in some way when it runs."""
+
+    async def run() -> dict[str, Any]:
+        prints = Prints()
+
+        async def reach(condition: Callable[[RunningPrint], object]) -> RunningPrint:
+            while not condition(prints.prints[0]):
+                await prints.changed(prints.version)
+            return prints.prints[0]
+
+        prints.begin("me", order(port))
+        begun = await reach(lambda current: current.state["phase"] == "ready")
+        begun.begin()
+        await reach(lambda current: current.state["progress"] and runs(current))
+        end(prints, begun)
+        state = (await reach(lambda current: current.over)).state
+        await asyncio.gather(*prints._tasks)
+        return state
+
+    return asyncio.run(asyncio.wait_for(run(), 60.0))
+
+
+def heats(current: RunningPrint) -> bool:
+    return bool(current.state["progress"]["nozzle_target_c"] == 210.0)
+
+
+def process_of(current: RunningPrint) -> "subprocess.Popen[bytes]":
+    assert current._process is not None
+    return current._process.process
+
+
+def kill(prints: Prints, current: RunningPrint) -> None:
+    os.kill(process_of(current).pid, signal.SIGKILL)
+
+
+def hang_up(prints: Prints, current: RunningPrint) -> None:
+    pipe = process_of(current).stdin
+    assert pipe is not None
+    pipe.close()
+
+
+def break_off(prints: Prints, current: RunningPrint) -> None:
+    """The server dies in the middle of a frame."""
+    pipe = process_of(current).stdin
+    assert pipe is not None
+    pipe.write(frame((Command.PAUSE,))[:-1])
+    pipe.close()
+
+
+def cannot_be_told(prints: Prints, current: RunningPrint) -> None:
+    """A fault of the program in the midst of what the process says."""
+    tell = current._changed
+
+    def fail() -> None:
+        current._changed = tell
+        raise ValueError("a state that nobody understands")
+
+    current._changed = fail
+
+
+def freeze(prints: Prints, current: RunningPrint) -> None:
+    """Its process does nothing any more, also not what it is told; then a person presses the emergency stop."""
+    os.kill(process_of(current).pid, signal.SIGSTOP)
+    prints.stop_at_once(None)
+
+
+DIED = "the process that printed has ended before the print was done"
+
+
+@pytest.mark.parametrize(("end", "expected"), [
+    (kill, f"{DIED}; the printer reports its heaters off"),
+    (freeze, f"{DIED}; emergency stop: the printer has halted"),
+    (hang_up, "the print was stopped"),
+    (break_off, "the print was stopped"),
+    (cannot_be_told, f"a bug in tiltprint: .*; {DIED}; the printer reports its heaters off"),
+])  # fmt: skip
+def test_whoever_dies_the_heaters_go_off(
+    end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running_print, "EMERGENCY_S", 0.2)
+    with SimulatedPrinter(PROFILE.machine, speed=100.0) as printer:
+        state = print_until(printer.path, heats, end)
+        assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
+    assert re.fullmatch(expected, state["sentence"])
+    assert Path(state["journal"]).is_file()
+
+
+GOES_ON = "is printing hour.gcode and goes on without this program: its own page commands it"
+
+
+@pytest.mark.parametrize(("end", "expected"), [
+    (kill, f"{DIED}; {{address}} {GOES_ON}"),
+    (hang_up, "hour goes on printing on {address}: this page follows it no more"),
+])  # fmt: skip
+def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
+    end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    with stand_in("octoprint") as (job, address):
+        job.steps = 10_000
+        ended = print_until(address, lambda current: current.state["progress"]["state"] == "printing", end)
+        assert job.state == "printing"
+    assert ended["sentence"] == expected.format(address=address)
+    assert job.files["hour.gcode"].decode() == HOUR
+    assert KEY not in f"{ended}{Path(ended['log']).read_text()}"
+
+
+def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_starts_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    uploading = threading.Event()
+
+    class Slow(OctoPrintStandIn):
+        def form(self, body: bytes) -> dict[str, tuple[str, bytes]]:
+            uploading.wait(10.0)
+            return super().form(body)
+
+    async def run(address: str) -> dict[str, Any]:
+        prints = Prints()
+        current = RunningPrint(1, order(address), "me", prints.notify)
+        printing = asyncio.create_task(current.run())
+
+        async def reach(phase: str) -> None:
+            while current.state["phase"] != phase:
+                await prints.changed(prints.version)
+
+        await reach("ready")
+        current.begin()
+        await reach("uploading")
+        current.stop_at_once()
+        await printing
+        uploading.set()
+        return current.state
+
+    with stand_in("octoprint", handler=Slow) as (job, address):
+        ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
+        assert (job.state, job.commands) == ("idle", ["M112"])
+    assert ended["sentence"] == f"emergency stop: {address} has taken it; restart the printer before the next print"
+
+
+# A print's process that is left and does nothing any more of what it hears.
+LEAVES = """
+import sys, time
+from mdp.kernels.workers import frame, read_frames
+progress = {"state": "printing", "heat_s": time.time()}
+message = {"phase": "printing", "server": True, "progress": progress, "end": "left", "sentence": "it goes on"}
+message["stop_given"] = False
+for phase in ("printing", "over"):
+    sys.stdout.buffer.write(frame(message | {"phase": phase}))
+    sys.stdout.flush()
+    for _ in zip(range(2 if phase == WAITS_FOR else 0), read_frames(sys.stdin.buffer)):
+        pass
+"""
+
+
+@pytest.mark.parametrize("waits_for", ["printing", "over"])
+@pytest.mark.parametrize(("kind", "give", "expected", "halted", "state"), [
+    ("octoprint", RunningPrint.stop_at_once, "emergency stop: {0} has taken it; ", True, "printing"),
+    ("duet", RunningPrint.cancel, "the print was stopped", False, "cancelled"),
+])  # fmt: skip
+def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_own(
+    waits_for: str,
+    kind: str,
+    give: Callable[[RunningPrint], None],
+    expected: str,
+    halted: bool,
+    state: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    monkeypatch.setattr(running_print, "MAIN", f"WAITS_FOR = {waits_for.replace('over', '')!r}\n{LEAVES}")
+
+    async def run(address: str) -> dict[str, Any]:
+        prints = Prints()
+        current = RunningPrint(1, order(address), "me", prints.notify)
+        current._begun = True
+        printing = asyncio.create_task(current.run())
+        while current.state["phase"] != waits_for:
+            await prints.changed(prints.version)
+        give(current)
+        await printing
+        while not current.over:
+            await prints.changed(prints.version)
+        return current.state
+
+    with stand_in(kind) as (job, address):
+        job.files["hour.gcode"] = HOUR.encode()
+        job.start("hour.gcode")
+        job.steps = 10_000
+        ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
+        assert (job.halted, job.state) == (halted, state)
+    assert ended["sentence"].startswith(expected.format(address))
+
+
+class Agreeing:
+    """A person who would print whatever is asked."""
+
+    agreed = False
+
+    def agrees(self) -> bool:
+        raise AssertionError("nobody is asked when something speaks against the print")
+
+
+class Heard:
+    """Takes what is told."""
+
+    def __init__(self) -> None:
+        self.state: dict[str, Any] = {}
+
+    def tell(self, **values: Any) -> None:
+        self.state |= values
+
+
+@pytest.mark.parametrize(("wanted", "sentence", "forcible"), [
+    (order("/dev/no-such-port"), "port /dev/no-such-port does not exist", False),
+    (ResumeOrder(Path("gone.journal"), PrintRequest("/dev/none")), "journal gone.journal cannot be read: no such file", False),
+    (ResumeOrder(Path("any.journal"), PrintRequest("sim")), "--port sim: a simulated printer ends with its print", False),
+    (FollowOrder(PrintRequest("duet:127.0.0.1:9")), "duet:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9", False),
+    (order("octoprint:127.0.0.1:9"), "octoprint:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9: is OctoPrint", False),
+    (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 error, the first: X goes to 500 mm", True),
+    (replace(order("sim"), gcode=Path("gone.gcode")), "these slices are not there any more: slice what is to be printed", False),
+])  # fmt: skip
+def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence: str, forcible: bool) -> None:
+    heard = Heard()
+    end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
+    assert end["sentence"].startswith(sentence)
+    assert (end["end"], end["forcible"]) == ("refused", forcible)
+
+
+def test_an_incomplete_journal_is_refused_at_the_page_with_the_sentence_of_resume(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keep_notes_in(tmp_path / "notes", monkeypatch)
+    with Journal(tmp_path / "j", JournalHeading("p.gcode", "", "p", {})) as journal:
+        journal.path.rename(tmp_path / "moved")
+    heard = Heard()
+    wanted = ResumeOrder(tmp_path / "moved", PrintRequest("/dev/none"))
+    end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
+    assert end["end"] == "refused"
+    assert end["sentence"].startswith(f"journal {tmp_path / 'moved'} is incomplete: its print went on when the journal could not")
+
+
+def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_names_no_journal_any_more(tmp_path: Path) -> None:
+    heard, log = Heard(), SerialLog(tmp_path / "log", "p")
+    person = AtPage(heard)  # type: ignore[arg-type]
+    with (
+        log,
+        Journal(tmp_path / "j", JournalHeading("p.gcode", "", "p", {})) as journal,
+        person.show(Observers(log, journal), UnknownTimeline()) as shown,
+    ):
+        shown.open()
+        shown(Progress(1.0, Temperature()))
+        assert (heard.state["journal"], heard.state["progress"]["warning"]) == (str(tmp_path / "j"), "")
+        shown(Progress(2.0, Temperature(), warning="this print can no longer be resumed"))
+    assert (heard.state["journal"], heard.state["progress"]["warning"]) == ("", "this print can no longer be resumed")
+
+
+@pytest.mark.parametrize(("kind", "profile"), [("octoprint", PROFILE), ("duet", load("gen5x"))])
+def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_another(
+    kind: str, profile: Profile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    heard = Heard()
+    person = AtPage(heard)  # type: ignore[arg-type]
+    person.hear(BEGIN)
+    with stand_in(kind) as (job, address):
+        job.files["vase.gcode"] = bytes(100)
+        job.start("vase.gcode")
+        job.steps = 10_000
+        upload = replace(order(address), profile=profile, starts=False)
+        end = carry_out(upload, person, Checks(heard))  # type: ignore[arg-type]
+        assert (job.state, job.files["hour.gcode"].decode()) == ("printing", HOUR)
+        assert not any(asked.endswith("/start") for asked in job.asked)
+        log = Path(heard.state["log"]).read_text()
+    assert (end["end"], end["sentence"]) == ("done", f"hour.gcode waits on {address}")
+    assert "hour.gcode" in log
+    assert KEY not in log
+
+
+class Attended:
+    """A print on a server that a person at a page attends, in a thread of its own."""
+
+    def __init__(self, wanted: PrintOrder) -> None:
+        self.heard = Heard()
+        self.person = AtPage(self.heard)  # type: ignore[arg-type]
+        checks = Checks(self.heard)  # type: ignore[arg-type]
+        threading.Thread(target=lambda: self.heard.tell(**carry_out(wanted, self.person, checks)), daemon=True).start()
+        self.until(lambda state: "phase" in state)
+        self.person.hear(BEGIN)
+        self.until(lambda state: state.get("progress", {}).get("state") == "printing")
+
+    def until(self, condition: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
+        end_s = time.monotonic() + 20.0
+        while not condition(self.heard.state):
+            assert time.monotonic() < end_s, f"that never came, only {self.heard.state}"
+            time.sleep(0.01)
+        return self.heard.state
+
+
+def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    monkeypatch.setattr(follow, "POLL_S", 0.05)
+    stopped = (
+        "emergency stop: {0} has taken it; restart the printer before the next print; nozzle 210 deg C, bed 60 deg C as last"
+    )
+    left = "hour goes on printing on {0}: this page follows it no more"
+    with stand_in("duet") as (job, address):
+        job.steps = 10_000
+        wanted = PrintOrder("hour", written(HOUR), load("gen5x"), PrintRequest(address), force=True)
+        current = Attended(wanted)
+        assert job.files["hour.gcode"].decode() == HOUR
+        current.person.hear(Command.FEED, 150.0)
+        current.person.hear(Command.PAUSE)
+        current.until(lambda state: (state["progress"]["state"], state["progress"]["feed_percent"]) == ("paused", 150.0))
+        assert (job.state, job.commands) == ("paused", ["M220 S150"])
+        current.person.hear(Command.RESUME)
+        current.until(lambda state: state["progress"]["state"] == "printing")
+        for word, sentence, state in ((Command.CANCEL, "the print was stopped", "cancelled"), (LEAVE, left, "printing")):
+            current.person.hear(word)
+            assert current.until(lambda state: state.get("end"))["sentence"] == sentence.format(address)
+            assert job.state == state
+            job.state = "idle"
+            current = Attended(wanted)
+        current.person.hear(Command.EMERGENCY_STOP)
+        assert current.until(lambda state: state.get("end"))["sentence"].startswith(stopped.format(address))
+        assert job.halted
+        assert current.person.has_stopped()
+
+
+def test_a_print_whose_server_dies_at_any_byte_of_a_command_is_left() -> None:
+    pause = frame((Command.PAUSE,))
+    for sent in range(len(pause)):
+        person = AtPage(Heard())  # type: ignore[arg-type]
+        listen(BytesIO(pause[:sent]), lambda words, person=person: person.hear(*words), person.leave)  # type: ignore[misc]
+        assert person.gone()
+        assert not person.agrees()
+
+
+def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
+    person = AtPage(Heard())  # type: ignore[arg-type]
+    assert not person.has_stopped()
+    person.hear(Command.EMERGENCY_STOP)
+    assert not person.has_stopped()
+
+
+def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> None:
+    heard = Heard()
+    checks = Checks(heard)  # type: ignore[arg-type]
+    with said_to(checks.hear):
+        with checks.that("the axes are there"):
+            refuse("an axis is missing", force=True)
+        with checks.that("the file is whole"):
+            say("one moment")
+        with pytest.raises(PrinterError, match="too hot") as refused, checks.that("it is cool"):
+            refuse("too hot", force=False)
+    assert refused.value.forcible
+    assert heard.state["checks"] == (
+        {"text": "an axis is missing", "forced": True},
+        {"text": "the file is whole", "forced": False},
+    )
+    assert heard.state["said"] == ("an axis is missing", "one moment")
+
+
+def page_of(prints: Prints, name: str = "me") -> PageOfPrints:
+    async def on_bench(order: Callable[[], Order]) -> Order:
+        return order()
+
+    return PageOfPrints(name, SimpleNamespace(), prints, on_bench)  # type: ignore[arg-type]
+
+
+def prints_with_one(port: str = "sim") -> Prints:
+    prints = Prints()
+    prints.prints.append(RunningPrint(1, order(port), "me", prints.notify))
+    return prints
+
+
+@pytest.mark.parametrize("percent", [float("inf"), float("nan"), "fast", True, 99.5, [1]])
+def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
+    with pytest.raises(PrinterError, match=r"percent is .*: a whole number is expected"):
+        obey(page_of(prints_with_one()), {"do": "feed", "print": 1, "percent": percent})
+
+
+@pytest.mark.parametrize(
+    "name", sorted({*COMMANDS} - {"ports", "journals", "check", "go_on", "follow", "hand", "emergency", "take"})
+)
+def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_at_once(name: str) -> None:
+    prints = prints_with_one()
+    with pytest.raises(PrinterError, match="another page commands this print"):
+        obey(page_of(prints, "other"), {"do": name, "print": 1})
+    with pytest.raises(PrinterError, match="this print is not there any more"):
+        obey(page_of(prints), {"do": name, "print": 2})
+    obey(page_of(prints, "other"), {"do": "take", "print": 1})
+    assert prints.prints[0].holder == "other"
+
+
+@pytest.mark.parametrize(("name", "port", "phase", "allowed"), [
+    ("leave", "sim", "printing", False), ("leave", "duet:printer", "printing", True),
+    ("forget", "sim", "printing", False), ("forget", "sim", "over", True), ("dance", "sim", "printing", False),
+    (["take"], "sim", "printing", False),
+])  # fmt: skip
+def test_what_cannot_be_asked_of_a_print_is_refused(name: Any, port: str, phase: str, allowed: bool) -> None:
+    prints = prints_with_one(port)
+    prints.prints[0].state["phase"] = phase
+    with nullcontext() if allowed else pytest.raises(PrinterError, match="is no command of a print"):
+        obey(page_of(prints), {"do": name, "print": 1})
+    assert bool(prints.prints) == (name != "forget" or not allowed)
+
+
+def test_an_emergency_stop_goes_before_all_that_was_asked_earlier() -> None:
+    control = Control()
+    control.ask(Command.PAUSE)
+    control.ask(Command.EMERGENCY_STOP)
+    assert [asked.command for asked in iter(control.take, None)] == [Command.EMERGENCY_STOP, Command.PAUSE]
+
+
+def test_a_print_that_is_begun_twice_is_begun_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[object] = []
+    monkeypatch.setattr(RunningPrint, "say", lambda current, value: said.append(value))
+    current = RunningPrint(1, order("sim"), "me", lambda: None)
+    with pytest.raises(PrinterError, match="cannot begin now"):
+        current.begin()
+    current.state["phase"] = "ready"
+    current.begin()
+    current.begin()
+    assert said == [(BEGIN,)]
+
+
+def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[int] = []
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
+
+    async def run() -> None:
+        prints = Prints()
+        prints.prints += [RunningPrint(number, order("sim"), "me", lambda: None) for number in (1, 2)]
+        prints._last = 2
+        prints.prints[0].state["phase"] = "over"  # by the first press
+        prints.stop_at_once(1)
+        del prints.prints[0]  # another page has taken it off the list
+        prints.stop_at_once(1)
+        assert 2 not in stopped
+        prints.stop_at_once(None)
+        assert 2 in stopped
+
+    asyncio.run(run())
+
+
+def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newest_five(monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[int] = []
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
+
+    async def runs(current: RunningPrint) -> None:
+        """For good."""
+
+    async def run() -> None:
+        prints = Prints()
+        monkeypatch.setattr(RunningPrint, "run", runs)
+        for number in range(1, 16):
+            prints.begin("me", order(f"/dev/port{number}"))
+            if number > 8:
+                prints.prints[-1].state["phase"] = "over"
+        prints.begin("me", order("/dev/port16"))
+        prints.stop_at_once(None)
+        assert stopped == [1, 2, 3, 4, 5, 6, 7, 8, 16]
+        assert [listed.number for listed in prints.prints if listed.over] == [11, 12, 13, 14, 15]
+
+    asyncio.run(run())

@@ -1,0 +1,63 @@
+"""The table of commands: what each needs on the bench, and that the page's scripts know the very same names."""
+
+import re
+from importlib import resources
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from machine.workbench.bench.bench import Bench
+from machine.workbench.printing.commands import COMMANDS as OF_PRINTS
+from machine.workbench.session.commands import COMMANDS, obey
+from machine.workbench.web.devices_line import COMMANDS as OF_DEVICES
+from profiles.errors import PlanError
+from profiles.profile import load
+from tests.machine.workbench.models import model
+
+WITHOUT_A_MODEL = {"demo", "undo", "redo", "set", "reset", "profile", "stop", "dismiss", "unit"}
+UNSLICED = "what is on the workbench is not sliced yet: slice it first"
+DOCS = Path(__file__).parents[3] / "docs" / "workbench.md"
+PAGE = resources.files("machine.workbench.web").joinpath("page")
+
+
+def bare(bench: Bench) -> Any:
+    """A session on whose bench nothing is sliced, and which can do nothing."""
+    return SimpleNamespace(
+        bench=bench, stopped="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED)
+    )
+
+
+@pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))
+def test_all_that_is_done_to_a_model_is_refused_without_one(name: str) -> None:
+    with pytest.raises(PlanError, match="there is no model on the workbench yet: choose a file first"):
+        obey(bare(Bench(load())), {"do": name})
+
+
+def test_only_what_is_sliced_is_compared() -> None:
+    with pytest.raises(PlanError, match=UNSLICED):
+        obey(bare(Bench(load(), model())), {"do": "compare"})
+
+
+@pytest.mark.parametrize("name", ["dance", ["turn"], None, "refuse"])
+def test_what_is_no_command_is_told_to_be_none(name: Any) -> None:
+    with pytest.raises(PlanError, match=r"is no command of the workbench: docs/workbench.md lists them"):
+        obey(bare(Bench(load(), model())), {"do": name})
+
+
+def test_the_page_knows_the_very_same_names() -> None:
+    page = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith((".js", ".html")))
+    said = {
+        word
+        for pattern in (r'\bdo: "(\w+)"', r'command\("(\w+)"', r'data-(?:do|print)="(\w+)"')
+        for word in re.findall(pattern, page)
+    }
+    never_said_so = {"resume", "feed", "flow"}  # by variables
+    assert {*COMMANDS, *OF_PRINTS, *OF_DEVICES} - said <= never_said_so
+    assert said <= {*COMMANDS, *OF_PRINTS, *OF_DEVICES}
+
+
+def test_the_documentation_lists_every_command_and_no_other() -> None:
+    rows = re.findall(r"^\| (`[^|]*) \|", DOCS.read_text("utf-8").partition("Below `/TOKEN/N/`")[2], re.MULTILINE)
+    assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} == {*COMMANDS, *OF_PRINTS}

@@ -1,0 +1,237 @@
+"""Work that is kept by itself: what lies on a bench, written to a folder and opened again, or refused with a sentence."""
+
+import asyncio
+import errno
+import json
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from threading import Event
+
+import pytest
+
+from machine.pipeline.project import read_folder
+from machine.pipeline.project_record import RECORD
+from machine.pipeline.requests import Given
+from machine.planning.stops import parse_stops
+from machine.workbench.bench.bench import Bench
+from machine.workbench.session import keeping
+from machine.workbench.session.keeping import Keeping
+from machine.workbench.session.session import Session
+from machine.workbench.work import kept_work
+from machine.workbench.work.kept_work import MOST_KEPT, folders_kept, new_folder, write_work
+from machine.workbench.work.received import Received, tidy_left
+from machine.workbench.work.worker_pool import WorkerPools
+from mdp.save import stl
+from mdp.search.plan_file import PlannedPart
+from mdp.search.plan_reading import read_plan
+from profiles import files
+from profiles.errors import PlanError
+from profiles.files import lock_folder
+from profiles.profile import load
+from tests.machine.workbench.models import model
+from tests.shapes import tee
+
+LOW, HIGH = PlannedPart((0.0, 0.0, 1.0), 10.0), PlannedPart((0.0, 0.0, 1.0), 30.0)
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    file = tmp_path / "tee \u732b.stl"
+    file.write_bytes(stl(tee()))
+    return Bench(
+        load(settings=["process.walls=4"]),
+        replace(model(), path=file, name=file.name),
+        cuts=(LOW, HIGH),
+        locked=frozenset({HIGH}),
+        given=Given(settings=("process.walls=4",)),
+        stops=parse_stops(["1:3"], ["2:1.5mm"]),
+        copies=1,
+    )
+
+
+def test_what_lies_on_a_bench_is_read_as_it_was_written(bench: Bench) -> None:
+    folder = new_folder()
+    write_work(folder, bench)
+    write_work(folder, bench)
+    work = read_folder(folder)
+    assert (work.name, work.given, work.rotation) == ("tee \u732b.stl", bench.given, bench.rotation)
+    assert (work.locked, work.stops, work.parts) == ((1,), bench.stops, 3)
+    assert work.model is not None
+    assert work.model.read_bytes() == stl(tee())
+    assert work.plan is not None
+    assert read_plan(work.plan).parts == (LOW, HIGH)
+    assert len(list(folder.iterdir())) == 3  # record, plan, model
+
+
+def test_profiles_that_are_files_are_kept_with_their_names(bench: Bench, tmp_path: Path) -> None:
+    own = tmp_path / "mine.toml"
+    own.write_text('inherits = "pla"\n[material]\nname = "mine"\nbed_c = 55.0\n')
+    folder = new_folder()
+    write_work(folder, replace(bench, given=Given(material=str(own))))
+    own.unlink()
+    work = read_folder(folder)
+    assert work.own_names == {"material": "mine.toml"}
+    assert load(material=work.given.material).material == load(settings=["material.name=mine", "material.bed_c=55"]).material
+
+
+def test_work_of_a_newer_version_is_refused_and_stays(bench: Bench) -> None:
+    folder = new_folder()
+    write_work(folder, bench)
+    (folder / RECORD).write_text(json.dumps({"version": 2}))
+    with pytest.raises(PlanError, match="kept by a newer tiltprint, which can open it; it stays in"):
+        read_folder(folder)
+    (folder / RECORD).write_text('{"version": 1, "name"')
+    with pytest.raises(PlanError, match="is no work of a workbench, or damaged"):
+        read_folder(folder)
+    assert folders_kept() == [folder]
+
+
+def test_the_newest_ten_are_kept_and_what_a_bench_writes_to_is_nobody_else_s(bench: Bench) -> None:
+    folders = [new_folder() for _ in range(MOST_KEPT + 2)]
+    for folder in folders:
+        write_work(folder, bench)
+    lock = lock_folder(folders[0])
+    assert lock is not None
+    assert len(folders_kept()) == MOST_KEPT
+    assert folders[0] not in folders_kept()
+    assert sum(folder.exists() for folder in folders) == MOST_KEPT + 1
+
+
+def test_a_full_disk_is_told_once_and_what_was_kept_before_is_still_there(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(keeping, "AFTER_S", 0.0)
+
+    async def change_twice() -> tuple[list[str], Path]:
+        session = Session(bench.profile, bench.given, WorkerPools())
+        told = []
+        session.do("open", bench)
+        await _settled(session.keeping)
+        (kept,) = kept_work.kept_folder().iterdir()
+        monkeypatch.setattr(shutil, "copyfileobj", _full)
+        for copies in (2, 3):
+            for file in kept.glob("model-*"):
+                file.rename(file.with_suffix(".gone"))
+            session.do("copies", replace(session.bench, copies=copies))
+            await _settled(session.keeping)
+            told.append(session.problem)
+        await session.close()
+        return told, kept
+
+    told, kept = asyncio.run(change_twice())
+    assert told == ["this work cannot be kept for after a crash: no space left on device; Save > Project keeps it", ""]
+    assert read_folder(kept).copies == 1
+
+
+class Slow:
+    """Writes of work that wait, each for a word; what was written, in order, and the most of them that went on at a time."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.go_on, self.begun = Event(), Event()
+        self.written: list[int] = []
+        self.most = self._now = 0
+        monkeypatch.setattr(keeping, "write_work", self._write)
+
+    def _write(self, folder: Path, bench: Bench) -> None:
+        self._now += 1
+        self.most = max(self.most, self._now)
+        self.begun.set()
+        assert self.go_on.wait(20.0)
+        write_work(folder, bench)
+        self.written.append(bench.copies)
+        self._now -= 1
+
+
+def test_a_bench_that_closes_waits_for_the_write_under_way_writes_what_is_newer_and_removes_its_files_last(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keeping, "AFTER_S", 0.0)
+    slow = Slow(monkeypatch)
+
+    async def close() -> Path:
+        session = Session(bench.profile, bench.given, WorkerPools())
+        sent = session.received.new_file("tee.stl")
+        sent.write_bytes(stl(tee()))
+        assert bench.model is not None
+        on_bench = replace(bench, model=replace(bench.model, path=sent))
+        session.do("open", on_bench)
+        assert await asyncio.to_thread(slow.begun.wait, 20.0)
+        session.do("copies", replace(on_bench, copies=2))
+        closing = asyncio.create_task(session.close())
+        await asyncio.sleep(0.05)  # in which it would end, if it did not wait
+        assert not closing.done()
+        assert sent.is_file()
+        slow.go_on.set()
+        assert await closing == ""
+        return sent
+
+    sent = asyncio.run(close())
+    assert (slow.written, slow.most) == ([1, 2], 1)
+    (kept,) = folders_kept()
+    work = read_folder(kept)
+    assert work.copies == 2
+    assert work.model is not None
+    assert work.model.read_bytes() == stl(tee())
+    assert not sent.parents[1].exists()
+
+
+def test_what_pages_have_sent_stays_for_the_next_start_where_it_could_not_be_kept(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(shutil, "copyfileobj", _full)
+
+    async def close() -> tuple[str, Path]:
+        session = Session(bench.profile, bench.given, WorkerPools())
+        sent = session.received.new_file("tee.stl")
+        sent.write_bytes(stl(tee()))
+        assert bench.model is not None
+        session.do("open", replace(bench, model=replace(bench.model, path=sent)))
+        return await session.close(), sent
+
+    told, sent = asyncio.run(close())
+    assert told.startswith("the work on a bench could not be kept: no space left on device; the files of its pages stay in ")
+    assert tidy_left() == (sent.parents[1],)
+    assert sent.read_bytes() == stl(tee())
+
+
+def test_kept_work_is_opened_on_one_bench_at_a_time(bench: Bench) -> None:
+    folder = new_folder()
+    write_work(folder, bench)
+
+    async def open_twice() -> None:
+        first, second = (Session(bench.profile, bench.given, WorkerPools()) for _ in range(2))
+        async with first.keeping.opening(folder):
+            with pytest.raises(PlanError, match="is not kept any more, or another page has opened it"):
+                async with second.keeping.opening(folder):
+                    raise AssertionError("it is open already")
+        assert folders_kept() == []  # it is the first one's now
+        await first.close()
+        await second.close()
+
+    asyncio.run(open_twice())
+    assert folders_kept() == [folder]
+
+
+def test_kept_work_is_listed_where_the_system_has_no_locks_and_no_files_of_other_programs_are_touched(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(files, "fcntl", None)
+    folder = new_folder()
+    write_work(folder, bench)
+    received = Received()  # of a program that runs
+    received.new_file("tee.stl").touch()
+    assert folders_kept() == [folder]
+    assert tidy_left() == ()
+    received.remove()
+
+
+def _full(*_: object) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+async def _settled(kept: Keeping) -> None:
+    while kept.behind:
+        await asyncio.sleep(0.01)

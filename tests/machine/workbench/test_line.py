@@ -1,0 +1,129 @@
+"""The websocket of a page: what is no command, what is no fault, and that nothing of it is left."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+from starlette.websockets import WebSocketDisconnect
+
+from machine.workbench.web.line import tell, until_either_ends
+from machine.workbench.work.observable import Observable
+from tests.machine.prints import prints_line
+from tests.machine.running_workbench import workbench
+
+
+def test_a_frame_of_bytes_is_told_to_be_no_command_and_ends_no_line() -> None:
+    no_command = "what the page has sent is no command of the workbench"
+    with workbench() as bench, bench.line() as page, prints_line(bench, "first") as printing:
+        page.say(b"\x00")
+        assert page.until(lambda state: state["problem"])["problem"] == no_command
+        page.do("demo", name="other")
+        page.until(lambda state: state["problem"].startswith("other: only the models that ship"))
+        printing.say(b"\x00")
+        assert printing.refused() == no_command
+        printing.do("cancel", print=1)
+        assert printing.refused() == "this print is not there any more"
+
+
+class Page:
+    """The socket of a page that takes what it is told as long as it is awake."""
+
+    def __init__(self) -> None:
+        self.heard: list[int] = []
+        self.awake = asyncio.Event()
+
+    async def send_text(self, text: str) -> None:
+        await self.awake.wait()
+        self.heard.append(json.loads(text)["version"])
+
+
+def test_fifty_pages_that_read_nothing_hold_up_nobody_and_hear_the_newest_when_they_read_again() -> None:
+    worded: list[int] = []
+
+    async def run() -> tuple[Page, list[Page]]:
+        source, reading, asleep = Observable(), Page(), [Page() for _ in range(50)]
+
+        def state() -> dict[str, int]:
+            worded.append(source.version)
+            return {"version": source.version}
+
+        async def settle() -> None:
+            for _ in range(10):
+                await asyncio.sleep(0)
+
+        reading.awake.set()
+        telling = [asyncio.create_task(tell(source, state, page)) for page in (*asleep, reading)]  # type: ignore[arg-type]
+        await settle()
+        for _ in range(20):
+            source.notify()
+            await settle()
+        for page in asleep:
+            page.awake.set()
+        await settle()
+        for task in telling:
+            task.cancel()
+        return reading, asleep
+
+    reading, asleep = asyncio.run(run())
+    assert reading.heard == list(range(21))
+    assert [page.heard for page in asleep] == 50 * [[0, 20]]
+    assert worded == list(range(21))  # once for all pages
+
+
+class Directions:
+    """The two coroutines of a line, and which of them goes on."""
+
+    def __init__(self) -> None:
+        self.going = 0
+
+    @asynccontextmanager
+    async def counted(self) -> AsyncIterator[None]:
+        self.going += 1
+        try:
+            yield
+        finally:
+            self.going -= 1
+
+    async def waits(self) -> None:
+        async with self.counted():
+            await asyncio.Event().wait()
+
+    async def ends(self, error: Exception | None = None) -> None:
+        async with self.counted():
+            await asyncio.sleep(0.01)
+            if error is not None:
+                raise error
+
+
+@pytest.mark.parametrize("error", [None, WebSocketDisconnect(1006)])
+def test_a_line_of_which_one_direction_ends_leaves_nothing_and_is_no_fault(error: Exception | None) -> None:
+    async def run() -> int:
+        directions = Directions()
+        await until_either_ends(directions.ends(error), directions.waits())
+        return directions.going
+
+    assert asyncio.run(run()) == 0
+
+
+def test_a_line_that_is_cancelled_leaves_nothing() -> None:
+    async def run() -> int:
+        directions = Directions()
+        talking = asyncio.create_task(until_either_ends(directions.waits(), directions.waits()))
+        await asyncio.sleep(0.01)
+        talking.cancel()
+        await asyncio.wait([talking])
+        return directions.going
+
+    assert asyncio.run(run()) == 0
+
+
+def test_a_bug_of_one_direction_is_not_taken_for_a_page_that_has_gone() -> None:
+    async def run() -> None:
+        directions = Directions()
+        await until_either_ends(directions.ends(RuntimeError("a bug")), directions.waits())
+
+    with pytest.raises(ExceptionGroup) as raised:
+        asyncio.run(run())
+    assert [str(error) for error in raised.value.exceptions] == ["a bug"]

@@ -1,0 +1,182 @@
+"""A model's mesh in a file: it is what was read, goes through no pipe, and lasts as long as somebody has the model."""
+
+import asyncio
+import gc
+import pickle
+import weakref
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from machine.pipeline.project import Project, project_bytes
+from machine.pipeline.requests import Given
+from machine.workbench.bench.bench import Bench, plan_of_bench, with_model, with_rotation
+from machine.workbench.bench.model import Model
+from machine.workbench.session.commands import obey
+from machine.workbench.session.session import Session
+from machine.workbench.web.snapshot import snapshot
+from machine.workbench.work.cutting import cut_bench, make_folder
+from machine.workbench.work.models import read_model
+from machine.workbench.work.standing import stand
+from machine.workbench.work.worker_pool import WorkerPools
+from mdp.mesh import Mesh
+from mdp.save import stl
+from mdp.search.plan_file import PlanFile
+from mdp.search.plan_reading import read_plan
+from mdp.zone import MeshVolume, Modifier, Zone, Zones
+from profiles.errors import PlanError
+from profiles.profile import load
+from tests.machine.workbench.models import model
+from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
+from tests.shapes import ball, tee
+
+
+@pytest.mark.parametrize("colours", [None, np.arange(28, dtype=np.int32)])
+def test_a_mesh_comes_back_from_its_file_as_it_was(colours: Any) -> None:
+    mesh = Mesh(tee().vertices / 3.0, tee().faces, colours)
+    stored = model(mesh=mesh)
+    again = stored.mesh()
+    assert (again.vertices == mesh.vertices).all()
+    assert (again.faces == mesh.faces).all()
+    assert (again.colours is None) if colours is None else (again.colours == colours).all()
+    assert (stored.faces, stored.size_mm) == (28, pytest.approx((40.0 / 3.0, 10.0 / 3.0, 40.0 / 3.0)))
+    assert stored.volume_mm3 == pytest.approx(7000.0 / 27.0)
+
+
+def test_what_goes_through_a_pipe_of_a_model_is_as_short_for_many_faces_as_for_few() -> None:
+    few, many = model("a", tee()), model("a", ball(10.0, 480))
+    assert many.faces > 100_000
+    assert len(pickle.dumps(many)) < len(pickle.dumps(few)) + 100 < 1000
+
+
+def read(work: Any, path: Path) -> Any:
+    """What work gives with a session in which a model has been opened, whose tasks are done in this process."""
+
+    async def run() -> Any:
+        session = Session(load(), Given(), WorkerPools())
+        tasks = {"read_model": read_model, "stand": stand}
+
+        async def here(task: str, *given: Any, **more: Any) -> Any:
+            return tasks[task](lambda report: None, *given) if task in tasks else ()
+
+        for queue in (session.quick, session.long, session.hand):
+            queue.run = here  # type: ignore[method-assign]
+        await session.open_model(path, path.name)
+        await until_idle(session)
+        return await work(session)
+
+    return asyncio.run(run())
+
+
+async def until_idle(session: Session) -> None:
+    while session._tasks:
+        await asyncio.gather(*session._tasks)
+
+
+def the_model(session: Session) -> Model:
+    assert session.bench.model is not None
+    return session.bench.model
+
+
+def test_a_closed_bench_leaves_no_model_and_no_file(tmp_path: Path) -> None:
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+
+    async def close(session: Session) -> tuple[weakref.ref[Model], Path]:
+        assert snapshot(session)["overhang_mm2"] == pytest.approx(300.0)
+        left = weakref.ref(the_model(session)), session.received.path
+        assert the_model(session).mesh_file.is_file()
+        await session.close()
+        return left
+
+    left, folder = read(close, tmp_path / "tee.stl")
+    gc.collect()
+    assert left() is None
+    assert not folder.exists()
+
+
+def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more(tmp_path: Path) -> None:
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+
+    async def forget(session: Session) -> tuple[bool, bool]:
+        file = the_model(session).mesh_file
+        obey(session, {"do": "undo"})
+        gc.collect()
+        undone = file.is_file()
+        obey(session, {"do": "redo"})
+        obey(session, {"do": "undo"})
+        session.do("something else", replace(session.bench, copies=2))
+        await until_idle(session)
+        gc.collect()
+        return undone, file.is_file()
+
+    assert read(forget, tmp_path / "tee.stl") == (True, False)
+
+
+def test_the_parts_folder_has_the_meshes_that_its_plan_names(tmp_path: Path) -> None:
+    (tmp_path / "insert.stl").write_bytes(stl(ball(4.0, 16)))
+    insert = Modifier(MeshVolume(tmp_path / "insert.stl", ball(4.0, 16)), {"walls": 4})
+    bench = replace(with_model(Bench(load()), model(mesh=tee())), cuts=(), zones=Zones(modifiers=(insert,)))
+    make_folder(lambda report: None, bench, tmp_path / "parts.zip")
+    with zipfile.ZipFile(tmp_path / "parts.zip") as archive:
+        archive.extractall(tmp_path / "parts")
+    (read_back,) = read_plan(tmp_path / "parts" / "plan.toml").zones.modifiers
+    assert isinstance(read_back.volume, MeshVolume)
+    assert read_back.volume.file.parent == tmp_path / "parts"
+    assert read_back.volume.file.read_bytes() == stl(ball(4.0, 16))
+
+
+def project(path: Path, mesh: Mesh, given: Given, plan: PlanFile | None = None) -> Path:
+    """A project file of a model beside it."""
+    (path.parent / "own.stl").write_bytes(stl(mesh))
+    made = Project("own.stl", path.parent / "own.stl", given, parts=1)
+    path.write_bytes(project_bytes(made, plan or PlanFile("own.stl"), mesh, b""))
+    return path
+
+
+def test_a_project_opens_whatever_lies_on_the_bench_and_in_one_step(tmp_path: Path) -> None:
+    (tmp_path / "large.stl").write_bytes(stl(Mesh(tee().vertices * 10.0, tee().faces)))  # 400 mm, 10 m at the project's scale
+    path = project(tmp_path / "p.3mf", Mesh(tee().vertices / 25.4, tee().faces), Given(settings=("process.scale=25.4",)))
+
+    async def work(session: Session) -> Any:
+        await session.open_project(path, "p.3mf")
+        return the_model(session).size_mm, [step.word for step in session.history.before]
+
+    size_mm, before = read(work, tmp_path / "large.stl")
+    assert size_mm == pytest.approx((40.0, 10.0, 40.0), abs=1e-4)
+    assert before == ["", "open large.stl"]
+
+
+def test_a_project_with_a_damaged_plan_leaves_the_bench_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+    wrong = PlanFile("own.stl", zones=Zones(support=(Zone((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),)))
+    path = project(tmp_path / "p.3mf", tee(), Given(settings=("process.walls=5",)), wrong)
+
+    async def work(session: Session) -> Any:
+        before = session.bench
+        with pytest.raises(PlanError, match="support 1: min_mm is"):
+            await session.open_project(path, "p.3mf")
+        return session.bench is before
+
+    assert read(work, tmp_path / "tee.stl")
+
+
+def test_what_a_slicer_file_marks_lies_on_the_bench_boxes_and_other_shapes_too(tmp_path: Path) -> None:
+    block, ball = m3.Manifold.cube((20.0, 20.0, 20.0), True), m3.Manifold.sphere(4.0, 16)
+    insert = Made(m3.Manifold.cube((4.0, 6.0, 8.0), True), "modifier", {"perimeters": "4"})
+    path = prusaslicer(
+        tmp_path / "a.3mf", [Object([Made(block), insert, Made(ball.translate((1.0, 0.0, 0.0)), "support")], [AT_ORIGIN])]
+    )
+
+    async def work(session: Session) -> Any:
+        bench = with_rotation(session.bench, [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        return session.bench, cut_bench(bench, plan_of_bench(bench, "plan.toml")).parts[0].support.volumes
+
+    bench, (held,) = read(work, path)
+    assert bench.zones == Zones(modifiers=(Modifier(Zone((-2.0, -3.0, 6.0), (2.0, 3.0, 14.0)), {"walls": 4}),))
+    assert isinstance(held, MeshVolume)
+    assert held.mesh.bounds_mm == pytest.approx(np.array([[-4.0, -3.0, 6.0], [4.0, 5.0, 14.0]]), abs=0.1)

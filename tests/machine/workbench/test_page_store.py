@@ -1,0 +1,32 @@
+"""The store of the page: changes are told in their order, each with what was before, and there is no other way of change."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from machine.workbench.web.page import OWN
+from tests.machine.fake_page import needs_node, on_fake_page
+
+HEARD = """
+    const { store, update, subscribe, onState } = modules["page/store"], heard = [];
+    subscribe((now, before) => { if (now.part === 1 && before.part === 0) update({ part: 2, tab: "parts" }); });
+    subscribe((now, before) => heard.push([before.part, now.part, now.tab]));
+    onState((state, before) => heard.push([before?.version ?? null, state.version]));
+"""
+
+
+@needs_node
+def test_nobody_is_told_before_there_is_a_state() -> None:
+    assert on_fake_page(f"{HEARD} update({{ part: 5 }}); return [heard, store.part];") == [[], 5]
+
+
+@needs_node
+def test_what_a_listener_changes_comes_when_all_have_heard_of_the_change_before() -> None:
+    asked = f"{HEARD} update({{ state: {{ version: 1 }} }}); update({{ part: 1 }}); return heard;"
+    assert on_fake_page(asked) == [[0, 0, "model"], [None, 1], [0, 1, "model"], [1, 2, "parts"]]
+
+
+@pytest.mark.parametrize("script", sorted(OWN.glob("*.js")), ids=lambda file: file.stem)
+def test_nobody_but_the_store_writes_into_it(script: Path) -> None:
+    assert script.stem == "store" or re.findall(r"\bstore(?:\.\w+)+ [-+|&?]*=[^=>].*", script.read_text("utf-8")) == []

@@ -1,0 +1,385 @@
+"""A session whose bench changes while work for it is under way: what lies on it at the end is what was asked for last."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from machine.pipeline.requests import Given
+from machine.workbench.bench.bench import Bench, with_front, with_profile
+from machine.workbench.session.base import hear_from
+from machine.workbench.session.commands import obey
+from machine.workbench.session.finding import Search
+from machine.workbench.session.session import Session
+from machine.workbench.work.cutting import Found, Searched
+from machine.workbench.work.standing import Standing
+from machine.workbench.work.tasks import TASKS
+from machine.workbench.work.worker_pool import WorkerPools
+from mdp.decomposition import FrontRow
+from mdp.plane import Plane
+from mdp.search.plan_file import PlannedPart
+from mdp.search.trial import Trial
+from profiles.profile import Profile, load
+from tests.machine.workbench.models import model
+
+UP = (0.0, 0.0, 1.0)
+EDIT = st.fixed_dictionaries({
+    "do": st.sampled_from(["add", "move", "remove", "reorder"]), "part": st.integers(1, 5), "to": st.integers(2, 5),
+    "after": st.integers(1, 5), "normal": st.just([*UP]), "offset_mm": st.integers(1, 30),
+})  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.workbench.session.readiness.CHANGING_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.trials.REST_S", 0.0)
+
+
+def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
+    """A session with a model on its bench after some work; its processes answer what the work has them answer."""
+
+    async def run() -> Session:
+        session = Session(load(), Given(), WorkerPools())
+
+        async def nothing(task: str, *given: Any, **more: Any) -> Any:
+            await asyncio.sleep(0)
+            return {"try_cuts": Trial(()), "stand": Standing((40.0, 8.0, 40.0), 0.0, "")}.get(task)
+
+        for tasks in (session.quick, session.long, session.hand):
+            tasks.run = nothing  # type: ignore[method-assign]
+        session.do("open a", replace(session.bench, model=model("a")))
+        await work(session)
+        await settled(session)
+        return session
+
+    return asyncio.run(asyncio.wait_for(run(), 20.0))
+
+
+def under_way(session: Session) -> Search:
+    """The search that a session has under way."""
+    assert session.finding.search is not None
+    return session.finding.search
+
+
+async def settled(session: Session) -> None:
+    """Return when no work is under way any more."""
+    while session._tasks:
+        await asyncio.gather(*session._tasks, return_exceptions=True)
+
+
+def edited(offsets_mm: list[float], edit: dict[str, Any]) -> None:
+    """A list of planes after an edit, as a person would do it; one of a part that is not there changes nothing."""
+    parts, at = range(2, len(offsets_mm) + 2), edit["part"] - 2
+    if edit["do"] == "add" and edit["after"] <= len(parts) + 1:
+        offsets_mm.insert(edit["after"] - 1, edit["offset_mm"])
+    elif edit["do"] == "move" and edit["part"] in parts:
+        offsets_mm[at] = edit["offset_mm"]
+    elif edit["do"] == "remove" and edit["part"] in parts:
+        del offsets_mm[at]
+    elif edit["do"] == "reorder" and edit["part"] in parts and edit["to"] in parts:
+        offsets_mm.insert(edit["to"] - 2, offsets_mm.pop(at))
+
+
+@settings(max_examples=50)
+@given(st.lists(st.tuples(EDIT, st.integers(0, 3)), max_size=12))
+def test_edits_that_follow_each_other_quickly_leave_what_they_leave_one_by_one(edits: list[tuple[dict[str, Any], int]]) -> None:
+    async def work(session: Session) -> None:
+        for edit, turns in edits:
+            obey(session, edit)
+            for _ in range(turns):  # so far the work for the edits before has come meanwhile
+                await asyncio.sleep(0)
+
+    offsets_mm: list[float] = []
+    for edit, _ in edits:
+        edited(offsets_mm, edit)
+    assert [part.offset_mm for part in when_done(work).bench.cuts or ()] == offsets_mm
+
+
+def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_it_rests() -> None:
+    """The stem of the tee is a square of 10 mm: a rim of 40 mm wherever it is cut."""
+    tried: list[tuple[tuple[float, ...], int, float | None]] = []
+
+    async def work(session: Session) -> None:
+        async def really(task: str, *asked: Any, **more: Any) -> Any:
+            return TASKS[task](lambda told: None, *asked)
+
+        def listen() -> None:
+            if session.trials.trial is not None:
+                _, cuts, trial = session.trials.trial
+                seen = tuple(part.offset_mm or 0.0 for part in cuts), trial.unchecked, trial.seam_mm
+                tried.extend([seen] if tried[-1:] != [seen] else [])
+
+        session.hand.run = really  # type: ignore[method-assign]
+        for after, offset_mm in ((1, 12.0), (2, 24.0)):
+            obey(session, {"do": "add", "normal": list(UP), "offset_mm": offset_mm, "after": after})
+        await settled(session)
+        session.listeners.append(listen)
+        for step in range(20):
+            obey(session, {"do": "try", "part": 3, "normal": list(UP), "offset_mm": 23.0 - 0.1 * step})
+
+    when_done(work)
+    held, newest = (12.0, 24.0), (12.0, 23.0 - 0.1 * 19)
+    assert tried == [(held, 0, 80.0), (newest, 1, 80.0), (newest, 0, 80.0)]
+
+
+def test_an_edit_whose_bench_is_another_one_meanwhile_is_not_done_and_says_so() -> None:
+    async def work(session: Session) -> None:
+        obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
+        await asyncio.sleep(0)
+        obey(session, {"do": "turn", "axis": "x", "deg": 90})
+
+    session = when_done(work)
+    assert session.bench.cuts is None
+    assert session.problem == "add a plane: what lies on the workbench has changed meanwhile, so it was not done"
+
+
+@pytest.mark.parametrize("turns", range(4))  # of the loop between the two commands
+def test_a_plane_that_is_locked_while_it_is_moved_is_locked_where_it_comes_to_stand(turns: int) -> None:
+    async def work(session: Session) -> None:
+        obey(session, {"do": "add", "normal": [*UP], "offset_mm": 5, "after": 1})
+        await settled(session)
+        obey(session, {"do": "move", "part": 2, "normal": [*UP], "offset_mm": 9})
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        obey(session, {"do": "lock", "part": 2, "locked": True})
+
+    session = when_done(work)
+    assert session.bench.locked == {PlannedPart(UP, 9.0)}
+    assert session.problem == ""
+
+
+def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
+    async def work(session: Session) -> None:
+        scales = []
+
+        async def read(task: str, *given: Any, **more: Any) -> Any:
+            if task != "read_model":
+                return ()
+            profile: Profile = given[2]
+            scales.append(profile.process.scale)
+            if len(scales) == 1:
+                doubled = Given(settings=("process.scale=2.0",))
+                session.do("set process.scale", with_profile(session.bench, doubled, load(settings=doubled.settings)))
+            return model(f"{given[1]} at {profile.process.scale:g}")
+
+        session.quick.run = read  # type: ignore[method-assign]
+        await session.open_model(Path("b"), "b")
+
+    read = when_done(work).bench.model
+    assert read is not None
+    assert read.name == "b at 2"
+
+
+def test_a_scale_that_was_set_for_a_model_is_not_that_of_the_next_one() -> None:
+    async def work(session: Session) -> None:
+        async def read(task: str, *given: Any, **more: Any) -> Any:
+            return model(f"{given[1]} at {given[2].process.scale:g}") if task == "read_model" else ()
+
+        session.quick.run = read  # type: ignore[method-assign]
+        set_for_one = Given(settings=("process.walls=4", "process.scale=25.4", "process.rotate_deg=[90,0,0]"))
+        session.do("set", with_profile(session.bench, set_for_one, load(settings=set_for_one.settings)))
+        await session.open_model(Path("b"), "b")
+
+    bench = when_done(work).bench
+    assert bench.model is not None
+    assert bench.model.name == "b at 1"
+    assert (bench.given.settings, bench.profile.process.walls) == (("process.walls=4",), 4)
+    assert (bench.profile.process.scale, bench.profile.process.rotate_deg) == (1.0, (0, 0, 0))
+
+
+def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_told_later() -> None:
+    best = FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0)
+
+    async def work(session: Session) -> None:
+        async def price(task: str, *given: Any, **more: Any) -> Any:
+            return (replace(best, time_s=60.0, chosen=True),) if task == "measure_plan" else await asyncio.sleep(9.0)
+
+        session.long.run = price  # type: ignore[method-assign]
+        session.finding.begin()
+        await asyncio.sleep(0)
+        session.finding.search = replace(under_way(session), searched=Searched("", best))
+        session.finding.stop()
+        assert (session.bench.cuts, session.bench.rows[0].time_s) == ((PlannedPart(UP, 5.0),), None)
+
+    (row,) = when_done(work).bench.rows
+    assert (row.seam_mm, row.time_s) == (2.0, 60.0)
+
+
+def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> None:
+    async def work(session: Session) -> None:
+        obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
+        await settled(session)
+        for at in ("1:3", "2:8.4mm"):
+            obey(session, {"do": "add_stop", "kind": "pause", "at": at})
+        obey(session, {"do": "slice"})
+        await asyncio.sleep(0)
+        obey(session, {"do": "turn", "axis": "x", "deg": 90})
+
+    session = when_done(work)
+    assert [stop.option for stop in session.bench.stops] == ["--pause 1:3"]
+    assert session.problem.startswith(
+        "turn the model: taken away with part 2: --pause 2:8.4mm (Undo brings it back); slicing has ended"
+    )
+
+
+def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:
+    async def work(session: Session) -> None:
+        obey(session, {"do": "slice"})
+        await asyncio.sleep(0)
+        obey(session, {"do": "turn", "axis": "x", "deg": 90})
+        assert session.problem.startswith("slicing has ended")
+        obey(session, {"do": "slice"})
+        assert session.slicing.under_way is not None
+        assert session.slicing.under_way.bench is session.bench
+
+    session = when_done(work)
+    assert session.slicing.done is not None
+    assert session.slicing.done.bench is session.bench
+
+
+def test_slices_wait_for_the_settings_that_were_asked_for_before() -> None:
+    async def work(session: Session) -> None:
+        async def read(task: str, *given: Any, **more: Any) -> Any:
+            for _ in range(5):
+                await asyncio.sleep(0)
+            return model("a") if task == "read_model" else ()
+
+        session.quick.run = read  # type: ignore[method-assign]
+        obey(session, {"do": "set", "key": "process.scale", "value": "2"})
+        await asyncio.sleep(0)
+        obey(session, {"do": "slice"})
+        assert session.slicing.under_way is None
+
+    session = when_done(work)
+    assert session.slicing.done is not None
+    assert session.slicing.done.bench.profile.process.scale == 2.0
+    assert session.problem == ""
+
+
+def test_what_a_page_is_refused_no_other_page_is_told_and_its_next_step_takes_it_back() -> None:
+    told = []
+
+    async def work(session: Session) -> None:
+        for page, part in (("mine", 7), ("yours", 8)):
+            hear_from(page)
+            obey(session, {"do": "move", "part": part, "normal": [*UP], "offset_mm": 1})
+            await settled(session)
+        told.append(dict(session.problems))
+        hear_from("mine")
+        obey(session, {"do": "dismiss"})
+        told.append(dict(session.problems))
+        hear_from("yours")
+        obey(session, {"do": "add", "normal": [*UP], "offset_mm": 20})
+        await settled(session)
+        told.append(dict(session.problems))
+
+    when_done(work)
+    mine, yours = (f"part is {part}: there is none yet" for part in (7, 8))
+    assert told == [{"mine": mine, "yours": yours}, {"yours": yours}, {}]
+
+
+def test_a_plane_that_is_refused_is_put_at_the_nearest_place_when_that_is_asked_for() -> None:
+    def bounded(session: Session) -> None:
+        async def answer(task: str, *given: Any, **more: Any) -> Any:
+            if task == "nearest":
+                (cuts, part), *_ = given[2]
+                return (*cuts[: part - 2], PlannedPart(UP, 30.0), *cuts[part - 1 :])
+            high = task == "try_cuts" and any(cut.offset_mm > 30.0 for cut in given[2])
+            return Trial((), 2, "too high") if high else Trial(()) if task == "try_cuts" else None
+
+        session.hand.run = answer  # type: ignore[method-assign]
+
+    async def work(session: Session) -> None:
+        bounded(session)
+        obey(session, {"do": "add", "normal": [*UP], "offset_mm": 33})
+        await settled(session)
+        assert session.problem == "part 2 cannot be cut off: too high"
+        assert session.trials.refused is not None
+        assert session.trials.refused.near == {"do": "add", "normal": [*UP], "offset_mm": 33, "near": True}
+        obey(session, session.trials.refused.near)
+        await settled(session)
+
+    session = when_done(work)
+    assert (session.bench.cuts, session.problem) == ((PlannedPart(UP, 30.0),), "")
+
+
+def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_and_undo_brings_it_back() -> None:
+    low, high = (Plane(np.array(UP), offset_mm) for offset_mm in (5.0, 25.0))
+    rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((low,), 1.0, 2.0, 3.0), FrontRow((low, high), 1.0, 1.0, 2.0, chosen=True))
+
+    async def work(session: Session) -> None:
+        async def answer(task: str, *given: Any, **more: Any) -> Any:
+            if task != "try_cuts":
+                return Standing((40.0, 8.0, 40.0), 0.0, "") if task == "stand" else None
+            far = given[1].profile.process.place_mm[0] > 50.0 and any(cut.offset_mm > 20.0 for cut in given[2])
+            return Trial((), 3, "Z would go too far") if far else Trial(())
+
+        async def price(task: str, bench: Bench, row: int, **more: Any) -> Any:
+            return bench.rows[row]
+
+        session.hand.run, session.long.run = answer, price  # type: ignore[method-assign, assignment]
+        session.do("find", with_front(session.bench, rows))
+        for x in (30, 60):
+            obey(session, {"do": "set", "key": "process.place_mm", "value": f"[{x}, 0]"})
+            await settled(session)
+            cut.append((session.bench.parts, len(session.bench.rows), session.problem))
+        obey(session, {"do": "undo"})
+
+    cut: list[tuple[int, int, str]] = []
+    session = when_done(work)
+    why = "set process.place_mm: the planes were taken away, for part 3 cannot be cut off: Z would go too far"
+    assert cut == [(3, 3, ""), (0, 2, why)]
+    assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
+
+
+def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is_done() -> None:
+    told = []
+
+    async def work(session: Session) -> None:
+        session.long.warm = partial(asyncio.sleep, 0)  # type: ignore[method-assign]
+        for best in (None, FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0)):
+            obey(session, {"do": "search"})
+            await asyncio.sleep(0)
+            session.finding.search = replace(under_way(session), searched=Searched("stage 1", best))
+            obey(session, {"do": "stop"})
+            told.append(session.stopped)
+            await settled(session)
+        obey(session, {"do": "dismiss"})
+        told.append(session.stopped)
+
+    when_done(work)
+    assert told == [
+        "The search was stopped before it had cut anything: all is as it was.",
+        "The search was stopped, and the best so far is taken: 2 parts.",
+        "",
+    ]
+
+
+def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on() -> None:
+    found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
+
+    async def work(session: Session) -> None:
+        async def find(task: str, *given: Any, **more: Any) -> Any:
+            for _ in range(5):
+                await asyncio.sleep(0)
+            return Found((found,), ())
+
+        session.long.run = find  # type: ignore[method-assign]
+        session.long.warm = partial(asyncio.sleep, 0)  # type: ignore[method-assign]
+        obey(session, {"do": "search"})
+        await asyncio.sleep(0)
+        obey(session, {"do": "stop"})
+        obey(session, {"do": "search"})
+        for _ in range(3):  # the end of the one that was stopped comes meanwhile
+            await asyncio.sleep(0)
+        assert session.finding.search is not None
+
+    session = when_done(work)
+    assert (session.bench.parts, session.finding.search) == (2, None)
