@@ -15,7 +15,7 @@ from machine.cli.terminal.server_keys import ServerKeyboard
 from machine.dryrun.timeline import Timeline
 from machine.link.journal import Journal
 from machine.link.pending_commands import Control
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.printing.serial_log import SerialLog
 
 
@@ -25,7 +25,7 @@ class Observers:
 
     log: SerialLog
     journal: Journal | None = None
-    follow: Callable[[Progress], None] | None = None
+    follow: Callable[[PrintStatus], None] | None = None
 
 
 class Display(Protocol):
@@ -34,7 +34,7 @@ class Display(Protocol):
     def open(self) -> None:
         """Begin to show what comes."""
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: PrintStatus) -> None:
         """Show where the print stands; in the thread of the stream, which must not wait for it."""
 
 

@@ -11,7 +11,8 @@ from machine.cli.terminal.progress import reporting, say
 from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
-from machine.link.progress import ProgramPosition, Progress, last_known
+from machine.link.print_state import ACTIVE, PrintStatus, last_known
+from machine.link.progress import ProgramPosition
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.attendance import Observers, ServerAttendance
 from machine.printing.rescue import STOPPED
@@ -19,7 +20,7 @@ from machine.printing.serial_log import SerialLog, new_log
 from machine.printing.server_checks import check_free
 from machine.printing.servers.follow import End, OnStatus, follow_print
 from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import ACTIVE, JobStatus, PrintServer
+from machine.printing.servers.server import PrintServer
 from machine.printing.servers.servers import open_server
 from machine.quantities import duration
 from profiles.errors import FirmwareError, ServerError
@@ -87,17 +88,15 @@ def print_there(server: PrintServer, job: LoadedProgram, observers: Observers, p
     return end
 
 
-def running_print(server: PrintServer) -> JobStatus:
+def running_print(server: PrintServer) -> PrintStatus:
     """Where the print stands that a server is at. Raises ServerError when there is none."""
     status = server.status()
-    if status.phase not in ACTIVE:
-        raise ServerError(
-            f"{server.name} prints nothing now ({status.message or status.phase.value}): there is nothing to follow"
-        )
+    if status.state not in ACTIVE:
+        raise ServerError(f"{server.name} prints nothing now ({status.message or status.state}): there is nothing to follow")
     return status
 
 
-def follow_there(server: PrintServer, now: JobStatus, observers: Observers, person: ServerAttendance) -> End:
+def follow_there(server: PrintServer, now: PrintStatus, observers: Observers, person: ServerAttendance) -> End:
     """Show a print that a server is at already until it ends or the person leaves; says how it ended. now: of running_print().
 
     Raises ServerError, FirmwareError after an emergency stop.
@@ -109,7 +108,7 @@ def follow_there(server: PrintServer, now: JobStatus, observers: Observers, pers
     return end
 
 
-def file_name(status: JobStatus) -> str:
+def file_name(status: PrintStatus) -> str:
     """What a server prints, as a person is told."""
     return status.file or "its file"
 
@@ -122,7 +121,7 @@ def _shown(
     with person.show(observers, timeline) as display:
         display.open()
 
-        def on_status(status: JobStatus, message: str) -> None:
+        def on_status(status: PrintStatus, message: str) -> None:
             now = progress.at(status, message)
             display(now)
             if observers.follow is not None:
@@ -151,7 +150,7 @@ class ReportedProgress:
 
     def __init__(self) -> None:
         self.line, self.elapsed_s = 0, 0.0
-        self._last_status: JobStatus | None = None
+        self._last_status: PrintStatus | None = None
         self._last_status_s = monotonic()
 
     @property
@@ -159,19 +158,15 @@ class ReportedProgress:
         """The temperatures that were told last, behind the last words of a print."""
         return "" if self._last_status is None else last_known(self._last_status.temperature, monotonic() - self._last_status_s)
 
-    def at(self, status: JobStatus, message: str) -> Progress:
+    def at(self, status: PrintStatus, message: str) -> PrintStatus:
         """The progress at a moment. message: goes before the server's own."""
         if status is not self._last_status:  # a server that does not answer leaves what it told last
             self._last_status, self._last_status_s = status, monotonic()
-        self.elapsed_s = max(self.elapsed_s, status.elapsed_s or 0.0)
-        return Progress(
+        self.elapsed_s = max(self.elapsed_s, status.elapsed_s)
+        return replace(
+            status,
             elapsed_s=self.elapsed_s,
-            share=status.share,
-            temperature=status.temperature,
             heat_age_s=monotonic() - self._last_status_s,
-            state=status.phase.value,
-            feed_percent=status.feed_percent or 100.0,
-            flow_percent=status.flow_percent or 100.0,
             message=plain_line(message or status.message),
         )
 
@@ -184,7 +179,7 @@ class ServerProgress(ReportedProgress):
         self._line_at, self._lines, self._remaining_s = upload.line_at, lines, remaining_s
         self._position = ProgramPosition()
 
-    def at(self, status: JobStatus, message: str) -> Progress:
+    def at(self, status: PrintStatus, message: str) -> PrintStatus:
         """The progress at a moment. message: goes before the server's own."""
         progress = super().at(status, message)
         self._read_to(self._line_at(status.bytes_read or 0))

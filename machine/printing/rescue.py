@@ -5,10 +5,10 @@ A print server goes on printing by itself: it is only asked what it does, unless
 
 from machine.link.medium import SERIAL
 from machine.link.port import open_port
+from machine.link.print_state import ACTIVE
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from machine.printing.servers.address import is_server_address
 from machine.printing.servers.follow import UNCONFIRMED
-from machine.printing.servers.server import ACTIVE
 from machine.printing.servers.servers import open_server
 from profiles.errors import PortError, ServerError, UserError
 
@@ -56,14 +56,14 @@ def cancel_on_server(address: str, file: str, away_s: float) -> bool:
     with open_server(address) as server:
         server.greet()
         status = server.status()
-        if status.phase not in ACTIVE:
+        if status.state not in ACTIVE:
             return False
         printed = status.file or server.file_in_print()
         if not printed:
             raise ServerError(f"{address} does not say which file it prints, it may not be {file}: {CANCEL_THERE}")
         if printed != file:
             raise ServerError(f"{address} prints {printed} now, not {file}")
-        if (status.elapsed_s or 0.0) + ROUNDED_S < away_s:  # begun after the one that was left was last seen
+        if status.elapsed_s + ROUNDED_S < away_s:  # begun after the one that was left was last seen
             raise ServerError(f"{address} may have begun to print {file} again since: {CANCEL_THERE}")
         server.cancel()
         return True
@@ -76,7 +76,7 @@ def _look_at_server(address: str) -> str:
             status = server.status()
     except UserError as error:
         return f"{error}; what {address} prints goes on without this program: look at the printer"
-    if status.phase in ACTIVE:
-        now = f"{address} is {status.phase.value} {status.file or 'a file'}"
+    if status.state in ACTIVE:
+        now = f"{address} is {status.state} {status.file or 'a file'}"
         return f"{now} and goes on without this program: its own page commands it"
-    return f"{address} prints nothing now ({status.message or status.phase.value})"
+    return f"{address} prints nothing now ({status.message or status.state})"

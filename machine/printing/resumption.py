@@ -25,6 +25,7 @@ from machine.link.journal import (
     read_journal,
 )
 from machine.link.pending_commands import CancelledError
+from machine.link.print_state import PrintState
 from machine.link.resume import (
     PARKED,
     InterruptedPrint,
@@ -146,7 +147,7 @@ def print_rest(
             serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched,
         ):
             outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin=begin, attendance=person)
-            watched.end("stopped" if outcome.cancelled else "done")
+            watched.end(PrintState.CANCELLED if outcome.cancelled else PrintState.DONE)
         if outcome.cancelled and outcome.heaters_off is None:
             say("nothing was moved or heated")
             return NOTHING

@@ -6,10 +6,11 @@ from machine.firmware.klipper import stepper_name
 from machine.gcode.commands import command_named
 from machine.gcode.line_text import macro_name
 from machine.link.identification import Answer, Kind
+from machine.link.print_state import ACTIVE, PrintState, PrintStatus
 from machine.pipeline.programs import refuse_errors
 from machine.printing.compatibility import check_printer, check_program, refuse
 from machine.printing.servers.address import ServerAddress, is_server_address
-from machine.printing.servers.server import ACTIVE, JobStatus, Phase, ServerIdentity
+from machine.printing.servers.server import ServerIdentity
 from machine.printing.servers.servers import dialect_mismatch
 from machine.program import Program
 from profiles.errors import PrinterError, ServerError
@@ -41,20 +42,20 @@ def ready_for_server(greeting: ServerIdentity, program: Program, profile: Profil
     refuse_errors(program.run.errors, force)
 
 
-def check_free(server: str, status: JobStatus) -> None:
+def check_free(server: str, status: PrintStatus) -> None:
     """Refuse a server that cannot begin a print now. Raises ServerError."""
-    if status.phase in ACTIVE:
-        now = f"{server} is {status.phase.value} {status.file or 'another file'} now"
+    if status.state in ACTIVE:
+        now = f"{server} is {status.state} {status.file or 'another file'} now"
         raise ServerError(f"{now}: wait until that is done; send without --start hands a file over meanwhile")
-    if status.phase is Phase.OFFLINE:
+    if status.state is PrintState.OFFLINE:
         raise ServerError(f"{server} cannot print now: {status.message or 'its printer is not connected'}")
 
 
-def check_idle(server: str, status: JobStatus) -> None:
+def check_idle(server: str, status: PrintStatus) -> None:
     """Refuse a server that prints, or whose printer is not there, where only questions are asked. Raises ServerError."""
-    if status.phase in ACTIVE:
-        raise ServerError(f"{server} is {status.phase.value} {status.file or 'a file'} now: ask it when that is done")
-    if status.phase is Phase.OFFLINE:
+    if status.state in ACTIVE:
+        raise ServerError(f"{server} is {status.state} {status.file or 'a file'} now: ask it when that is done")
+    if status.state is PrintState.OFFLINE:
         raise ServerError(f"{server} cannot tell its settings now: {status.message or 'its printer is not connected'}")
 
 

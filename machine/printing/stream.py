@@ -14,7 +14,8 @@ from machine.dryrun.timeline import Timeline
 from machine.firmware import dialect_of
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal
-from machine.link.progress import Progress, Schedule
+from machine.link.print_state import PrintStatus
+from machine.link.progress import Schedule
 from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
@@ -118,7 +119,7 @@ def stream_program(
         if begin is None:
             display.open()
 
-        def on_progress(progress: Progress) -> None:
+        def on_progress(progress: PrintStatus) -> None:
             display(progress)
             if observers.follow is not None:
                 observers.follow(progress)

@@ -18,6 +18,6 @@ def follow(address: str, log: Path | None = None) -> int:
     with server_session(address, f"what {address} prints", "print", log) as (server, record):
         say(f"{server.greet().text} answers at {server.name}")
         now = running_print(server)
-        say(f"it is {now.phase.value} {file_name(now)}")
+        say(f"it is {now.state} {file_name(now)}")
         end = follow_there(server, now, Observers(record), AtServerTerminal(server.name))
     return 0 if end is End.DONE else 130

@@ -6,6 +6,7 @@ from machine.cli.commands.send import print_on_server
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.report import print_table
 from machine.firmware.line import check_baud
+from machine.link.print_state import PrintState
 from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
 from machine.pipeline.output import check_writable
 from machine.pipeline.programs import load_program
@@ -41,5 +42,5 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     person = AtTerminal()
     with serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched:
         code = print_program(job, printing, watched.follow, person)
-        watched.end("stopped" if code else "done")
+        watched.end(PrintState.CANCELLED if code else PrintState.DONE)
     return code

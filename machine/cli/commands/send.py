@@ -7,6 +7,7 @@ from pathlib import Path
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.progress import say
 from machine.cli.terminal.report import print_table
+from machine.link.print_state import PrintState
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_writable
 from machine.pipeline.programs import LoadedProgram, load_program
@@ -58,7 +59,7 @@ def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
         person = AtServerTerminal(server.name)
         with serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched:
             end = print_there(server, job, Observers(log, None, watched.follow), person)
-            watched.end("done" if end is End.DONE else "stopped")
+            watched.end(PrintState.DONE if end is End.DONE else PrintState.CANCELLED)
     return 0 if end is End.DONE else 130
 
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 
 STEP_PERCENT = 10.0
 LOOK_S = 0.05
@@ -40,7 +40,7 @@ class Keyboard:
         """A question, an explanation, or what was just asked for; "" when there is none or it is old."""
         return self._hint if self._now_s() < self._hint_until_s else ""
 
-    def follow(self, progress: Progress) -> None:
+    def follow(self, progress: PrintStatus) -> None:
         """Know what the print does, so that one key can mean pause and resume."""
         self._state = progress.state
         percents = (progress.feed_percent, progress.flow_percent)

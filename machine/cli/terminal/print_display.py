@@ -8,10 +8,10 @@ from machine.cli.terminal.printer_messages import PrinterMessages
 from machine.cli.terminal.progress import PlainLines, is_terminal, say
 from machine.cli.terminal.screen import Screen
 from machine.dryrun.timeline import Timeline
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.quantities import duration
 
-Follow = Callable[[Progress], None]
+Follow = Callable[[PrintStatus], None]
 
 
 class PrintDisplay:
@@ -28,7 +28,7 @@ class PrintDisplay:
         """Begin to show what comes."""
         self._follow = self._stack.enter_context(self._shown)
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: PrintStatus) -> None:
         if self._follow is not None:
             self._follow(progress)
 
@@ -51,7 +51,7 @@ def _shown(title: str, timeline: Timeline, board: Keyboard, messages: PrinterMes
             stack.enter_context(typing(board.press))
         screen = stack.enter_context(Screen(title, timeline, messages, lambda: board.hint, keys))
 
-        def follow(progress: Progress) -> None:
+        def follow(progress: PrintStatus) -> None:
             board.follow(progress)
             screen.tell(progress)
 
@@ -64,7 +64,7 @@ class _StatusLines:
     def __init__(self) -> None:
         self._lines, self._last, self._warning = PlainLines(), ("printing", ""), ""
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: PrintStatus) -> None:
         if progress.warning != self._warning:
             self._warning = progress.warning
             say(progress.warning)
@@ -72,7 +72,7 @@ class _StatusLines:
         self._lines.show(status(progress), at_once=before != self._last)
 
 
-def status(progress: Progress) -> str:
+def status(progress: PrintStatus) -> str:
     """One line that tells where a print stands."""
     phrases = [f"{100 * progress.share:.0f} %"] if progress.share is not None else []
     if progress.share is None and (progress.total is not None or progress.acknowledged):

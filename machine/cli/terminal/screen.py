@@ -14,7 +14,7 @@ from rich.text import Text
 from machine.cli.terminal.plain import plain_line
 from machine.cli.terminal.printer_messages import PrinterMessages
 from machine.dryrun.timeline import Timeline
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.quantities import duration
 
 WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
@@ -27,7 +27,7 @@ class ScreenState:
     """What stands on the screen. title: what is printed where; hint: a question or an explanation in place of the keys."""
 
     title: str
-    progress: Progress
+    progress: PrintStatus
     timeline: Timeline
     words: tuple[str, ...] = ()
     hint: str = ""
@@ -72,7 +72,7 @@ def _of(count: int | None) -> str:
     return f" of {count}" if count else ""
 
 
-def _heat(progress: Progress) -> Text:
+def _heat(progress: PrintStatus) -> Text:
     heat = progress.temperature
     old = [f"as last known {progress.heat_age_s:.0f} s ago:"] if progress.heat_is_old and heat.words else []
     phrases = [
@@ -84,7 +84,7 @@ def _heat(progress: Progress) -> Text:
     return _phrases_line([*old, *phrases, *overrides])
 
 
-def _bar(progress: Progress) -> RenderableType:
+def _bar(progress: PrintStatus) -> RenderableType:
     row = Table.grid(expand=True, padding=(0, 1))
     row.add_column(ratio=1)
     row.add_column(justify="right", no_wrap=True)
@@ -93,7 +93,7 @@ def _bar(progress: Progress) -> RenderableType:
     return row
 
 
-def _times(progress: Progress, now: datetime) -> Text:
+def _times(progress: PrintStatus, now: datetime) -> Text:
     phrases = [f"{duration(progress.elapsed_s)} so far"]
     if progress.left_s is not None:
         end = now + timedelta(seconds=progress.left_s)
@@ -124,7 +124,7 @@ class Screen:
         self._live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
         self._gone = False
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: PrintStatus) -> None:
         """Draw where the print stands."""
         if self._gone:
             return

@@ -14,9 +14,9 @@ from enum import Enum
 from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
-from machine.link.progress import last_known
+from machine.link.print_state import ACTIVE, PrintState, PrintStatus, last_known
 from machine.link.protocol.events import Temperature
-from machine.printing.servers.server import ACTIVE, JobStatus, Phase, PrintServer
+from machine.printing.servers.server import PrintServer
 from profiles.errors import NoAnswerError, ServerError
 
 POLL_S, TURN_S = 1.0, 0.05
@@ -27,7 +27,7 @@ QUIET_S = 15.0  # without an answer or an error for so long, it is said
 LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
 UNKNOWN = "whether the print goes on there is not known"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
-OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
+OnStatus = Callable[[PrintStatus, str], None]  # with a message to the person, "" when there is none
 
 
 class End(Enum):
@@ -43,7 +43,7 @@ class End(Enum):
 class _Heard:
     """What the polling thread has heard last, and how long it has heard nothing."""
 
-    status: JobStatus | None = None
+    status: PrintStatus | None = None
     error: ServerError | None = None
     answered_s: float = field(default_factory=time.monotonic)
 
@@ -56,7 +56,7 @@ def follow_print(
     on_status: OnStatus,
     control: Control,
     left: Callable[[], bool],
-    running: JobStatus | None = None,
+    running: PrintStatus | None = None,
 ) -> End:
     """Have a file printed that a server holds, and follow that to its end.
 
@@ -75,18 +75,18 @@ class _Follower:
     on_status: OnStatus
     control: Control
     left: Callable[[], bool]
-    running: JobStatus | None
+    running: PrintStatus | None
 
     def __post_init__(self) -> None:
         self._heard, self._over = _Heard(), threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
-        self._last_active: Phase | None = self.running.phase if self.running else None
+        self._last_active: PrintState | None = self.running.state if self.running else None
         self._read, self._heat = 0, Temperature()
         self._cancels = False  # the server has the order, or may have it
         self._began_s: float | None = None  # since when the server has been told to start
         self._failed: Exception | None = None  # of the start, or of a thread
-        self._shown: tuple[JobStatus | None, str] = (None, "")
+        self._shown: tuple[PrintStatus | None, str] = (None, "")
         self._shown_s = 0.0
         self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
@@ -149,43 +149,43 @@ class _Follower:
             self.on_status(heard.status, message)
         return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
 
-    def _end_of(self, status: JobStatus) -> End | None:
+    def _end_of(self, status: PrintStatus) -> End | None:
         if self._began_s is None:
             return None
         heat = status.temperature
         self._heat = heat if heat.words else self._heat
-        if status.phase in ACTIVE:
+        if status.state in ACTIVE:
             if self._last_active is not None and status.file not in ("", self.file):
                 raise ServerError(f"{self.server.name} prints {status.file} now: what became of {self.file} is not known")
-            self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
+            self._last_active, self._read = status.state, max(self._read, status.bytes_read or 0)
             return None
-        if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):
+        if status.state is PrintState.OFFLINE or (status.state is PrintState.FAILED and self._last_active is not None):
             where = f" at {self._reached}" if self._reached else ""
-            raise ServerError(f"{self.server.name}: the print has failed{where}: {status.message or status.phase.value}")
+            raise ServerError(f"{self.server.name}: the print has failed{where}: {status.message or status.state}")
         if self._last_active is None:
             return self._end_unseen(status, time.monotonic() - self._began_s)
-        if status.phase is not Phase.DONE and not self._cancels:
+        if status.state is not PrintState.DONE and not self._cancels:
             raise ServerError(self._ended_there(status))
-        return End.DONE if status.phase is Phase.DONE else End.CANCELLED
+        return End.DONE if status.state is PrintState.DONE else End.CANCELLED
 
     @property
     def _reached(self) -> str:
         """How far the server has read, in words; "" where it is not known."""
         return f"{100 * self._read / self.size:.0f} %" if self._read and self.size else ""
 
-    def _ended_there(self, status: JobStatus) -> str:
+    def _ended_there(self, status: PrintStatus) -> str:
         """A server that has died and come back, or somebody else who has cancelled: the heaters may still be on."""
         known = ", ".join(filter(None, (f"{self._reached} read" if self._reached else "", self._heat.words)))
         return (
-            f"{self.server.name} no longer prints {self.file or 'its file'} ({status.message or status.phase.value})"
+            f"{self.server.name} no longer prints {self.file or 'its file'} ({status.message or status.state})"
             f"{f'; last known: {known}' if known else ''}: look at the printer"
         )
 
-    def _end_unseen(self, status: JobStatus, waited_s: float) -> End | None:
+    def _end_unseen(self, status: PrintStatus, waited_s: float) -> End | None:
         """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
         if waited_s < BEGIN_S:
             return None
-        if status.phase is Phase.DONE and status.file in ("", self.file):
+        if status.state is PrintState.DONE and status.file in ("", self.file):
             return End.DONE
         raise ServerError(
             f"{self.server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
@@ -237,13 +237,11 @@ class _Follower:
         self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
         self._percents[command] = value
 
-    def _with_percents(self, status: JobStatus) -> JobStatus:
-        feed, flow = status.feed_percent, status.flow_percent
-        return replace(
-            status,
-            feed_percent=self._percents.get(Command.FEED) if feed is None else feed,
-            flow_percent=self._percents.get(Command.FLOW) if flow is None else flow,
-        )
+    def _with_percents(self, status: PrintStatus) -> PrintStatus:
+        if self.server.tells_percents:
+            return status
+        feed, flow = (self._percents.get(command, 100.0) for command in (Command.FEED, Command.FLOW))
+        return replace(status, feed_percent=feed, flow_percent=flow)
 
     def _carry_out(self) -> None:
         """The start, then orders one after the other; what a server refuses of these is told, and following goes on.

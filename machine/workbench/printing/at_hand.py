@@ -8,7 +8,7 @@ do all at the end unless the person says otherwise.
 from contextlib import ExitStack
 from math import inf
 from queue import Empty
-from time import monotonic, time
+from time import monotonic
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from machine.gcode.words import read_letters, split_command
 from machine.kinematics.table import machine_points
 from machine.link.pending_commands import Command
 from machine.link.port import open_port
+from machine.link.print_state import PrintState, PrintStatus
 from machine.pipeline.requests import SIMULATED
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.compatibility import check_machine, check_speed, describe_answer, identify_printer
@@ -114,28 +115,15 @@ class Hand:
             self._session.command(command)
         self._looked_s = monotonic()
         self._moments += 1
-        heat = self._session.heat
-        self._tell(
-            phase="hand",
-            progress={
-                "state": "in hand",
-                "share": None,
-                "left_s": None,
-                "message": self._problem,
-                "moment": self._moments,
-                "nozzle_c": heat.nozzle_c,
-                "nozzle_target_c": heat.nozzle_target_c,
-                "heat_s": time(),
-                "heat_is_old": False,
-                "bed_c": heat.bed_c,
-                "bed_target_c": heat.bed_target_c,
-                "at": {letter: place for letter, place in self._at().items() if letter != "E"},
-                "elapsed_s": monotonic() - self._began_s,
-                "homed": self._homed,
-                "feed_percent": 100,
-                "flow_percent": 100,
-            },
+        status = PrintStatus(
+            PrintState.IN_HAND,
+            monotonic() - self._began_s,
+            self._session.heat,
+            at={letter: place for letter, place in self._at().items() if letter != "E"},
+            message=self._problem,
+            homed=self._homed,
         )
+        self._tell(phase="hand", progress=status.json() | {"moment": self._moments})
 
     def _at(self) -> dict[str, float]:
         return {} if self._session.position is None else dict(self._session.position.axes)

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from queue import SimpleQueue
 from threading import Event as Flag
-from time import time
 from typing import Any
 
 from machine.cli.terminal.plain import plain_line
@@ -12,10 +12,9 @@ from machine.cli.terminal.printer_messages import PrinterMessages
 from machine.cli.terminal.progress import Report
 from machine.dryrun.timeline import Timeline
 from machine.link.pending_commands import Command, Control
-from machine.link.progress import Progress
+from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.attendance import Observers
 from machine.printing.serial_log import SerialLog
-from machine.view.serving.watch_page import state_of
 from machine.workbench.printing.order import HandCommand
 from machine.workbench.printing.reporter import StateReporter
 
@@ -115,26 +114,17 @@ class _Shown:
         self._opened = True
         self._reporter.tell(phase="printing", upload=None)
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: PrintStatus) -> None:
         if not self._opened:
             return
         self._words.add(progress.message)
-        phase = "leaving" if progress.state == "cancelling" else "printing"
+        phase = "leaving" if progress.state is PrintState.CANCELLING else "printing"
         words = tuple(plain_line(word) for word in self._words.last)
         self._moments += 1
         moment = moment_of(progress, self._timeline) | {"moment": self._moments}
         self._reporter.tell(phase=phase, progress=moment, words=words, **({"journal": ""} if progress.warning else {}))
 
 
-def moment_of(progress: Progress, timeline: Timeline) -> dict[str, Any]:
-    """A moment of a print for the page: what every page that watches is told, and what a terminal's screen adds. heat_s: since
-    when the temperatures are known, seconds since 1970, for the page goes on counting when nothing more comes."""
-    return {
-        **state_of(progress),
-        "parts": progress.parts,
-        "layers": timeline.layers(progress.part),
-        "at": timeline.at(progress.file_line),
-        "feed_percent": progress.feed_percent,
-        "flow_percent": progress.flow_percent,
-        "heat_s": time() - progress.heat_age_s,
-    }
+def moment_of(progress: PrintStatus, timeline: Timeline) -> dict[str, Any]:
+    """A moment of a print for the page: what every page that watches is told, and what a terminal's screen adds."""
+    return replace(progress, layers=timeline.layers(progress.part), at=timeline.at(progress.file_line)).json()

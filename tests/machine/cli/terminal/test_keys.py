@@ -12,11 +12,10 @@ import pytest
 
 from machine.cli.terminal.keys import HINT_S, MORE, SURE, Keyboard, Typing, can_type, typing
 from machine.link.pending_commands import Command, Control, PendingCommand
-from machine.link.progress import Progress
-from machine.link.protocol.events import Temperature
+from machine.link.print_state import PrintStatus
 from tests.machine.peers import PATIENCE_S
 
-MOMENT = Progress(0.0, Temperature())
+MOMENT = PrintStatus(elapsed_s=0.0)
 
 
 def asked(*keys: str, state: str = "printing") -> list[PendingCommand]:

@@ -11,18 +11,18 @@ from rich.console import Console
 from machine.cli.terminal.keys import MORE
 from machine.cli.terminal.print_display import status
 from machine.cli.terminal.screen import KEYS, ScreenState, render
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.link.protocol.events import Temperature
 from tests.machine.dryrun.test_timeline import TIMELINE
 
 NOON = datetime(2026, 11, 21, 12, 0, 0)
-MOMENT = Progress(
+MOMENT = PrintStatus(
     sent=14, acknowledged=12, total=14, elapsed_s=754.0, left_s=4335.0, share=0.62,
     temperature=Temperature(209.8, 210.0, 60.1, 60.0), part=1, parts=2, layer=1, file_line=13,
 )  # fmt: skip
 
 
-def lines(progress: Progress, words: tuple[str, ...] = (), hint: str = "", keys: bool = True, width: int = 100) -> list[str]:
+def lines(progress: PrintStatus, words: tuple[str, ...] = (), hint: str = "", keys: bool = True, width: int = 100) -> list[str]:
     """The screen as plain lines without the spaces at their ends."""
     console = Console(file=io.StringIO(), record=True, width=width, force_terminal=True, no_color=True)
     console.print(render(ScreenState("tree.gcode to /dev/ttyACM0", progress, TIMELINE, words, hint, keys), NOON))
@@ -46,7 +46,7 @@ def test_the_pose_is_that_of_the_acknowledged_line() -> None:
 
 
 def test_what_is_not_known_is_left_out() -> None:
-    unknown = Progress(0.0, Temperature())
+    unknown = PrintStatus(elapsed_s=0.0)
     _, position, heat, bar, times, _ = lines(unknown)
     assert (position, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
     assert "%" not in bar

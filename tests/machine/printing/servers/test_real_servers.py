@@ -16,10 +16,10 @@ from pathlib import Path
 import pytest
 
 from machine.link.pending_commands import Command, Control
+from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.servers.credentials import VARIABLE
 from machine.printing.servers.follow import End, follow_print
 from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import JobStatus, Phase
 from machine.printing.servers.servers import open_server
 from profiles.errors import ServerError
 from tests.machine.printing.servers.klippy_stub import KlippyStub
@@ -74,7 +74,7 @@ def wait_ready(address: str) -> None:
         try:
             with open_server(address) as server:
                 server.greet()
-                if server.status().phase is Phase.READY:
+                if server.status().state is PrintState.READY:
                     return
         except ServerError:
             if time.monotonic() > deadline:
@@ -127,17 +127,17 @@ def wait_for_key(database: Path) -> str:
     raise AssertionError("Moonraker has made no key")
 
 
-Steps = Callable[[JobStatus, Control], None]
+Steps = Callable[[PrintStatus, Control], None]
 
 
-def print_on(address: str, steps: Steps) -> tuple[End, list[Phase]]:
+def print_on(address: str, steps: Steps) -> tuple[End, list[PrintState]]:
     """How a print ends that is given orders on the way, and the phases it was seen in."""
-    phases: list[Phase] = []
+    phases: list[PrintState] = []
     control = Control()
 
-    def on_status(status: JobStatus, message: str) -> None:
-        if phases[-1:] != [status.phase]:
-            phases.append(status.phase)
+    def on_status(status: PrintStatus, message: str) -> None:
+        if phases[-1:] != [status.state]:
+            phases.append(status.state)
             steps(status, control)
 
     with open_server(address) as server:
@@ -146,21 +146,21 @@ def print_on(address: str, steps: Steps) -> tuple[End, list[Phase]]:
 
 
 def pause_resume_cancel() -> Steps:
-    orders = {Phase.PRINTING: [Command.PAUSE, Command.CANCEL], Phase.PAUSED: [Command.RESUME]}
+    orders = {PrintState.PRINTING: [Command.PAUSE, Command.CANCEL], PrintState.PAUSED: [Command.RESUME]}
 
-    def steps(status: JobStatus, control: Control) -> None:
-        if orders.get(status.phase):
-            control.ask(orders[status.phase].pop(0))
+    def steps(status: PrintStatus, control: Control) -> None:
+        if orders.get(status.state):
+            control.ask(orders[status.state].pop(0))
 
     return steps
 
 
-def only_watch(status: JobStatus, control: Control) -> None:
+def only_watch(status: PrintStatus, control: Control) -> None:
     """Ask for nothing."""
 
 
-def stop_at_once(status: JobStatus, control: Control) -> None:
-    if status.phase is Phase.PRINTING:
+def stop_at_once(status: PrintStatus, control: Control) -> None:
+    if status.state is PrintState.PRINTING:
         control.ask(Command.EMERGENCY_STOP)
 
 
@@ -194,7 +194,7 @@ def test_octoprint_prints_pauses_cancels_and_halts(octoprint: str, monkeypatch: 
         assert server.greet().text.startswith("OctoPrint 1.")
         assert not server.has("passes.gcode")
     end, phases = print_on(octoprint, only_watch)
-    assert (end, phases[-1]) == (End.DONE, Phase.DONE)
+    assert (end, phases[-1]) == (End.DONE, PrintState.DONE)
     with open_server(octoprint) as server:
         assert server.has("passes.gcode")
     check_pause_and_cancel(octoprint)
@@ -213,7 +213,7 @@ def test_moonraker_prints_pauses_cancels_and_halts(moonraker: tuple[str, KlippyS
         assert greeting.steppers == {"stepper_a", "stepper_c"}
         assert not server.has("passes.gcode")
     end, phases = print_on(address, only_watch)
-    assert (end, phases[-1]) == (End.DONE, Phase.DONE)
+    assert (end, phases[-1]) == (End.DONE, PrintState.DONE)
     with open_server(address) as server:
         assert server.has("passes.gcode")
         server.command("M220 S120")
@@ -223,15 +223,15 @@ def test_moonraker_prints_pauses_cancels_and_halts(moonraker: tuple[str, KlippyS
     check_broken_off(address)
     assert print_on(address, stop_at_once)[0] is End.STOPPED
     with open_server(address) as server:
-        assert server.status().phase is Phase.OFFLINE
+        assert server.status().state is PrintState.OFFLINE
     check_refusals(address, monkeypatch)
 
 
 def check_pause_and_cancel(address: str) -> None:
     end, phases = print_on(address, pause_resume_cancel())
     assert end is End.CANCELLED
-    begin = [phase for phase in phases if phase in (Phase.PRINTING, Phase.PAUSED)][:3]
-    assert begin == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
+    begin = [phase for phase in phases if phase in (PrintState.PRINTING, PrintState.PAUSED)][:3]
+    assert begin == [PrintState.PRINTING, PrintState.PAUSED, PrintState.PRINTING]
 
 
 def check_while_printing(address: str) -> None:

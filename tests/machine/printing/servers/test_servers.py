@@ -14,12 +14,13 @@ from typing import Any
 import pytest
 
 from machine.link.pending_commands import Command, Control
+from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.rescue import cancel_on_server, rescue
 from machine.printing.servers import duet, follow, http
 from machine.printing.servers.credentials import VARIABLE, servers_file
 from machine.printing.servers.follow import End, follow_print
 from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import JobStatus, Phase, PrintServer
+from machine.printing.servers.server import PrintServer
 from machine.printing.servers.servers import KINDS, open_server
 from profiles.errors import NoAnswerError, ServerError
 from tests.machine.printing.servers.stand_ins import KEY, STAND_INS, Job, stand_in
@@ -43,7 +44,7 @@ def unheard(count: int) -> None:
     del count
 
 
-def ignore(status: JobStatus, message: str) -> None:
+def ignore(status: PrintStatus, message: str) -> None:
     del status, message
 
 
@@ -61,7 +62,7 @@ def printing(kind: str, **more: Any) -> Iterator[tuple[Job, PrintServer]]:
         yield job, server
 
 
-def run(server: PrintServer, control: Control, on_status: Callable[[JobStatus, str], None] = ignore) -> End:
+def run(server: PrintServer, control: Control, on_status: Callable[[PrintStatus, str], None] = ignore) -> End:
     return follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False)
 
 
@@ -101,11 +102,11 @@ def test_a_server_tells_of_its_camera_or_of_none(kind: str, path: str, value: ob
 
 @every_kind
 def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
-    seen: list[JobStatus] = []
+    seen: list[PrintStatus] = []
     with stand_in(kind) as (_, address), open_server(address) as server:
         hand_over(server)
         assert run(server, Control(), lambda status, message: seen.append(status)) is End.DONE
-    printing = [status for status in seen if status.phase is Phase.PRINTING]
+    printing = [status for status in seen if status.state is PrintState.PRINTING]
     assert any(0 < (status.bytes_read or 0) < len(UPLOAD.content) for status in printing)
     heat = printing[0].temperature
     assert (heat.nozzle_c, heat.nozzle_target_c, heat.bed_c, heat.bed_target_c) == (209.6, 210.0, 59.9, 60.0)
@@ -113,22 +114,22 @@ def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
 
 @every_kind
 def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> None:
-    control, phases = Control(), list[Phase]()
-    asks = {Phase.PRINTING: Command.PAUSE, Phase.PAUSED: Command.RESUME}
+    control, phases = Control(), list[PrintState]()
+    asks = {PrintState.PRINTING: Command.PAUSE, PrintState.PAUSED: Command.RESUME}
 
-    def ask(status: JobStatus, message: str) -> None:
-        if status.phase is Phase.READY or phases[-1:] == [status.phase]:
+    def ask(status: PrintStatus, message: str) -> None:
+        if status.state is PrintState.READY or phases[-1:] == [status.state]:
             return
-        phases.append(status.phase)
+        phases.append(status.state)
         done = len(phases) > 2  # printing, paused, printing
-        if status.phase in asks:
-            control.ask(Command.CANCEL if done else asks[status.phase])
+        if status.state in asks:
+            control.ask(Command.CANCEL if done else asks[status.state])
 
     with printing(kind) as (job, server):
         end = run(server, control, ask)
     assert end is End.CANCELLED
     assert job.state == "cancelled"
-    assert phases[:3] == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
+    assert phases[:3] == [PrintState.PRINTING, PrintState.PAUSED, PrintState.PRINTING]
 
 
 def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
@@ -187,12 +188,12 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
         control.ask(Command.FEED, 120.0)
         control.ask(Command.FLOW, 900.0)  # not possible: told, not sent
 
-        def stop(status: JobStatus, message: str) -> None:
+        def stop(status: PrintStatus, message: str) -> None:
             if job.commands:
                 control.ask(Command.EMERGENCY_STOP)
 
         assert run(server, control, stop) is End.STOPPED
-        assert server.status().phase is Phase.OFFLINE
+        assert server.status().state is PrintState.OFFLINE
     assert job.commands[0] == "M220 S120"
     assert job.halted
 
@@ -301,7 +302,7 @@ def test_a_session_of_a_duet_that_has_ended_is_begun_again() -> None:
     with stand_in("duet", sessions=sessions) as (_, address), open_server(address) as server:
         server.greet()
         sessions.clear()
-        assert server.status().phase is Phase.READY
+        assert server.status().state is PrintState.READY
 
 
 @every_kind
@@ -309,11 +310,11 @@ def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch:
     messages: list[str] = []
     with printing(kind) as (job, server):
 
-        def away(status: JobStatus, message: str) -> None:
+        def away(status: PrintStatus, message: str) -> None:
             messages.append(message)
             if message:
                 monkeypatch.setattr(follow, "LOST_S", 0.0)  # two minutes later
-            if status.phase is Phase.PRINTING:
+            if status.state is PrintState.PRINTING:
                 job.refuse = dict.fromkeys(STATUS, (502, "Bad Gateway"))
 
         with pytest.raises(ServerError, match="the print may go on, look at the printer"):
@@ -354,7 +355,7 @@ def test_what_became_of_a_print_is_told_as_far_as_it_is_known(
         run(
             server,
             Control(),
-            lambda status, message: happens(job, message) if status.phase is Phase.PRINTING or message else None,
+            lambda status, message: happens(job, message) if status.state is PrintState.PRINTING or message else None,
         )
 
 
@@ -367,10 +368,10 @@ def test_a_cancel_that_was_refused_has_cancelled_nothing() -> None:
     control = Control()
     with printing("octoprint", handler=Busy) as (job, server):
 
-        def cancel(status: JobStatus, message: str) -> None:
+        def cancel(status: PrintStatus, message: str) -> None:
             if "refuses to cancel" in message:
                 job.restart()
-            elif status.phase is Phase.PRINTING:
+            elif status.state is PrintState.PRINTING:
                 control.ask(Command.CANCEL)
 
         with pytest.raises(ServerError, match=r"no longer prints box\.gcode"):
@@ -490,29 +491,29 @@ def test_an_answer_that_drips_is_not_waited_for(monkeypatch: pytest.MonkeyPatch)
 class Unanswered:
     """A server that takes the order to start without an answer; status() calls what it is given."""
 
-    name = "octoprint:host"
+    name, tells_percents = "octoprint:host", True
 
-    def __init__(self, status: Callable[[], JobStatus]) -> None:
+    def __init__(self, status: Callable[[], PrintStatus]) -> None:
         self.status = status
 
     def start(self, file: str) -> None:
         raise NoAnswerError("it has stopped answering")
 
 
-def follow_unanswered(status: Callable[[], JobStatus]) -> End:
+def follow_unanswered(status: Callable[[], PrintStatus]) -> End:
     server: object = Unanswered(status)
     return follow_print(server, "box.gcode", 9, on_status=ignore, control=Control(), left=lambda: False)  # type: ignore[arg-type]
 
 
 def test_a_print_whose_start_was_not_answered_is_followed_all_the_same() -> None:
-    phases = iter([Phase.PRINTING] * 20)
-    assert follow_unanswered(lambda: JobStatus(next(phases, Phase.DONE), "box.gcode")) is End.DONE
+    phases = iter([PrintState.PRINTING] * 20)
+    assert follow_unanswered(lambda: PrintStatus(next(phases, PrintState.DONE), file="box.gcode")) is End.DONE
 
 
 def test_the_end_of_an_earlier_print_is_not_taken_for_ours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(follow, "BEGIN_S", 0.1)
     with pytest.raises(ServerError, match="has not begun to print within"):
-        follow_unanswered(lambda: JobStatus(Phase.DONE, "other.gcode"))
+        follow_unanswered(lambda: PrintStatus(PrintState.DONE, file="other.gcode"))
 
 
 def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -521,13 +522,13 @@ def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.Monke
     monkeypatch.setattr(follow, "JOIN_S", 0.01)
     try:
         with pytest.raises(ServerError, match="octoprint:host; no answer for 0 s: the print may go on, look at the printer"):
-            follow_unanswered(lambda: JobStatus(Phase.READY if over.wait(60.0) else Phase.FAILED))
+            follow_unanswered(lambda: PrintStatus(PrintState.READY if over.wait(60.0) else PrintState.FAILED))
     finally:
         over.set()
 
 
 def test_an_error_of_a_thread_is_not_lost() -> None:
-    def broken() -> JobStatus:
+    def broken() -> PrintStatus:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):

@@ -24,8 +24,7 @@ from machine.cli.terminal.progress import say
 from machine.dryrun.timeline import UnknownTimeline
 from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
-from machine.link.progress import Progress
-from machine.link.protocol.events import Temperature
+from machine.link.print_state import PrintStatus
 from machine.pipeline.requests import PrintRequest
 from machine.printing.attendance import Observers
 from machine.printing.compatibility import refuse
@@ -318,9 +317,9 @@ def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_name
         person.show(Observers(log, journal), UnknownTimeline()) as shown,
     ):
         shown.open()
-        shown(Progress(1.0, Temperature()))
+        shown(PrintStatus(elapsed_s=1.0))
         assert (heard.state["journal"], heard.state["progress"]["warning"]) == (str(tmp_path / "j"), "")
-        shown(Progress(2.0, Temperature(), warning="this print can no longer be resumed"))
+        shown(PrintStatus(elapsed_s=2.0, warning="this print can no longer be resumed"))
     assert (heard.state["journal"], heard.state["progress"]["warning"]) == ("", "this print can no longer be resumed")
 
 
