@@ -7,7 +7,6 @@ stream and the servers make it, a terminal's screen and the pages show it.
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from time import time
 from typing import Any
 
 from machine.link.protocol.events import Temperature
@@ -63,7 +62,7 @@ TABLE: Mapping[PrintState, frozenset[PrintState]] = {
     S.UPLOADING: frozenset({S.READY, S.DECLINED, S.DONE, S.LEFT, *_LIVE, *_ENDS}),
     **{state: frozenset({*_LIVE, *_ENDS, S.DONE, S.LEFT, S.READY, S.OFFLINE}) for state in _LIVE},
     S.IN_HAND: frozenset({*_ENDS, S.DONE}),
-    S.CANCELLING: frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.FAILED, S.READY, S.OFFLINE}),
+    S.CANCELLING: frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.FAILED, S.READY, S.OFFLINE, *_LIVE}),  # it may be refused
     S.LEFT: frozenset({S.CANCELLING}),  # a print that its server goes on with is stopped after all
     **{state: frozenset() for state in OVER - {S.LEFT}},
     S.OFFLINE: frozenset(S) - OVER,
@@ -114,15 +113,10 @@ class PrintStatus:
         return self.heat_age_s >= OLD_HEAT_S or self.state in UNHEARD or self.state.is_over
 
     def json(self) -> dict[str, Any]:
-        """The status for a page, where nothing is nested but `at`. heat_s: since when the temperatures are known, seconds since
-        1970, for the page goes on counting when nothing more comes."""
-        values = asdict(self)
-        return {
-            **values,
-            **values.pop("temperature"),
-            "heat_is_old": self.heat_is_old,
-            "heat_s": time() - self.heat_age_s,
-        }
+        """The status for a page, where nothing is nested but `at`."""
+        values: dict[str, Any] = asdict(self)
+        heat: dict[str, float | None] = values.pop("temperature")
+        return values | heat | {"heat_is_old": self.heat_is_old}
 
 
 def last_known(heat: Temperature, age_s: float) -> str:

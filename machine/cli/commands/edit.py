@@ -47,7 +47,7 @@ def edit(request: EditRequest) -> int:
         show("".join(f"{each}\n" for each in (address, *of_lan)))
         say(f"the workbench is there, for this computer{'' if of_lan else ' alone'}; Ctrl-C ends it")
         if request.browser:
-            lead_browser(address, until_end)
+            lead_browser(address, until_end, say)
 
     with ExitStack() as until_end:
         serve_workbench(make, begin, announce, request.port, request.upload_mib, lan)

@@ -6,7 +6,7 @@ from threading import Event
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.progress import say
 from machine.firmware.line import check_baud
-from machine.printing.port_reports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
+from machine.printing.ports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
 
 
 def ports(baud: int, as_json: bool, ask: bool) -> int:

@@ -10,7 +10,7 @@ from machine.cli.terminal.progress import say
 from machine.firmware import dialect_of, dialects
 from machine.firmware.line import check_baud
 from machine.pipeline.requests import SimulatorRequest
-from machine.printing.running_simulators import announced
+from machine.printing.ports import announced
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.contact.probe import ProbedTable

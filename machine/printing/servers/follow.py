@@ -10,11 +10,10 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
-from machine.link.print_state import ACTIVE, PrintState, PrintStatus, last_known
+from machine.link.print_state import PrintState, PrintStatus, last_known
 from machine.link.protocol.events import Temperature
 from machine.printing.servers.server import PrintServer
 from profiles.errors import NoAnswerError, ServerError
@@ -28,15 +27,6 @@ LOST_S = 120.0  # without an answer for so long the person is told the truth: no
 UNKNOWN = "whether the print goes on there is not known"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
 OnStatus = Callable[[PrintStatus, str], None]  # with a message to the person, "" when there is none
-
-
-class End(Enum):
-    """How following a print ended."""
-
-    DONE = "done"
-    CANCELLED = "cancelled"  # by the person here
-    LEFT = "left"  # the print goes on
-    STOPPED = "stopped"  # by the emergency stop
 
 
 @dataclass
@@ -57,12 +47,12 @@ def follow_print(
     control: Control,
     left: Callable[[], bool],
     running: PrintStatus | None = None,
-) -> End:
+) -> PrintState:
     """Have a file printed that a server holds, and follow that to its end.
 
     size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
     the server is at already, which is not to be started. Raises ServerError when it is refused, fails or is lost, or when the
-    server no longer prints it and nobody here has cancelled it.
+    server no longer prints it and nobody here has cancelled it. Returns DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
     """
     return _Follower(server, file, size, on_status, control, left, running).run()
 
@@ -90,20 +80,20 @@ class _Follower:
         self._shown_s = 0.0
         self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
-    def run(self) -> End:
+    def run(self) -> PrintState:
         """A stop that is asked for before the start leaves nothing to start, and one that comes as the following ends is given
         all the same."""
         if self._take_requests():
-            return End.STOPPED
+            return PrintState.FAILED
         try:
             end = self._followed()
         except ServerError:
             if self._take_requests():
-                return End.STOPPED
+                return PrintState.FAILED
             raise
-        return End.STOPPED if end is not End.STOPPED and self._take_requests() else end
+        return PrintState.FAILED if end is not PrintState.FAILED and self._take_requests() else end
 
-    def _followed(self) -> End:
+    def _followed(self) -> PrintState:
         works = (self._poll, self._carry_out)
         threads = [threading.Thread(target=self._guard, args=(work,), name="print server", daemon=True) for work in works]
         for thread in threads:
@@ -111,9 +101,9 @@ class _Follower:
         try:
             while True:
                 if self._take_requests():
-                    return End.STOPPED
+                    return PrintState.FAILED
                 if self.left():
-                    return End.LEFT
+                    return PrintState.LEFT
                 end = self._look()
                 if end is not None:
                     return end
@@ -130,7 +120,7 @@ class _Follower:
         except Exception as error:  # noqa: BLE001 - raised again by _look()
             self._failed = error
 
-    def _look(self) -> End | None:
+    def _look(self) -> PrintState | None:
         """Tell the newest status; how the print has ended, None while it goes on."""
         if self._failed is not None:
             raise self._failed
@@ -149,12 +139,12 @@ class _Follower:
             self.on_status(heard.status, message)
         return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
 
-    def _end_of(self, status: PrintStatus) -> End | None:
+    def _end_of(self, status: PrintStatus) -> PrintState | None:
         if self._began_s is None:
             return None
         heat = status.temperature
         self._heat = heat if heat.words else self._heat
-        if status.state in ACTIVE:
+        if status.state.is_printing:
             if self._last_active is not None and status.file not in ("", self.file):
                 raise ServerError(f"{self.server.name} prints {status.file} now: what became of {self.file} is not known")
             self._last_active, self._read = status.state, max(self._read, status.bytes_read or 0)
@@ -166,7 +156,7 @@ class _Follower:
             return self._end_unseen(status, time.monotonic() - self._began_s)
         if status.state is not PrintState.DONE and not self._cancels:
             raise ServerError(self._ended_there(status))
-        return End.DONE if status.state is PrintState.DONE else End.CANCELLED
+        return PrintState.DONE if status.state is PrintState.DONE else PrintState.CANCELLED
 
     @property
     def _reached(self) -> str:
@@ -181,12 +171,12 @@ class _Follower:
             f"{f'; last known: {known}' if known else ''}: look at the printer"
         )
 
-    def _end_unseen(self, status: PrintStatus, waited_s: float) -> End | None:
+    def _end_unseen(self, status: PrintStatus, waited_s: float) -> PrintState | None:
         """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
         if waited_s < BEGIN_S:
             return None
         if status.state is PrintState.DONE and status.file in ("", self.file):
-            return End.DONE
+            return PrintState.DONE
         raise ServerError(
             f"{self.server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
         )

@@ -10,11 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from machine.link.print_state import PrintState, PrintStatus
-from machine.printing.servers.answers import entry, number, table, temperature, whole
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
-from machine.printing.servers.http import HttpSession
+from machine.printing.servers.http import HttpSession, entry, number, picture_address, table, temperature, whole
 from machine.printing.servers.server import PrintServer, ServerIdentity
-from machine.printing.servers.webcam import picture_address
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers

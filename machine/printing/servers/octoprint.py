@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from machine.link.print_state import PrintState, PrintStatus
-from machine.printing.servers.answers import number, table, temperature, whole
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
+from machine.printing.servers.http import number, picture_address, table, temperature, whole
 from machine.printing.servers.server import PrintServer, ServerIdentity
-from machine.printing.servers.webcam import picture_address
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers

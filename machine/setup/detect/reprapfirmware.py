@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from machine.printing.servers.answers import number, table
+from machine.printing.servers.http import number, table
 from machine.setup.detect.config_g import read_commands
 from machine.setup.detect.duet_board import MINUTE_S, DuetBoard
 from machine.setup.detect.found import ACCELERATION, LIMITS, SPEED, AxisReadings, ConfigText, Found, Reading, limits

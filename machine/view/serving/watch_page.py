@@ -6,13 +6,12 @@ Its buttons ask of the print what keys in the terminal do. Who is answered: see 
 import json
 import secrets
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
-from machine.cli.terminal.progress import say
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
 from machine.pipeline.programs import LoadedProgram
@@ -68,17 +67,19 @@ class Watched:
 
 
 @contextmanager
-def serve_watch_page(job: LoadedProgram, port: int | None, control: Control, browser: bool = True) -> Iterator[Watched]:
+def serve_watch_page(
+    loaded: LoadedProgram, port: int | None, control: Control, note: Callable[[str], object], browser: bool = True
+) -> Iterator[Watched]:
     """Serve the page of a print on a port of this computer, 0: on any free one; None: nobody watches. control: of the print,
-    asked by the page's buttons; browser: open it there. Raises OutputError."""
+    asked by the page's buttons; note: told where the page is; browser: open it there. Raises OutputError."""
     if port is None:
         yield Watched()
         return
-    page = print_page(job.name, job.program, job.profile, live=True)
+    page = print_page(loaded.name, loaded.program, loaded.profile, live=True)
     with serve(page, port, control) as watched, ExitStack() as until_end:
-        say(f"watch the print at {watched.address}")
+        note(f"watch the print at {watched.address}")
         if browser:
-            lead_browser(watched.address, until_end)
+            lead_browser(watched.address, until_end, note)
         yield watched
 
 

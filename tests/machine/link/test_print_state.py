@@ -27,10 +27,6 @@ def test_what_is_over_stays_over_but_for_a_print_that_its_server_goes_on_with(st
         assert any(follows(state, end) for end in (PrintState.FAILED, PrintState.CANCELLED))
 
 
-def test_a_print_that_is_being_cancelled_never_prints_again() -> None:
-    assert not any(state.is_printing for state in TABLE[PrintState.CANCELLING])
-
-
 def test_a_moment_is_told_to_a_page_as_it_is() -> None:
     status = PrintStatus(PrintState.PAUSED, 2.0, Temperature(210.0, 215.0), file_line=7, at={"X": 1.0}, heat_age_s=20.0)
     page = json.loads(json.dumps(status.json()))

@@ -2,19 +2,18 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from math import inf
 
 from machine.cli.commands.measuring.mover import PrinterMover
 from machine.cli.commands.measuring.prober import ProbingSession
 from machine.cli.terminal.interrupts import interrupting
 from machine.cli.terminal.progress import say
 from machine.firmware import dialect_of
-from machine.link.port import open_port
-from machine.pipeline.requests import SIMULATED, PortRequest
-from machine.printing.compatibility import check_machine, describe_answer, identify_printer
+from machine.pipeline.requests import PortRequest
+from machine.printing.checks import check_machine
+from machine.printing.destination import parse_printer
+from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
 from machine.printing.serial_log import TappedWire, new_log
 from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError, add_words
 from profiles.machine import Machine
 
@@ -25,18 +24,16 @@ HOT_C = 50.0  # a nozzle from which plastic may hang
 def cold_session(port: PortRequest, machine: Machine, table: ProbedTable | None = None) -> Iterator[ProbingSession]:
     """A conversation with the machine at the port, or with the simulated one, whose table may be sensed; its heaters off at the
     end."""
+    at = parse_printer(port.port, port.baud)
     with ExitStack() as stack:
-        path = port.port
-        if path == SIMULATED:
-            path = stack.enter_context(SimulatedPrinter(machine, inf, table=table)).path
         log = stack.enter_context(new_log("calibrate", f"calibrate at {port.port}", port.log))
-        wire = stack.enter_context(open_port(path, port.baud))
+        wire = stack.enter_context(open_line(at, machine, table))
         if log.trouble:
             say(f"the traffic is not logged: {log.file}: {log.trouble}")
         stack.enter_context(interrupting())
-        answer = identify_printer(wire, port.baud)
-        say(describe_answer(answer, port.baud))
-        check_machine(answer, machine, False)
+        answer = identify_printer(wire, rate_of(at), say)
+        say(describe_answer(answer, rate_of(at)))
+        check_machine(answer, machine)
         session = stack.enter_context(ProbingSession(TappedWire(wire, log.note), dialect_of(machine).longest_line))
         session.greet()
         yield session

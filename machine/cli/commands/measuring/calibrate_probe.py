@@ -12,7 +12,7 @@ from machine.firmware import dialect_of, firmware_of
 from machine.firmware.probing import ProbingRules
 from machine.pipeline.output import check_writable
 from machine.pipeline.requests import CalibrationRequest, ProbeRequest
-from machine.printing.server_checks import check_no_server
+from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.probing.ball import Ball
 from machine.setup.calibration.probing.measure import Measuring, Probe
@@ -33,7 +33,7 @@ PLACE = (
 def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Profile) -> int:
     """Measure, tell what follows, save it as calibrate saves. Raises UserError, the tip raised and nothing saved."""
     machine = tilting_machine(request)
-    check_no_server(probing.at.port)
+    parse_printer(probing.at.port, probing.at.baud)
     refuse_if_saved(request)
     if probing.png is not None:
         check_writable(probing.png)

@@ -83,7 +83,7 @@ export function followIn(print) {
     tell();
   };
   return () => {
-    const runs = same() && print().progress && print().phase !== "over";
+    const runs = same() && print().progress && !print().over;
     $("follow").hidden = !runs;
     tell();
     if (follows && (!store.looking || !runs)) set(false);

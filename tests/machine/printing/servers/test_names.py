@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.printing.servers.address import is_server_address, parse_server_address
+from machine.printing.destination import is_server_address, parse_server_address
 from machine.printing.servers.credentials import VARIABLE, Credentials, read_credentials, servers_file
 from machine.printing.servers.gcode_upload import GcodeUpload, server_name
 from machine.printing.servers.http import HttpSession

@@ -7,9 +7,8 @@ from threading import Thread
 
 import pytest
 
-from machine.printing.servers.address import parse_server_address
-from machine.printing.servers.http import fetch_picture
-from machine.printing.servers.webcam import picture_address
+from machine.printing.destination import parse_server_address
+from machine.printing.servers.http import fetch_picture, picture_address
 from profiles.errors import ServerError
 
 SERVER = parse_server_address("moonraker:printer.local")

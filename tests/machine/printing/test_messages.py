@@ -2,7 +2,7 @@
 
 import pytest
 
-from machine.cli.terminal.printer_messages import PrinterMessages, printer_message
+from machine.printing.messages import PrinterMessages, printer_message
 
 
 @pytest.mark.parametrize(("line", "text"), [

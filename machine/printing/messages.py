@@ -4,14 +4,14 @@ from collections import deque
 
 from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event, unknown_command
 
-MOST_SHOWN = 4
+KEPT = 50
 LONGEST_BYTES = 4096  # of a line that is not ended yet
 
 
 class PrinterMessages:
     """The last things a printer has said that are no mere answers; hear() takes chunks of bytes in the thread of the port."""
 
-    def __init__(self, most: int = MOST_SHOWN) -> None:
+    def __init__(self, most: int = KEPT) -> None:
         self.last: deque[str] = deque(maxlen=most)
         self._half, self._message = b"", ""
         self._newest, self._times = "", 0
