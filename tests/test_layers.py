@@ -41,7 +41,7 @@ CONFINED = {
     "rich": ("machine/cli/", "machine/pipeline/", "mdp/batch/"),
     "prompt_toolkit": ("machine/cli/",),
     "PIL": ("machine/pipeline/pictures/",),
-    "tomlkit": ("machine/setup/calibration/", "mdp/search/plan_writing.py"),
+    "tomlkit": ("machine/setup/", "mdp/search/plan_writing.py"),
     "platformdirs": ("profiles/folders.py",),
     "torch": ("mdp/learning/",),
     "xgboost": ("mdp/learning/",),

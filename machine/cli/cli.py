@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from machine.cli import model_cli, printer_cli, setup_cli
+from machine.cli.command_line import COMMANDS, PROFILES_COMMANDS
 from machine.cli.terminal.interrupts import outside_compiler
 from machine.cli.terminal.plain import plain_line
 from machine.cli.terminal.usage import sentence
@@ -28,9 +28,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="From a mesh to a finished multi-directional print on a 5-axis printer.",
 )
-for word, command in (model_cli.COMMANDS | printer_cli.COMMANDS | setup_cli.COMMANDS).items():
-    app.command(word)(command)
-app.add_typer(setup_cli.profiles_app, name="profiles")
+profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
+for group, commands in ((app, COMMANDS), (profiles_app, PROFILES_COMMANDS)):
+    for word, command in commands.items():
+        group.command(word)(command)
+app.add_typer(profiles_app, name="profiles")
 
 
 def _version(wanted: bool) -> None:

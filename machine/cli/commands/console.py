@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 
 from machine.cli.terminal.interrupts import calling, interrupting
 from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import ConsoleRequest
 from machine.firmware import dialect_of
 from machine.link.port import open_port
 from machine.link.protocol import events
 from machine.pipeline.output import check_writable
-from machine.pipeline.requests import SIMULATED, ConsoleRequest
+from machine.pipeline.requests import SIMULATED
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.compatibility import check_speed, describe_answer, identify_printer
 from machine.printing.serial_log import TappedWire, new_log
@@ -25,6 +26,7 @@ from machine.printing.server_checks import check_no_server
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import LocalProtocolError, PrinterError
 from profiles.folders import state_folder
+from profiles.machine import Machine
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession
@@ -47,13 +49,13 @@ COLOURS: dict[type[events.Event], str] = {
 }
 
 
-def console(request: ConsoleRequest) -> int:
+def console(request: ConsoleRequest, machine: Machine) -> int:
     """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
     check_speed(request.sim_speed)
     check_no_server(request.port)
     if request.log is not None:
         check_writable(request.log)
-    machine, port = request.profile.machine, request.port
+    port = request.port
     with ExitStack() as stack:
         simulated = port == SIMULATED
         path = stack.enter_context(SimulatedPrinter(machine, request.sim_speed or inf)).path if simulated else port

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from machine.pipeline.requests import MOST_COPIES, Cuts, Given, ModelRequest, PortRequest, ProbeRequest
+from machine.pipeline.requests import MOST_COPIES, Cuts, Given, ModelRequest
 from profiles.errors import PlanError
 
 if TYPE_CHECKING:
@@ -52,11 +52,7 @@ ModelsOrGcode = Annotated[
 ]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
-Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
-PlansGiven = Annotated[
-    list[Path] | None,
-    typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search; one for each model"),
-]
+Settings = Annotated[tuple[str, ...], typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
@@ -67,11 +63,7 @@ LogFile = Annotated[
 Baud = Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")]
 PortOrSim = Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")]
 SimSpeed = Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")]
-Watch = Annotated[bool, typer.Option("--watch", help="open a page of this computer that follows and commands the print")]
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="only tell the address")]
-WatchPort = Annotated[
-    int | None, typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one")
-]
 
 
 @dataclass(frozen=True)
@@ -99,9 +91,9 @@ class SearchOptions:
     ] = None
     parts: Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")] = None
     part: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
-    ] = None
+    ] = ()
 
     @property
     def settings(self) -> list[str]:
@@ -130,17 +122,20 @@ class FileOptions(SearchOptions):
 class ProgramOptions(FileOptions):
     """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
 
-    plan: PlansGiven = None
+    plan: Annotated[
+        tuple[Path, ...],
+        typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search; one for each model"),
+    ] = ()
     pause: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         typer.Option(
             "--pause", metavar="PART:LAYER", help="wait for a person before this layer, or at a height: 1:8.4mm; repeatable"
         ),
-    ] = None
+    ] = ()
     filament_change: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
-    ] = None
+    ] = ()
     copies: Annotated[
         int | None, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate, 1 by default")
     ] = None
@@ -153,7 +148,7 @@ class ProfileOptions:
     machine: MachineGiven = None
     material: Annotated[str | None, _profile_option("material", OF_FILE)] = None
     process: Annotated[str | None, _profile_option("process", OF_FILE)] = None
-    settings: Settings = None
+    settings: Settings = ()
 
     @property
     def names(self) -> tuple[str | None, str | None, str | None]:
@@ -165,18 +160,18 @@ class ProfileOptions:
         names = {
             kind: name for kind, name in zip(("machine", "material", "process"), self.names, strict=True) if name is not None
         }
-        return Given(**names, settings=(*(self.settings or ()), *(search.settings if search else ())))
+        return Given(**names, settings=(*self.settings, *(search.settings if search else ())))
 
     def over(self, given: Given) -> "ProfileOptions":
         """These options over what a project was made with."""
-        new = given.replaced(self.names, self.settings or ())
-        return ProfileOptions(new.machine, new.material, new.process, list(new.settings))
+        new = given.replaced(self.names, self.settings)
+        return ProfileOptions(new.machine, new.material, new.process, new.settings)
 
     @property
     def sections(self) -> frozenset[str]:
         """The sections of the profile that the user has said something about."""
         named = {kind for kind in ("machine", "material", "process") if getattr(self, kind) is not None}
-        return frozenset(named | {setting.partition(".")[0] for setting in self.settings or ()})
+        return frozenset(named | {setting.partition(".")[0] for setting in self.settings})
 
     def profile(self, search: SearchOptions | None = None) -> "Profile":
         """The profile, with what the options of a search set in it. Raises ProfileError."""
@@ -184,7 +179,7 @@ class ProfileOptions:
         from profiles.profile import load, with_part_settings
 
         profile = load(**asdict(self.given(search)))
-        return with_part_settings(profile, map(parse_part_settings, search.part or () if search else ()))
+        return with_part_settings(profile, map(parse_part_settings, search.part if search else ()))
 
 
 @dataclass(frozen=True)
@@ -287,7 +282,7 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     from machine.pipeline.project import is_project
     from machine.planning.stops import parse_stops
 
-    stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(tuple(program.plan or ()), program.parts)
+    stops, cuts = parse_stops(program.pause, program.filament_change), Cuts(program.plan, program.parts)
     first, *others = named_models(models)
     if program.settings_of_file and len({first, *others}) > 1:
         several = ", ".join(dict.fromkeys((first, *others)))
@@ -300,47 +295,6 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     return model_request(first, program, given, program.copies, cuts=cuts, stops=stops, beside=tuple(others), **further)
 
 
-def machine_profile(machine: str | None, settings: list[str] | None = None) -> "Profile":
+def machine_profile(machine: str, settings: tuple[str, ...] = ()) -> "Profile":
     """The profile where only the machine matters."""
     return ProfileOptions(machine, settings=settings).profile()
-
-
-def page_port(watch: bool, watch_port: int | None) -> int | None:
-    """Where the page of a print is served, 0: at any free port; None: nowhere."""
-    return (watch_port or 0) if watch or watch_port is not None else None
-
-
-@dataclass(frozen=True)
-class ProbeOptions:
-    """A machine that measures a ball on its plate by itself."""
-
-    probe: Annotated[bool, typer.Option("--probe", help="the machine at --port measures a ball on its plate by itself")] = False
-    port: Annotated[
-        str | None,
-        typer.Option("--port", metavar="PORT|sim", help="serial port of the machine to measure; sim: simulated"),
-    ] = None
-    baud: Baud = 115200
-    ball_mm: Annotated[float, typer.Option("--ball-mm", metavar="MM", min=4, max=60, help="diameter of the ball")] = 20.0
-    probe_offset: Annotated[
-        str,
-        typer.Option("--probe-offset", metavar="X,Y,Z", help="from the nozzle's tip to what touches; 0,0,0: the nozzle senses"),
-    ] = "0,0,0"
-    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="of --probe: picture of what is left over")] = None
-    log: LogFile = None
-
-    @property
-    def at(self) -> PortRequest | None:
-        """The printer at --port, None: there is none."""
-        return None if self.port is None else PortRequest(self.port, self.baud, self.log)
-
-    def request(self) -> ProbeRequest:
-        """What is asked for with --probe; raises BadParameter."""
-        if self.at is None:
-            raise typer.BadParameter("--probe needs --port PORT, or sim for the simulated printer")
-        try:
-            x, y, z = (float(word) for word in self.probe_offset.split(","))
-        except ValueError:
-            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: three numbers X,Y,Z in mm are expected") from None
-        if not all(-200.0 <= value <= 200.0 for value in (x, y, z)):
-            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: -200 to 200 mm are allowed")
-        return ProbeRequest(self.at, self.ball_mm, (x, y, z), self.png)

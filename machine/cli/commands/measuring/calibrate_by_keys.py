@@ -10,7 +10,8 @@ from machine.cli.commands.measuring.calibrate import judged, mark_height_mm, ref
 from machine.cli.commands.measuring.mover import PrinterMover
 from machine.cli.terminal.keys import can_type, typing
 from machine.cli.terminal.progress import say
-from machine.pipeline.requests import CalibrationRequest, PortRequest
+from machine.cli.terminal.requests import CalibrationRequest
+from machine.pipeline.requests import PortRequest
 from machine.printing.command_session import CommandSession
 from machine.printing.server_checks import check_no_server
 from machine.setup.calibration.fit import Calibration, Touch

@@ -8,10 +8,11 @@ from machine.cli.commands.measuring.calibrate_dialogue import read_reply
 from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import CalibrationRequest
 from machine.firmware import dialect_of, firmware_of
 from machine.firmware.probing import ProbingRules
 from machine.pipeline.output import check_writable
-from machine.pipeline.requests import CalibrationRequest, ProbeRequest
+from machine.pipeline.requests import ProbeRequest
 from machine.printing.server_checks import check_no_server
 from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.probing.ball import Ball
