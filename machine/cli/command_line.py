@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from machine.cli.terminal import options, requests
-from machine.cli.terminal.option_groups import with_option_groups
+from machine.cli.terminal.option_groups import option, with_option_groups
 from machine.pipeline.requests import Outputs, PrintRequest
 
 
@@ -24,7 +24,7 @@ def decompose(
 
 def export(
     models: options.Models,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write; - for standard output")],
+    out: Annotated[Path, option("-o --out OUT.gcode", "G-code file to write; - for standard output")],
     program: options.ProgramOptions,
     asked: requests.ExportOptions,
     given: options.ProfileOptions,
@@ -42,13 +42,9 @@ def simulate(
     models: options.ModelsOrGcode,
     program: options.ProgramOptions,
     json: options.JsonFile = None,
-    reference: Annotated[
-        str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
-    ] = None,
+    reference: Annotated[str | None, option("--model MODEL", "hold a G-code file's plastic against this model")] = None,
     html: options.HtmlFile = None,
-    baud: Annotated[
-        int | None, typer.Option("--baud", metavar="N", help="find moves that a line of N bits a second brings too late")
-    ] = None,
+    baud: Annotated[int | None, option("--baud N", "find moves that a line of N bits a second brings too late")] = None,
     *,
     given: options.ProfileOptions,
 ) -> int:
@@ -61,12 +57,10 @@ def simulate(
 def view(
     models: options.ModelsOrGcode,
     program: options.ProgramOptions,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="VIEW.html", help="page to write; else named after the model, here")
-    ] = None,
+    out: Annotated[Path | None, option("-o --out VIEW.html", "page to write; else named after the model, here")] = None,
     *,
-    open_: Annotated[bool, typer.Option("--open", help="show the page in the browser")] = False,
-    compare: Annotated[bool, typer.Option("--compare", help="tell also time and material printed in one part")] = False,
+    open_: Annotated[bool, option("--open", "show the page in the browser")] = False,
+    compare: Annotated[bool, option("--compare", "tell also time and material printed in one part")] = False,
     given: options.ProfileOptions,
 ) -> int:
     """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
@@ -85,7 +79,7 @@ def edit(asked: requests.EditRequest) -> int:
 def save(
     model: options.Model,
     program: options.ProgramOptions,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="NAME.3mf", help="project file to write")],
+    out: Annotated[Path, option("-o --out NAME.3mf", "project file to write")],
     given: options.ProfileOptions,
 ) -> int:
     """Write a project: one 3MF with model, plan and profiles. Every command takes it, and other slicers open it."""
@@ -122,14 +116,9 @@ def print_(
 
 def send(
     file: Annotated[str, typer.Argument(metavar="FILE.gcode", help="a G-code file")],
-    to: Annotated[
-        str,
-        typer.Option(
-            "--to", metavar="SERVER", help="octoprint:HOST, moonraker:HOST or duet:HOST; HOST may be http(s)://HOST:PORT"
-        ),
-    ],
+    to: Annotated[str, option("--to SERVER", "octoprint:HOST, moonraker:HOST or duet:HOST; HOST may be http(s)://HOST:PORT")],
     *,
-    start: Annotated[bool, typer.Option("--start", help="print it at once; print --port SERVER follows it, too")] = False,
+    start: Annotated[bool, option("--start", "print it at once; print --port SERVER follows it, too")] = False,
     log: options.LogFile = None,
     force: options.ForceAll = False,
     given: options.ProfileOptions,
@@ -172,11 +161,11 @@ def resume(asked: requests.ResumeOptions) -> int:
 
 
 def ports(
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="rate tried first, bits a second")] = PrintRequest.baud,
+    baud: Annotated[int, option("--baud N", "rate tried first, bits a second")] = PrintRequest.baud,
     *,
-    json: Annotated[bool, typer.Option("--json", help="the list as JSON")] = False,
+    json: Annotated[bool, option("--json", "the list as JSON")] = False,
     ask: Annotated[
-        bool, typer.Option("--ask/--no-ask", help="open each port and ask what is there; many boards restart when opened")
+        bool, option("--ask/--no-ask", "open each port and ask what is there; many boards restart when opened")
     ] = True,
 ) -> int:
     """List serial ports and what answers at each. It tells firmware, axes and rate, or why nothing answers."""
@@ -269,9 +258,9 @@ def coupon(asked: requests.CouponRequest) -> int:
     out, measured = asked.out, asked.measured
     if asked.report is not None and measured is None:
         raise typer.BadParameter(f"--report {asked.report} goes with --measured FILE, whose loads it tells")
-    for option, file in (("--html", asked.html), ("--png", asked.png)):
+    for name, file in (("--html", asked.html), ("--png", asked.png)):
         if file is not None and out is None:
-            raise typer.BadParameter(f"{option} {file} goes with -o OUT.gcode, whose bars it shows")
+            raise typer.BadParameter(f"{name} {file} goes with -o OUT.gcode, whose bars it shows")
     if out is not None and measured is None:
         return write_program(asked, out)
     if measured is not None and out is None:
@@ -293,7 +282,7 @@ def list_() -> int:
 
 def show(
     name: ProfileName,
-    json: Annotated[bool, typer.Option("--json", help="resolved values as JSON")] = False,
+    json: Annotated[bool, option("--json", "resolved values as JSON")] = False,
     settings: options.Settings = (),
 ) -> int:
     """Resolved values of one profile, with what each key means."""
@@ -304,7 +293,7 @@ def show(
 
 def save_profile(
     name: ProfileName,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.toml", help="profile to write, for --machine and the like")],
+    out: Annotated[Path, option("-o --out FILE.toml", "profile to write, for --machine and the like")],
     settings: options.Settings = (),
 ) -> int:
     """A profile with changes of yours as a profile of your own, that says what differs and inherits the rest."""

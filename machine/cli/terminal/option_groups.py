@@ -6,6 +6,18 @@ from functools import wraps
 from inspect import Parameter, Signature, signature
 from typing import Annotated, Any, get_args, get_origin
 
+import typer
+
+
+def option(names: str, meaning: str, **further: Any) -> Any:
+    """An option of the command line. names: as `-o --out FILE`, the placeholder of its value last where it has one."""
+    *flags, last = names.split(" ")
+    if not last.startswith("-"):
+        further["metavar"] = last
+    else:
+        flags.append(last)
+    return typer.Option(*flags, help=meaning, **further)
+
 
 def with_option_groups(command: Callable[..., int]) -> Callable[..., int]:
     """The command as typer reads it: every parameter that is a dataclass becomes an option for each of its fields.

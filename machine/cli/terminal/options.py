@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from machine.cli.terminal.option_groups import option
 from machine.pipeline.requests import MOST_COPIES, Cuts, Given, ModelRequest
 from profiles.errors import PlanError
 
@@ -52,47 +53,38 @@ ModelsOrGcode = Annotated[
 ]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
-Settings = Annotated[tuple[str, ...], typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
-JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
-HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
-Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
-ForceAll = Annotated[bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")]
-LogFile = Annotated[
-    Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-]
-Baud = Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")]
-PortOrSim = Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")]
-SimSpeed = Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")]
-NoBrowser = Annotated[bool, typer.Option("--no-browser", help="only tell the address")]
+Settings = Annotated[tuple[str, ...], option("--set KEY=VALUE", "override a profile key; repeatable")]
+JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
+HtmlFile = Annotated[Path | None, option("--html FILE", "page that shows it in a browser, see view")]
+Force = Annotated[bool, option("--force", "go on although the dry run found errors")]
+ForceAll = Annotated[bool, option("--force", "go on although dry run, printer, machine and program do not agree")]
+LogFile = Annotated[Path | None, option("--log FILE", "what is sent and received; else a new file in the state folder")]
+Baud = Annotated[int, option("--baud N", "bits a second")]
+PortOrSim = Annotated[str, option("--port PORT|sim", "serial port; sim: the simulated printer")]
+SimSpeed = Annotated[float, option("--sim-speed X", "X times real time; 0: as fast as possible")]
+NoBrowser = Annotated[bool, option("--no-browser", "only tell the address")]
 
 
 @dataclass(frozen=True)
 class SearchOptions:
     """How a model is cut into parts."""
 
-    beam_width: Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")] = None
-    search: Annotated[
-        str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
-    ] = None
-    time_limit: Annotated[
-        float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")
-    ] = None
+    beam_width: Annotated[int | None, option("--beam-width B", "decompositions followed at a time")] = None
+    search: Annotated[str | None, option("--search best|published", "published: as the 2020 paper searches")] = None
+    time_limit: Annotated[float | None, option("--time-limit SECONDS", "then the best parts so far are used")] = None
     ranker: Annotated[
         str,
-        typer.Option(
-            "--ranker",
-            metavar="classic|learned|FILE.onnx",
-            help="which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
+        option(
+            "--ranker classic|learned|FILE.onnx",
+            "which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
         ),
     ] = "classic"
     orient: Annotated[
-        bool | None,
-        typer.Option("--orient/--as-is", help="lay the model down in the cheapest orientation, or print it as its file has it"),
+        bool | None, option("--orient/--as-is", "lay the model down in the cheapest orientation, or print it as its file has it")
     ] = None
-    parts: Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")] = None
+    parts: Annotated[int | None, option("--parts N", "into N parts at most, not as many as pay")] = None
     part: Annotated[
-        tuple[str, ...],
-        typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
+        tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, as 2:walls=4; repeatable")
     ] = ()
 
     @property
@@ -107,14 +99,10 @@ class FileOptions(SearchOptions):
     """Options of a command for one model: how to cut it, and which plate and settings of a slicer file to use."""
 
     plate: Annotated[
-        int | None,
-        typer.Option(
-            "--plate", metavar="N", help="plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something"
-        ),
+        int | None, option("--plate N", "plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something")
     ] = None
     settings_of_file: Annotated[
-        bool,
-        typer.Option("--settings-of-file", help="print by the settings inside a .3mf of another slicer; see profiles import"),
+        bool, option("--settings-of-file", "print by the settings inside a .3mf of another slicer; see profiles import")
     ] = False
 
 
@@ -123,22 +111,15 @@ class ProgramOptions(FileOptions):
     """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
 
     plan: Annotated[
-        tuple[Path, ...],
-        typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search; one for each model"),
+        tuple[Path, ...], option("--plan FILE", "cut by this plan of decompose, without a search; one for each model")
     ] = ()
     pause: Annotated[
-        tuple[str, ...],
-        typer.Option(
-            "--pause", metavar="PART:LAYER", help="wait for a person before this layer, or at a height: 1:8.4mm; repeatable"
-        ),
+        tuple[str, ...], option("--pause PART:LAYER", "wait for a person before this layer, or at a height: 1:8.4mm; repeatable")
     ] = ()
     filament_change: Annotated[
-        tuple[str, ...],
-        typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
+        tuple[str, ...], option("--filament-change PART:LAYER", "the same, for another filament; repeatable")
     ] = ()
-    copies: Annotated[
-        int | None, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate, 1 by default")
-    ] = None
+    copies: Annotated[int | None, option("--copies N", "number of copies of each model on the plate, 1 by default")] = None
 
 
 @dataclass(frozen=True)

@@ -8,40 +8,31 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from machine.cli.terminal import options
+from machine.cli.terminal.option_groups import option
 from machine.pipeline.requests import UPLOAD_MIB, Cuts, Given, ModelRequest, Outputs, PortRequest, PrintRequest, ProbeRequest
 
 if TYPE_CHECKING:
     from mdp.batch.pool import Workers
     from profiles.profile import Profile
 
-Replace = Annotated[bool, typer.Option("--replace", help="write over a file that exists")]
+Replace = Annotated[bool, option("--replace", "write over a file that exists")]
 
 
 @dataclass(frozen=True)
 class DecomposeOptions:
     """Files that decompose reads and writes besides the model."""
 
-    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="folder for part-NN.stl, 3MF, JSON")] = None
-    plan: Annotated[
-        Path | None, typer.Option("--plan", metavar="FILE", help="where FILE exists: cut by it without a search; else write it")
-    ] = None
-    planes: Annotated[
-        Path | None, typer.Option("--planes", metavar="FILE", help="planes by hand, cut first; the search finds the others")
-    ] = None
+    out: Annotated[Path | None, option("-o --out DIR", "folder for part-NN.stl, 3MF, JSON")] = None
+    plan: Annotated[Path | None, option("--plan FILE", "where FILE exists: cut by it without a search; else write it")] = None
+    planes: Annotated[Path | None, option("--planes FILE", "planes by hand, cut first; the search finds the others")] = None
     json: options.JsonFile = None
-    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the parts")] = None
-    sheet: Annotated[
-        Path | None, typer.Option("--sheet", metavar="FILE", help="picture of the print order, tilted as printed")
-    ] = None
-    front: Annotated[
-        Path | None, typer.Option("--front", metavar="FILE", help="picture of how every number of parts would cut the model")
-    ] = None
+    png: Annotated[Path | None, option("--png FILE", "picture of the parts")] = None
+    sheet: Annotated[Path | None, option("--sheet FILE", "picture of the print order, tilted as printed")] = None
+    front: Annotated[Path | None, option("--front FILE", "picture of how every number of parts would cut the model")] = None
     html: options.HtmlFile = None
-    record: Annotated[Path | None, typer.Option("--record", metavar="FILE", help="what the search saw, as .npz for training")] = (
-        None
-    )
+    record: Annotated[Path | None, option("--record FILE", "what the search saw, as .npz for training")] = None
     compare: Annotated[
-        bool, typer.Option("--compare", help="slice the parts: tell how their joints lie, and time and material in one part")
+        bool, option("--compare", "slice the parts: tell how their joints lie, and time and material in one part")
     ] = False
 
     def request(self, model: str, search: options.FileOptions, given: options.ProfileOptions) -> ModelRequest:
@@ -66,12 +57,10 @@ class ExportOptions:
     """Files that export writes besides the G-code."""
 
     json: options.JsonFile = None
-    svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer, see --layer")] = None
+    svg: Annotated[Path | None, option("--svg FILE", "picture of one layer, see --layer")] = None
     html: options.HtmlFile = None
-    layer: Annotated[str | None, typer.Option("--layer", metavar="PART:LAYER", help="which layer; else the first, 1:1")] = None
-    compare: Annotated[
-        bool, typer.Option("--compare", help="tell also time, material, support and risky area printed in one part")
-    ] = False
+    layer: Annotated[str | None, option("--layer PART:LAYER", "which layer; else the first, 1:1")] = None
+    compare: Annotated[bool, option("--compare", "tell also time, material, support and risky area printed in one part")] = False
     force: options.Force = False
 
 
@@ -83,22 +72,17 @@ class EditRequest:
         str | None, typer.Argument(metavar="[MODEL|PLAN]", show_default=False, help="a model file, demo:NAME, or a plan (.toml)")
     ] = None
     port: Annotated[
-        int,
-        typer.Option(
-            "--port", metavar="N", min=0, max=65535, show_default=False, help="serve it on this port; else on any free one"
-        ),
+        int, option("--port N", "serve it on this port; else on any free one", min=0, max=65535, show_default=False)
     ] = 0
     no_browser: options.NoBrowser = False
-    upload_mib: Annotated[
-        int, typer.Option("--upload-mib", metavar="N", min=1, max=1024, help="the largest file that is taken from a page")
-    ] = UPLOAD_MIB
+    upload_mib: Annotated[int, option("--upload-mib N", "the largest file that is taken from a page", min=1, max=1024)] = (
+        UPLOAD_MIB
+    )
     lan: Annotated[
-        bool, typer.Option("--lan", help="open it to devices of the local network, too, each paired by a code that is told here")
+        bool, option("--lan", "open it to devices of the local network, too, each paired by a code that is told here")
     ] = False
-    certificate: Annotated[
-        Path | None, typer.Option("--certificate", metavar="FILE", help="PEM file: encrypts --lan, with --key")
-    ] = None
-    key: Annotated[Path | None, typer.Option("--key", metavar="FILE", help="PEM file: the key of the certificate")] = None
+    certificate: Annotated[Path | None, option("--certificate FILE", "PEM file: encrypts --lan, with --key")] = None
+    key: Annotated[Path | None, option("--key FILE", "PEM file: the key of the certificate")] = None
     given: options.ProfileOptions
 
 
@@ -107,22 +91,14 @@ class BatchRequest:
     """Every model of a folder. do: decompose, export or estimate; out: folder for the table and the files."""
 
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", show_default=False, help="folder of models")]
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="folder for DO.csv, a row a model, and what is made")]
-    do: Annotated[
-        str, typer.Option("--do", metavar="decompose|export|estimate", help="what to make of each; estimate: the row alone")
-    ] = "export"
-    scheduler: Annotated[
-        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="dask scheduler whose workers do it, as tcp://HOST:8786")
-    ] = None
-    processes: Annotated[
-        int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="processes here; else one a core")
-    ] = None
-    retries: Annotated[
-        int, typer.Option("--retries", metavar="N", min=0, max=100, help="how often a model that was killed is tried again")
-    ] = 2
-    limit_s: Annotated[
-        float | None, typer.Option("--limit-s", metavar="SECONDS", min=1.0, help="a model that takes longer is given up")
-    ] = None
+    out: Annotated[Path, option("-o --out DIR", "folder for DO.csv, a row a model, and what is made")]
+    do: Annotated[str, option("--do decompose|export|estimate", "what to make of each; estimate: the row alone")] = "export"
+    scheduler: Annotated[str | None, option("--scheduler ADDRESS", "dask scheduler whose workers do it, as tcp://HOST:8786")] = (
+        None
+    )
+    processes: Annotated[int | None, option("--workers N", "processes here; else one a core", min=1, max=1024)] = None
+    retries: Annotated[int, option("--retries N", "how often a model that was killed is tried again", min=0, max=100)] = 2
+    limit_s: Annotated[float | None, option("--limit-s SECONDS", "a model that takes longer is given up", min=1.0)] = None
     search: options.SearchOptions
     given: options.ProfileOptions
 
@@ -142,12 +118,9 @@ class BatchRequest:
 class WatchOptions:
     """The page that follows and commands a print."""
 
-    watch: Annotated[bool, typer.Option("--watch", help="open a page of this computer that follows and commands the print")] = (
-        False
-    )
+    watch: Annotated[bool, option("--watch", "open a page of this computer that follows and commands the print")] = False
     watch_port: Annotated[
-        int | None,
-        typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one"),
+        int | None, option("--watch-port N", "serve it on this port; else on any free one", min=0, max=65535)
     ] = None
     no_browser: options.NoBrowser = False
 
@@ -165,9 +138,7 @@ class PrintOptions:
     speed: options.SimSpeed = 0.0
     watching: WatchOptions = WatchOptions()
     log: options.LogFile = None
-    journal: Annotated[
-        Path | None, typer.Option("--journal", metavar="FILE", help="for resume; else a new file in the state folder")
-    ] = None
+    journal: Annotated[Path | None, option("--journal FILE", "for resume; else a new file in the state folder")] = None
     force: options.ForceAll = False
 
     def at(self, port: str) -> PrintRequest:
@@ -183,13 +154,11 @@ class ResumeOptions:
     journal: Annotated[
         Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
     ] = None
-    port: Annotated[str | None, typer.Option("--port", metavar="PORT", help="serial port")] = None
+    port: Annotated[str | None, option("--port PORT", "serial port")] = None
     baud: options.Baud = PrintRequest.baud
-    yes: Annotated[bool, typer.Option("--yes", help="go on without asking, where nothing is in doubt")] = False
+    yes: Annotated[bool, option("--yes", "go on without asking, where nothing is in doubt")] = False
     watching: WatchOptions = WatchOptions()
-    further: Annotated[
-        Path | None, typer.Option("--journal", metavar="FILE", help="journal of the rest; else a new file in the state folder")
-    ] = None
+    further: Annotated[Path | None, option("--journal FILE", "journal of the rest; else a new file in the state folder")] = None
     log: options.LogFile = None
     machine: options.MachineGiven = None
 
@@ -218,9 +187,9 @@ class ConsoleRequest:
     port: options.PortOrSim
     baud: options.Baud = PrintRequest.baud
     sim_speed: options.SimSpeed = 0.0
-    reports: Annotated[bool, typer.Option("--reports/--no-reports", help="show temperatures that the printer reports")] = True
+    reports: Annotated[bool, option("--reports/--no-reports", "show temperatures that the printer reports")] = True
     leave_heaters: Annotated[
-        bool, typer.Option("--leave-heaters", help="heaters stay as they are on leaving; else they are switched off")
+        bool, option("--leave-heaters", "heaters stay as they are on leaving; else they are switched off")
     ] = False
     log: options.LogFile = None
     given: MachineOptions = MachineOptions()
@@ -233,21 +202,16 @@ class SimulatorRequest:
     ball: X,Y,Z,D of one on its plate, true_machine: what its probe senses; with either of them it has a probe.
     """
 
-    link: Annotated[Path | None, typer.Option("--pty", metavar="PATH", help="a link to keep on the terminal's path")] = None
-    tcp: Annotated[int | None, typer.Option("--tcp", metavar="PORT", help="for socket://localhost:PORT; 0: a free one")] = None
-    faults: Annotated[Path | None, typer.Option("--faults", metavar="FILE", help="fault script: what goes wrong")] = None
-    speed: Annotated[float, typer.Option("--speed", metavar="X", help="X times real time; 0: as fast as possible")] = 1.0
-    baud: Annotated[int | None, typer.Option("--baud", metavar="N", help="bytes are as slow as on such a line")] = None
-    habits: Annotated[
-        str | None, typer.Option("--habits", metavar="LIST", help="how the firmware was built: no-advanced-ok,no-busy,...")
-    ] = None
-    ball: Annotated[
-        str | None,
-        typer.Option("--ball", metavar="X,Y,Z,D", help="it has a probe, and a ball on the plate: centre and diameter, mm"),
-    ] = None
-    true_machine: Annotated[
-        str | None, typer.Option("--true-machine", metavar="NAME|FILE", help="what its probe senses is this machine's")
-    ] = None
+    link: Annotated[Path | None, option("--pty PATH", "a link to keep on the terminal's path")] = None
+    tcp: Annotated[int | None, option("--tcp PORT", "for socket://localhost:PORT; 0: a free one")] = None
+    faults: Annotated[Path | None, option("--faults FILE", "fault script: what goes wrong")] = None
+    speed: Annotated[float, option("--speed X", "X times real time; 0: as fast as possible")] = 1.0
+    baud: Annotated[int | None, option("--baud N", "bytes are as slow as on such a line")] = None
+    habits: Annotated[str | None, option("--habits LIST", "how the firmware was built: no-advanced-ok,no-busy,...")] = None
+    ball: Annotated[str | None, option("--ball X,Y,Z,D", "it has a probe, and a ball on the plate: centre and diameter, mm")] = (
+        None
+    )
+    true_machine: Annotated[str | None, option("--true-machine NAME|FILE", "what its probe senses is this machine's")] = None
     given: MachineOptions = MachineOptions()
 
 
@@ -255,18 +219,14 @@ class SimulatorRequest:
 class ProbeOptions:
     """A machine that measures a ball on its plate by itself."""
 
-    probe: Annotated[bool, typer.Option("--probe", help="the machine at --port measures a ball on its plate by itself")] = False
-    port: Annotated[
-        str | None,
-        typer.Option("--port", metavar="PORT|sim", help="serial port of the machine to measure; sim: simulated"),
-    ] = None
+    probe: Annotated[bool, option("--probe", "the machine at --port measures a ball on its plate by itself")] = False
+    port: Annotated[str | None, option("--port PORT|sim", "serial port of the machine to measure; sim: simulated")] = None
     baud: options.Baud = PortRequest.baud
-    ball_mm: Annotated[float, typer.Option("--ball-mm", metavar="MM", min=4, max=60, help="diameter of the ball")] = 20.0
+    ball_mm: Annotated[float, option("--ball-mm MM", "diameter of the ball", min=4, max=60)] = 20.0
     probe_offset: Annotated[
-        str,
-        typer.Option("--probe-offset", metavar="X,Y,Z", help="from the nozzle's tip to what touches; 0,0,0: the nozzle senses"),
+        str, option("--probe-offset X,Y,Z", "from the nozzle's tip to what touches; 0,0,0: the nozzle senses")
     ] = "0,0,0"
-    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="of --probe: picture of what is left over")] = None
+    png: Annotated[Path | None, option("--png FILE", "of --probe: picture of what is left over")] = None
     log: options.LogFile = None
 
     @property
@@ -295,33 +255,25 @@ class CalibrationRequest:
     touches are far off. directions: find those of the axes, too.
     """
 
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="OUT.gcode", help="program to write, with a sheet beside it to fill in")
-    ] = None
-    measured: Annotated[
-        Path | None, typer.Option("--measured", metavar="FILE", help="filled sheet, .toml or .csv: work out the numbers")
-    ] = None
-    mark_height_mm: Annotated[
-        float | None, typer.Option("--mark-height", metavar="MM", min=0, max=200, help="height of the mark over the plate")
-    ] = None
-    mark_radius_mm: Annotated[
-        float | None, typer.Option("--mark-radius", metavar="MM", help="distance of the mark from the middle of the plate")
-    ] = None
-    printed: Annotated[
-        tuple[Path, ...],
-        typer.Option("--printed", metavar="FILE.gcode", help="program of demo:calibration that was printed; repeatable"),
-    ] = ()
-    readings: Annotated[
-        tuple[str, ...],
-        typer.Option("--readings", metavar="TEXT", help="of each --printed: right,up,height of its four pads; else asked for"),
-    ] = ()
-    html: Annotated[Path | None, typer.Option("--html", metavar="FILE", help="with --printed: page to type the readings on")] = (
+    out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
+    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml or .csv: work out the numbers")] = None
+    mark_height_mm: Annotated[float | None, option("--mark-height MM", "height of the mark over the plate", min=0, max=200)] = (
         None
     )
-    save: Annotated[str | None, typer.Option("--save", metavar="NAME", help="name of your profile; else the machine's")] = None
+    mark_radius_mm: Annotated[float | None, option("--mark-radius MM", "distance of the mark from the middle of the plate")] = (
+        None
+    )
+    printed: Annotated[
+        tuple[Path, ...], option("--printed FILE.gcode", "program of demo:calibration that was printed; repeatable")
+    ] = ()
+    readings: Annotated[
+        tuple[str, ...], option("--readings TEXT", "of each --printed: right,up,height of its four pads; else asked for")
+    ] = ()
+    html: Annotated[Path | None, option("--html FILE", "with --printed: page to type the readings on")] = None
+    save: Annotated[str | None, option("--save NAME", "name of your profile; else the machine's")] = None
     replace: Replace = False
-    force: Annotated[bool, typer.Option("--force", help="save although touches or readings are far off")] = False
-    directions: Annotated[bool, typer.Option("--directions", help="find the directions of the axes, too")] = False
+    force: Annotated[bool, option("--force", "save although touches or readings are far off")] = False
+    directions: Annotated[bool, option("--directions", "find the directions of the axes, too")] = False
     probing: ProbeOptions = ProbeOptions()
     given: MachineOptions = MachineOptions()
 
@@ -345,28 +297,18 @@ class CouponRequest:
     although its dry run found errors.
     """
 
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="OUT.gcode", help="program to write, with a sheet beside it to fill in")
-    ] = None
-    measured: Annotated[
-        Path | None, typer.Option("--measured", metavar="FILE", help="filled sheet, .toml: work out what holds, and save it")
-    ] = None
+    out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
+    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml: work out what holds, and save it")] = None
     report: Annotated[
-        Path | None,
-        typer.Option("--report", metavar="FILE.md", help="with --measured: only write it as a table; - for standard output"),
+        Path | None, option("--report FILE.md", "with --measured: only write it as a table; - for standard output")
     ] = None
-    shape: Annotated[
-        str, typer.Option("--shape", metavar="bend|tensile", help="bars for a luggage scale, or ISO 527-2 type 5A")
-    ] = "bend"
+    shape: Annotated[str, option("--shape bend|tensile", "bars for a luggage scale, or ISO 527-2 type 5A")] = "bend"
     vary: Annotated[
-        tuple[str, ...],
-        typer.Option("--vary", metavar="KEY=VALUE", help="what half of the bars have, not the usual four; repeatable, at most 5"),
+        tuple[str, ...], option("--vary KEY=VALUE", "what half of the bars have, not the usual four; repeatable, at most 5")
     ] = ()
     html: options.HtmlFile = None
-    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the bars in print order")] = None
-    save: Annotated[
-        str | None, typer.Option("--save", metavar="NAME", help="name of your material and process profiles; else theirs")
-    ] = None
+    png: Annotated[Path | None, option("--png FILE", "picture of the bars in print order")] = None
+    save: Annotated[str | None, option("--save NAME", "name of your material and process profiles; else theirs")] = None
     replace: Replace = False
     force: options.Force = False
     given: options.DefaultProfileOptions
@@ -394,13 +336,13 @@ class ImportRequest:
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="config.ini, bundle or G-code of PrusaSlicer; JSON of OrcaSlicer; .curaprofile")
     ]
-    process: Annotated[str, typer.Option("--process-preset", metavar="NAME", help="of a bundle's print presets")] = ""
-    material: Annotated[str, typer.Option("--material-preset", metavar="NAME", help="of a bundle's filament presets")] = ""
-    printer: Annotated[str, typer.Option("--printer-preset", metavar="NAME", help="of a bundle's printers, for its nozzle")] = ""
-    name: Annotated[str, typer.Option("--name", metavar="NAME", help="of both profiles; else as there")] = ""
-    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FOLDER", help="where to; else your own profiles")] = None
+    process: Annotated[str, option("--process-preset NAME", "of a bundle's print presets")] = ""
+    material: Annotated[str, option("--material-preset NAME", "of a bundle's filament presets")] = ""
+    printer: Annotated[str, option("--printer-preset NAME", "of a bundle's printers, for its nozzle")] = ""
+    name: Annotated[str, option("--name NAME", "of both profiles; else as there")] = ""
+    out: Annotated[Path | None, option("-o --out FOLDER", "where to; else your own profiles")] = None
     replace: Replace = False
-    json: Annotated[bool, typer.Option("--json", help="what became of every setting as JSON")] = False
+    json: Annotated[bool, option("--json", "what became of every setting as JSON")] = False
 
     @property
     def presets(self) -> dict[str, str]:
@@ -417,13 +359,9 @@ class DetectRequest:
         Path | None,
         typer.Argument(metavar="FILE", help="printer.cfg, config.g, a log of M503, a dump of $$, LinuxCNC's .ini"),
     ] = None
-    port: Annotated[
-        str | None, typer.Option("--port", metavar="PORT", help="of a printer; moonraker:HOST, duet:HOST; or sim")
-    ] = None
+    port: Annotated[str | None, option("--port PORT", "of a printer; moonraker:HOST, duet:HOST; or sim")] = None
     baud: options.Baud = PortRequest.baud
-    base: Annotated[str | None, typer.Option("--base", metavar="NAME", help="inherit it, else the nearest shipped one")] = None
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE.toml", help="profile to write; else one of your own")
-    ] = None
+    base: Annotated[str | None, option("--base NAME", "inherit it, else the nearest shipped one")] = None
+    out: Annotated[Path | None, option("-o --out FILE.toml", "profile to write; else one of your own")] = None
     replace: Replace = False
-    json: Annotated[bool, typer.Option("--json", help="what was found, what not and what to measure as JSON")] = False
+    json: Annotated[bool, option("--json", "what was found, what not and what to measure as JSON")] = False
