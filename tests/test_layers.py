@@ -55,8 +55,6 @@ CONFINED = {
 FRONT_ENDS = ("machine/cli/", "machine/workbench/")  # they talk to people: nothing below knows them
 SPEAKING = (  # files below them that still speak to the terminal themselves
     *(f"machine/printing/{name}.py" for name in ("attendance", "compatibility", "network_print", "resumption", "stream")),
-    *(f"machine/pipeline/{name}.py" for name in ("batch_model", "comparison", "compilers", "pipeline", "programs")),
-    *(f"machine/view/serving/{name}.py" for name in ("browser", "watch_page")),
 )
 HEAVY = {
     "numba",

@@ -15,8 +15,9 @@ from typer.exceptions import TyperException
 
 from machine.cli.command_line import COMMANDS, PROFILES_COMMANDS
 from machine.cli.terminal.interrupts import outside_compiler
-from machine.cli.terminal.plain import plain_line
+from machine.cli.terminal.progress import TERMINAL
 from machine.cli.terminal.usage import sentence
+from machine.notices import notices_to, plain_line
 from profiles.errors import UserError, causes, notes
 
 ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by what --install-completion writes: words are wanted, no command
@@ -71,7 +72,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     if ASKED_BY_SHELL in os.environ:
         command.main(given, "tiltprint")
     try:
-        with outside_compiler(), command.make_context("tiltprint", given or ["--help"]) as context:
+        with outside_compiler(), notices_to(TERMINAL), command.make_context("tiltprint", given or ["--help"]) as context:
             code = command.invoke(context)
     except typer.Exit as done:
         return done.exit_code

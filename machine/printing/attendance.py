@@ -10,12 +10,12 @@ from machine.cli.terminal.interrupts import calling
 from machine.cli.terminal.keys import Keyboard
 from machine.cli.terminal.print_display import PrintDisplay
 from machine.cli.terminal.printer_messages import PrinterMessages
-from machine.cli.terminal.progress import Report, reporting
 from machine.cli.terminal.server_keys import ServerKeyboard
 from machine.dryrun.timeline import Timeline
 from machine.link.journal import Journal
 from machine.link.pending_commands import Control
 from machine.link.progress import Progress
+from machine.notices import Report, reporting
 from machine.printing.serial_log import SerialLog
 
 

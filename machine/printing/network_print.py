@@ -6,12 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
-from machine.cli.terminal.plain import plain_line, show
-from machine.cli.terminal.progress import reporting, say
 from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.progress import ProgramPosition, Progress, last_known
+from machine.notices import plain_line, reporting, say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.attendance import Observers, ServerAttendance
 from machine.printing.rescue import STOPPED

@@ -11,7 +11,6 @@ from math import hypot
 from os.path import isfile
 from pathlib import Path
 
-from machine.cli.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialect_of
 from machine.gcode.lines import GcodeFile
@@ -37,6 +36,7 @@ from machine.link.resume import (
     read_interrupted_print,
 )
 from machine.link.status import PrinterStatus
+from machine.notices import say
 from machine.pipeline.file_roles import check_roles, printing_files
 from machine.pipeline.programs import LoadedProgram
 from machine.pipeline.requests import SIMULATED, PrintRequest

@@ -7,9 +7,7 @@ from math import inf, isfinite
 from pathlib import Path
 
 from machine.cli.terminal.interrupts import stopping
-from machine.cli.terminal.plain import show
 from machine.cli.terminal.print_display import Follow
-from machine.cli.terminal.progress import say
 from machine.dryrun.timeline import Timeline
 from machine.firmware import dialect_of
 from machine.link.identification import Answer, Kind
@@ -19,6 +17,7 @@ from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
 from machine.link.stream import Outcome, print_lines
+from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.pipeline.requests import SIMULATED, PrintRequest
 from machine.printing.attendance import Attendance, AtTerminal, Observers

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from machine.cli.terminal.plain import plain_line, show
-from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import BatchRequest
 from machine.gcode.blocks import check_blocks
+from machine.notices import plain_line, say, show
 from machine.pipeline import compilers
 from machine.pipeline.batch_model import (
     ACTIONS,

@@ -12,11 +12,11 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from machine.cli.terminal.interrupts import calling, interrupting
-from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import ConsoleRequest
 from machine.firmware import dialect_of
 from machine.link.port import open_port
 from machine.link.protocol import events
+from machine.notices import say
 from machine.pipeline.output import check_writable
 from machine.pipeline.requests import SIMULATED
 from machine.printing.command_session import CommandSession, LeftError, StopError

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from machine.cli.terminal.advice import advice
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.report import joints_table, part_settings_lines, parts_table
+from machine.cli.terminal.report import compare_table, joints_table, part_settings_lines, parts_table
+from machine.notices import show
 from machine.pipeline import compilers
-from machine.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+from machine.pipeline.comparison import alternatives_json, compare_with_one_part
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_outputs, write_bytes, write_json
 from machine.pipeline.parts_folder import PLAN, save_parts

@@ -4,9 +4,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import EditRequest
+from machine.notices import say, show
 from machine.pipeline.project import is_project
 from machine.pipeline.requests import GCODE_SUFFIXES
 from machine.view.serving.browser import lead_browser

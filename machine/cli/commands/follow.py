@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from machine.cli.terminal.progress import say
+from machine.notices import say
 from machine.pipeline.output import check_writable
 from machine.printing.attendance import AtServerTerminal, Observers
 from machine.printing.network_print import file_name, follow_there, running_print, server_session

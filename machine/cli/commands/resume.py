@@ -5,8 +5,7 @@ from datetime import datetime
 from pathlib import Path
 
 from machine.cli.terminal.interrupts import interrupting
-from machine.cli.terminal.plain import plain_line, show
-from machine.cli.terminal.progress import say, say_lines
+from machine.notices import plain_line, say, say_lines, show
 from machine.pipeline.requests import PrintRequest
 from machine.printing.journal_folder import resumable_journals
 from machine.printing.resumption import print_rest, read_resumption

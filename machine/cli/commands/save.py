@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from machine.cli.terminal.plain import show
+from machine.notices import show
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_writable, write_bytes
 from machine.pipeline.pictures.picture import parts_together

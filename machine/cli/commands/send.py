@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
 from machine.cli.terminal.report import print_table
+from machine.notices import say, show
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_writable
 from machine.pipeline.programs import LoadedProgram, load_program

@@ -6,11 +6,10 @@ from math import inf, isfinite
 
 from machine.cli.terminal.interrupts import stopping
 from machine.cli.terminal.options import machine_profile
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import SimulatorRequest
 from machine.firmware import dialect_of, dialects
 from machine.firmware.line import check_baud
+from machine.notices import say, show
 from machine.printing.running_simulators import announced
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options

@@ -241,7 +241,7 @@ def _given_by(model: str, given: ProfileOptions) -> Given:
 
     Raises ProfileError if the model has no settings, or if both profiles are named.
     """
-    from machine.cli.terminal.progress import say
+    from machine.notices import say
     from machine.pipeline.file_settings import settings_inside
     from profiles.errors import ProfileError
 

@@ -5,10 +5,11 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 from machine.cli.terminal.keys import Keyboard, can_type, typing
 from machine.cli.terminal.printer_messages import PrinterMessages
-from machine.cli.terminal.progress import PlainLines, is_terminal, say
+from machine.cli.terminal.progress import is_terminal
 from machine.cli.terminal.screen import Screen
 from machine.dryrun.timeline import Timeline
 from machine.link.progress import Progress
+from machine.notices import PlainLines, say
 from machine.quantities import duration
 
 Follow = Callable[[Progress], None]

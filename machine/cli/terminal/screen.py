@@ -11,10 +11,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from machine.cli.terminal.plain import plain_line
 from machine.cli.terminal.printer_messages import PrinterMessages
 from machine.dryrun.timeline import Timeline
 from machine.link.progress import Progress
+from machine.notices import plain_line
 from machine.quantities import duration
 
 WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell

@@ -4,8 +4,9 @@ from collections.abc import Callable
 from time import monotonic
 
 from machine.cli.terminal.keys import HINT_S, Keyboard, can_type
-from machine.cli.terminal.progress import is_terminal, say
+from machine.cli.terminal.progress import is_terminal
 from machine.link.pending_commands import Command, Control
+from machine.notices import say
 
 ALONE_S = 2.0  # where nobody can press a key, a second interrupt is waited for so long
 LEAVING = "the print goes on without this program. c or Ctrl-C: cancel it, l: leave it printing; any other key: go on following"

@@ -4,7 +4,7 @@ import webbrowser
 from contextlib import ExitStack
 from threading import Thread
 
-from machine.cli.terminal.progress import say
+from machine.notices import say
 from machine.view.serving.redirect import redirecting
 
 

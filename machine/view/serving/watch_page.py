@@ -12,9 +12,9 @@ from dataclasses import asdict
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
-from machine.cli.terminal.progress import say
 from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
+from machine.notices import say
 from machine.pipeline.programs import LoadedProgram
 from machine.view.page import print_page
 from machine.view.serving.browser import lead_browser

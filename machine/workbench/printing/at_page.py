@@ -7,12 +7,11 @@ from threading import Event as Flag
 from time import time
 from typing import Any
 
-from machine.cli.terminal.plain import plain_line
 from machine.cli.terminal.printer_messages import PrinterMessages
-from machine.cli.terminal.progress import Report
 from machine.dryrun.timeline import Timeline
 from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
+from machine.notices import Report, plain_line
 from machine.printing.attendance import Observers
 from machine.printing.serial_log import SerialLog
 from machine.view.serving.watch_page import state_of

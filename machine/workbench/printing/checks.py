@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from machine.dryrun.dryrun import dry_run, summary
+from machine.notices import Notice
 from machine.pipeline import compilers
 from machine.program import Program
 from machine.quantities import filament_g, price_in_words
@@ -39,11 +40,11 @@ class Checks:
         self._done: tuple[Check, ...] = ()
         self._lines: deque[str] = deque(maxlen=LINES_KEPT)
 
-    def hear(self, text: str, forced: bool) -> None:
+    def hear(self, notice: Notice) -> None:
         """What the program says; what --force goes past is a check."""
-        if forced:
-            self.add(text, forced=True)
-        self._lines.extend(line for line in text.split("\n") if line.strip())
+        if notice.forced:
+            self.add(notice.text.rstrip(), forced=True)
+        self._lines.extend(line for line in notice.text.split("\n") if line.strip())
         self.reporter.tell(said=tuple(self._lines))
 
     @contextmanager

@@ -10,8 +10,8 @@ alone, which ends it in that same way.
 import sys
 from threading import Thread
 
-from machine.cli.terminal.plain import said_to
 from machine.crash import bug_in_words
+from machine.notices import FrontEnd, notices_to
 from machine.printing.servers.address import is_server_address
 from machine.workbench.printing.at_hand import by_hand
 from machine.workbench.printing.at_page import AtPage
@@ -33,7 +33,7 @@ def main() -> None:
     reporter = StateReporter(answers, first_state(order))
     person, checks = AtPage(reporter), Checks(reporter)
     Thread(target=listen, args=(asked, lambda words: person.hear(*words), person.leave), daemon=True).start()
-    with said_to(checks.hear):
+    with notices_to(FrontEnd(checks.hear)):
         end = carry_out(order, person, checks)
     reporter.tell(phase="over", stop_given=person.has_stopped(), **end)
     reporter.close()

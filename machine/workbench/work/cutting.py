@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.cli.terminal.advice import orientation_in_words, standing_in_words
 from machine.pipeline import compilers
 from machine.pipeline.given_plan import lies_freely, with_file_marks
+from machine.pipeline.orientation import orientation_in_words, standing_in_words
 from machine.pipeline.pictures.picture import parts_together
 from machine.pipeline.pictures.png import png_bytes
 from machine.pipeline.pricing import pricing

@@ -7,9 +7,9 @@ from math import inf
 from machine.cli.commands.measuring.mover import PrinterMover
 from machine.cli.commands.measuring.prober import ProbingSession
 from machine.cli.terminal.interrupts import interrupting
-from machine.cli.terminal.progress import say
 from machine.firmware import dialect_of
 from machine.link.port import open_port
+from machine.notices import say
 from machine.pipeline.requests import SIMULATED, PortRequest
 from machine.printing.compatibility import check_machine, describe_answer, identify_printer
 from machine.printing.serial_log import TappedWire, new_log

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from machine.cli.commands.measuring.calibrate_dialogue import ask_touches
-from machine.cli.terminal.plain import show
 from machine.cli.terminal.requests import CalibrationRequest
+from machine.notices import show
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
 from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.program import calibration_lines, plan_touches

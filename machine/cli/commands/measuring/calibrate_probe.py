@@ -6,11 +6,10 @@ from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip
 from machine.cli.commands.measuring.calibrate import MOST_OFF_MM, comparison, refuse_if_saved, save_calibration, tilting_machine
 from machine.cli.commands.measuring.calibrate_dialogue import read_reply
 from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.firmware import dialect_of, firmware_of
 from machine.firmware.probing import ProbingRules
+from machine.notices import say, show
 from machine.pipeline.output import check_writable
 from machine.pipeline.requests import ProbeRequest
 from machine.printing.server_checks import check_no_server

@@ -19,13 +19,12 @@ from typing import Any
 
 import pytest
 
-from machine.cli.terminal.plain import said_to
-from machine.cli.terminal.progress import say
 from machine.dryrun.timeline import UnknownTimeline
 from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
+from machine.notices import FrontEnd, notices_to, say
 from machine.pipeline.requests import PrintRequest
 from machine.printing.attendance import Observers
 from machine.printing.compatibility import refuse
@@ -415,7 +414,7 @@ def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
 def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> None:
     heard = Heard()
     checks = Checks(heard)  # type: ignore[arg-type]
-    with said_to(checks.hear):
+    with notices_to(FrontEnd(checks.hear)):
         with checks.that("the axes are there"):
             refuse("an axis is missing", force=True)
         with checks.that("the file is whole"):
