@@ -28,7 +28,7 @@ from machine.pipeline.given_plan import (
 from machine.pipeline.memory import keep_modules, return_unused
 from machine.pipeline.orientation import orientation_in_words, standing_in_words
 from machine.pipeline.output import write_bytes
-from machine.pipeline.pictures.png import with_thumbnails
+from machine.pipeline.pictures import with_thumbnails
 from machine.pipeline.plate import naming, naming_parts, on_one_plate
 from machine.pipeline.pricing import pricing
 from machine.pipeline.requests import ModelRequest, check_copies

@@ -242,7 +242,7 @@ def _given_by(model: str, given: ProfileOptions) -> Given:
     Raises ProfileError if the model has no settings, or if both profiles are named.
     """
     from machine.notices import say
-    from machine.pipeline.file_settings import settings_inside
+    from machine.pipeline.embedded_profile import settings_inside
     from profiles.errors import ProfileError
 
     file, kinds = Path(model), [kind for kind in ("material", "process") if getattr(given, kind) is None]

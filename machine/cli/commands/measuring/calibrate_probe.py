@@ -50,8 +50,8 @@ def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Prof
         f"{residual_table(calibration, machine, measuring)}"
     )
     if probing.png is not None:
-        from machine.pipeline.pictures.png import write_png
-        from machine.pipeline.pictures.residual_picture import residual_picture
+        from machine.pipeline.pictures import write_png
+        from machine.pipeline.residual_picture import residual_picture
 
         write_png(probing.png, residual_picture(calibration, [touch.pose for touch in touches], machine))
     if calibration.rms_mm > MOST_OFF_MM and not request.force:
