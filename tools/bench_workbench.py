@@ -25,7 +25,7 @@ from mdp.model_file import locate
 from mdp.read import read_mesh
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.workbench import Page, Running, workbench
+from tests.machine.running_workbench import Page, Running, workbench
 
 FACES = (10_000, 100_000)
 WAVE_MM, FOOT_MM = 0.02, 5.0  # of the skin, growing from the platform upwards

@@ -18,7 +18,7 @@ from machine.dryrun.balance.interfaces import LEAST, MOST, Interface, interfaces
 from machine.dryrun.balance.layers import layer_balances
 from machine.dryrun.dryrun import dry_run
 from machine.pipeline.embedded_profile import read_embedded_profile
-from machine.pipeline.pictures.png import write_png
+from machine.pipeline.pictures import write_png
 from profiles.profile import load
 
 HEAD = (

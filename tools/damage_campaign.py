@@ -30,8 +30,8 @@ from time import perf_counter
 import trimesh
 
 from machine.cli.cli import main as tiltprint
-from machine.cli.terminal.plain import plain_lines
 from machine.dryrun import dry_run
+from machine.notices import plain_lines
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.programs import read_gcode_lines
 from mdp.formats.readers import READERS

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.machine.browser import Browser
-from tests.machine.workbench import workbench
+from tests.machine.running_workbench import workbench
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 DEMO = "demo:tree"

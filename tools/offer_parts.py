@@ -22,10 +22,9 @@ from typing import Any
 import numpy as np
 from judge_parts import scaled
 
-from machine.pipeline.pictures.picture import FLOOR, best_view, floor_of, parts_apart, write_text
-from machine.pipeline.pictures.png import write_png
-from machine.pipeline.pictures.raster import Image, View, draw
+from machine.pipeline.pictures import FLOOR, best_view, floor_of, parts_apart, write_png, write_text
 from machine.pipeline.pricing import pricing
+from machine.pipeline.raster import Image, View, draw
 from machine.view.parts import part_colours, residual_faces
 from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, FrontRow

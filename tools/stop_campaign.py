@@ -36,7 +36,7 @@ from profiles.profile import load
 from tests.machine import prints
 from tests.machine import workbench as harness
 from tests.machine.prints import PrintPage, prints_line
-from tests.machine.workbench import QUICK, Page, Running, workbench
+from tests.machine.running_workbench import QUICK, Page, Running, workbench
 from tests.shapes import box
 
 Span = tuple[float, float]  # begin and end, s

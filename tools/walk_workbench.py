@@ -20,8 +20,8 @@ from machine.printing.destination import Simulated
 from machine.workbench.printing.prints import keep_printer
 from tests.machine.browser import Browser
 from tests.machine.prints import prints_line
+from tests.machine.running_workbench import OpenToNetwork, open_workbench, workbench
 from tests.machine.test_workbench_page import choose
-from tests.machine.workbench import OpenToNetwork, open_workbench, workbench
 
 IDLE = "document.documentElement.dataset.busy === ''"
 SEARCHED = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"

@@ -13,10 +13,11 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from machine.cli import model_cli, printer_cli, setup_cli
+from machine.cli.command_line import COMMANDS, PROFILES_COMMANDS
 from machine.cli.terminal.interrupts import outside_compiler
-from machine.cli.terminal.plain import plain_line
+from machine.cli.terminal.progress import TERMINAL
 from machine.cli.terminal.usage import sentence
+from machine.notices import notices_to, plain_line
 from profiles.errors import UserError, causes, notes
 
 ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by what --install-completion writes: words are wanted, no command
@@ -28,9 +29,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="From a mesh to a finished multi-directional print on a 5-axis printer.",
 )
-for word, command in (model_cli.COMMANDS | printer_cli.COMMANDS | setup_cli.COMMANDS).items():
-    app.command(word)(command)
-app.add_typer(setup_cli.profiles_app, name="profiles")
+profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
+for group, commands in ((app, COMMANDS), (profiles_app, PROFILES_COMMANDS)):
+    for word, command in commands.items():
+        group.command(word)(command)
+app.add_typer(profiles_app, name="profiles")
 
 
 def _version(wanted: bool) -> None:
@@ -69,7 +72,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     if ASKED_BY_SHELL in os.environ:
         command.main(given, "tiltprint")
     try:
-        with outside_compiler(), command.make_context("tiltprint", given or ["--help"]) as context:
+        with outside_compiler(), notices_to(TERMINAL), command.make_context("tiltprint", given or ["--help"]) as context:
             code = command.invoke(context)
     except typer.Exit as done:
         return done.exit_code

@@ -7,12 +7,11 @@ from importlib.metadata import version
 from pathlib import Path
 from time import process_time
 
-from machine.cli.terminal.plain import plain_line
 from machine.crash import bug_in_words
 from machine.dryrun.dryrun import summary
+from machine.notices import plain_line
 from machine.pipeline.comparison import support_mm3
-from machine.pipeline.output import write_bytes, write_lines
-from machine.pipeline.parts_folder import FIGURES, MODEL, PLAN, SCENE, save_parts
+from machine.pipeline.output import FIGURES, MODEL, PLAN, SCENE, save_parts, write_bytes, write_lines
 from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.programs import refuse_errors
 from machine.pipeline.project import close_projects, open_project, with_meshes, without_folders

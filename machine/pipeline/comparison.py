@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from machine.cli.terminal.progress import Report, say
-from machine.cli.terminal.report import table
 from machine.dryrun.dryrun import DryRun
+from machine.notices import Report, say
 from machine.pipeline.pipeline import build
 from machine.pipeline.plate import on_one_plate
 from machine.planning.fit import standing_at
 from machine.program import Alternative, Program, joints_of_print
-from machine.quantities import duration, filament_g
+from machine.quantities import filament_g
 from mdp.cost.cost import needing_upright, weight_of_stairs
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
@@ -172,22 +171,3 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
         }
         for name, alternative in zip(NAMES, alternatives, strict=True)
     ]
-
-
-def compare_table(alternatives: tuple[Alternative, ...]) -> str:
-    """The alternatives for a person."""
-    rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
-    rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm2"] for way in alternatives]
-    head, *lines = table(rows).splitlines()
-    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
-    return "\n".join(["", head, *lines, *notes]) + "\n"
-
-
-def _costs(alternative: Alternative) -> list[str]:
-    """Time, filament, mass, support and interfaces; dashes where it cannot be printed."""
-    if alternative.time_s is None:
-        return ["-"] * 5
-    filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000
-    mass = f"{alternative.filament_g or 0.0:.1f} g"
-    volumes = [f"{support_cm3:.2f} cm3", f"{sum(alternative.interface_mm3.values()) / 1000:.2f} cm3"]
-    return [duration(alternative.time_s), f"{filament_m:.2f} m", mass, *volumes]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from threading import Condition, Thread
 
-from machine.cli.terminal.progress import Report, reporting, say
+from machine.notices import Report, reporting, say
 from mdp.kernels.cache import is_cached, keep, trouble
 from mdp.kernels.threads import THREADS, harmless
 from mdp.kernels.workers import CallError, Worker

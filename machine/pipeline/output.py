@@ -10,6 +10,8 @@ from typing import Any
 from unicodedata import normalize
 
 from machine.pipeline.requests import STDOUT, Outputs
+from mdp.decomposition import Decomposition
+from mdp.save import FOLDER_FILES, HEADING, PART_FILES, glb, part_file, stl, threemf
 from profiles.errors import OutputError, reason
 from profiles.files import PRIVATE, SHARED, write_whole
 
@@ -158,3 +160,25 @@ def _write_text(path: Path, text: str, private: bool = False) -> None:
 def _is_device(path: Path) -> bool:
     """Whether a name stands for a device or a pipe (/dev/null, /dev/stdout), which must not be replaced by a file."""
     return exists(path) and not isfile(path) and not isdir(path)
+
+
+MODEL, FIGURES, PLAN, SCENE = FOLDER_FILES
+
+
+def save_parts(folder: Path, decomposition: Decomposition, figures: dict[str, Any]) -> None:
+    """Write the parts, the scenes that hold them all, and the figures. Raises OutputError."""
+    make_folder(folder)
+    for part in decomposition.parts:
+        write_bytes(folder / part_file(part.index), stl(part.mesh))
+    _drop_earlier_parts(folder, len(decomposition.parts))
+    write_bytes(folder / MODEL, threemf(decomposition))
+    write_bytes(folder / SCENE, glb(decomposition))
+    write_json(folder / FIGURES, figures)
+
+
+def _drop_earlier_parts(folder: Path, parts: int) -> None:
+    """Delete the parts that an earlier run has left beside the new ones; files of other programs stay."""
+    now = {part_file(index) for index in range(1, parts + 1)}
+    for file in folder.glob(PART_FILES):
+        if file.name not in now and file.is_file() and file.open("rb").read(len(HEADING)) == HEADING:
+            delete(file)

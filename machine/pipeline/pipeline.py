@@ -8,12 +8,11 @@ from time import perf_counter
 
 import numpy as np
 
-from machine.cli.terminal.advice import orientation_in_words, standing_in_words
-from machine.cli.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
 from machine.gcode.blocks import check_blocks
 from machine.gcode.writer import write_gcode
+from machine.notices import Report, reporting, say
 from machine.pipeline import compilers
 from machine.pipeline.given_plan import (
     as_turned,
@@ -27,8 +26,9 @@ from machine.pipeline.given_plan import (
     with_plan_settings,
 )
 from machine.pipeline.memory import keep_modules, return_unused
+from machine.pipeline.orientation import orientation_in_words, standing_in_words
 from machine.pipeline.output import write_bytes
-from machine.pipeline.pictures.png import with_thumbnails
+from machine.pipeline.pictures import with_thumbnails
 from machine.pipeline.plate import naming, naming_parts, on_one_plate
 from machine.pipeline.pricing import pricing
 from machine.pipeline.requests import ModelRequest, check_copies

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from machine.cli.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.findings import Finding
 from machine.gcode.lines import GcodeFile, Lines
+from machine.notices import say
 from machine.pipeline import compilers
 from machine.pipeline.embedded_profile import in_words, read_embedded_profile
 from machine.pipeline.memory import return_large_arrays

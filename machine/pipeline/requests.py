@@ -1,6 +1,6 @@
 """Requests: what a person asks a command for, as values: the command line makes them, the commands take them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +9,6 @@ from profiles.errors import PlanError
 
 if TYPE_CHECKING:
     from machine.planning.stops import Stop
-    from mdp.batch.pool import Workers
     from profiles.profile import Profile
 
 STDOUT = Path("-")  # stands for standard output where a file is asked for
@@ -110,18 +109,6 @@ class ModelRequest:
 
 
 @dataclass(frozen=True)
-class BatchRequest:
-    """Every model of a folder. do: decompose, export or estimate; asked: what of each, its model is not named yet; out: folder
-    for the table and the files; workers: where they run."""
-
-    folder: Path
-    out: Path
-    do: str
-    asked: ModelRequest
-    workers: "Workers"
-
-
-@dataclass(frozen=True)
 class Given:
     """What a profile is made of: the names of its machine, material and process, and KEY=VALUE settings over them."""
 
@@ -148,23 +135,6 @@ def _kind(setting: str) -> str:
 
 
 @dataclass(frozen=True)
-class EditRequest:
-    """The workbench. given: what the profile is made of; model: a model or a plan to begin with; port: of this computer, 0: any
-    free one; browser: open it there; upload_mib: the largest file that is taken from a page; lan: open it to the local
-    network, too, certificate, key: PEM files by which that is encrypted."""
-
-    profile: "Profile"
-    given: Given
-    model: str | None = None
-    port: int = 0
-    browser: bool = True
-    upload_mib: int = UPLOAD_MIB
-    lan: bool = False
-    certificate: Path | None = None
-    key: Path | None = None
-
-
-@dataclass(frozen=True)
 class PrintRequest:
     """A printer at a port, and how a print on it is recorded and watched.
 
@@ -180,55 +150,6 @@ class PrintRequest:
     journal: Path | None = None
     watch_port: int | None = None
     browser: bool = True
-
-
-@dataclass(frozen=True)
-class ConsoleRequest:
-    """A printer to talk to line by line. reports: show temperature reports; log as for a print."""
-
-    profile: "Profile"
-    port: str
-    baud: int = BAUD
-    sim_speed: float = 0.0
-    reports: bool = True
-    leave_heaters: bool = False
-    log: Path | None = None
-
-
-@dataclass(frozen=True)
-class SimulatorRequest:
-    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script.
-
-    ball: X,Y,Z,D of one on its plate, true: of what machine; with either of them it has a probe.
-    """
-
-    profile: "Profile"
-    link: Path | None = None
-    tcp: int | None = None
-    faults: Path | None = None
-    speed: float = 1.0
-    baud: int | None = None
-    habits: str = ""
-    ball: str | None = None
-    true: "Profile | None" = None
-
-
-@dataclass(frozen=True)
-class CalibrationRequest:
-    """A machine profile by name, the mark that is touched on it (None: the usual one), and where the result goes.
-
-    save: name of the user's own profile, None: the machine's. replace: write over files that exist. force: save although the
-    touches are far off. directions: find those of the axes, too.
-    """
-
-    machine: str
-    settings: tuple[str, ...] = ()
-    mark_height_mm: float | None = None
-    mark_radius_mm: float | None = None
-    save: str | None = None
-    replace: bool = False
-    force: bool = False
-    directions: bool = False
 
 
 @dataclass(frozen=True)
@@ -249,57 +170,3 @@ class ProbeRequest:
     ball_mm: float = 20.0
     offset_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     png: Path | None = None
-
-
-@dataclass(frozen=True)
-class ImportRequest:
-    """Another slicer's settings to read. presets: of a bundle, by process, material and printer, empty: its only or its active
-    one; name: of both profiles, empty: as there; out: folder for their files, None: the user's own; replace: write over files.
-    """
-
-    file: Path
-    presets: Mapping[str, str]
-    name: str = ""
-    out: Path | None = None
-    replace: bool = False
-    json: bool = False
-
-
-@dataclass(frozen=True)
-class DetectRequest:
-    """A firmware that tells of its machine, at a port or in a file. base: profile that is inherited, None: the nearest shipped
-    one; out: file to write, None: in the user's own folder; replace: write over it."""
-
-    port: str | None
-    file: Path | None
-    baud: int = BAUD
-    base: str | None = None
-    out: Path | None = None
-    json: bool = False
-    replace: bool = False
-
-
-@dataclass(frozen=True)
-class CouponRequest:
-    """Bars that tell what joints hold. names: of machine, material and process; shape: how the bars are broken; vary: KEY=VALUE
-    that half of them are printed with, none: the usual ones; html, png: what shows them; report: a table and nothing else.
-
-    save: name of the user's own material and process, None: theirs. replace: write over files that exist. force: write a program
-    although its dry run found errors.
-    """
-
-    names: tuple[str, str, str]
-    settings: tuple[str, ...] = ()
-    shape: str = "bend"
-    vary: tuple[str, ...] = ()
-    html: Path | None = None
-    png: Path | None = None
-    report: Path | None = None
-    save: str | None = None
-    replace: bool = False
-    force: bool = False
-
-    @property
-    def named(self) -> str:
-        """The names as options."""
-        return " ".join(f"--{kind} {name}" for kind, name in zip(("machine", "material", "process"), self.names, strict=True))

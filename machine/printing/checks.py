@@ -14,12 +14,11 @@ from machine.gcode.commands import command_named
 from machine.gcode.line_text import macro_name
 from machine.link.identification import Answer, Kind
 from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import say
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.programs import LoadedProgram, count_of_errors, refuse_errors
 from machine.pipeline.requests import FORCE_GOES_ON
 from machine.printing.destination import Destination, SerialPort, Server
-from machine.printing.job import Kind as NoteKind
-from machine.printing.job import Note
 from machine.printing.servers.server import ServerIdentity
 from machine.printing.servers.servers import dialect_mismatch
 from machine.program import Program
@@ -34,17 +33,15 @@ SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
 AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 
 
-def check(sentences: Iterable[str], force: bool, note: Note, passed: str = "") -> None:
-    """Raise PrinterError for the first sentence that speaks against a job, or with force tell all. passed: told where none
-    does."""
+def check(sentences: Iterable[str], force: bool) -> bool:
+    """Raise PrinterError for the first sentence that speaks against a job, or with force tell all; whether there is none."""
     found = False
     for sentence in filter(None, sentences):
         if not force:
             raise PrinterError(f"{sentence} ({FORCE_GOES_ON})", forcible=True)
         found = True
-        note(sentence, NoteKind.FORCED)
-    if passed and not found:
-        note(passed, NoteKind.PASSED)
+        say(sentence, forced=True)
+    return not found
 
 
 def check_machine(answer: Answer | None, machine: Machine) -> None:

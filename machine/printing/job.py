@@ -7,7 +7,7 @@ written once, against `Person` and `Printer`.
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from enum import Enum, StrEnum, auto
+from enum import StrEnum
 from pathlib import Path
 from threading import Event as Flag
 from typing import Protocol
@@ -70,21 +70,6 @@ NOT_BEGUN = End(PrintState.DECLINED, "nothing was printed")
 NOT_MOVED = End(PrintState.DECLINED, "nothing was moved or heated")
 
 
-class Kind(Enum):
-    """What a note is."""
-
-    LINE = auto()  # what the program says meanwhile
-    PASSED = auto()  # a check has found that something is as it must be
-    FORCED = auto()  # a check has found what speaks against the job, and --force goes past it
-    RESULT = auto()
-
-
-class Note(Protocol):
-    """Takes what a person is to be told."""
-
-    def __call__(self, text: str, kind: Kind = Kind.LINE) -> None: ...
-
-
 Show = Callable[[PrintStatus | None], None]  # None: it begins, nothing is known of it yet
 
 
@@ -103,13 +88,16 @@ class Scene:
 
 
 class Person(Protocol):
-    """A person who attends a job. commands: what the person asks of it; stop: set when it is to end, heaters off."""
+    """A person who attends a job; what is said meanwhile comes as `machine.notices`.
+
+    commands: what the person asks of it; stop: set when it is to end, heaters off.
+    """
 
     commands: Control
     stop: Flag
 
-    def note(self, text: str, kind: Kind = Kind.LINE) -> None:
-        """Tell the person something."""
+    def passed(self, sentence: str) -> None:
+        """Take note of what a check has found to be as it must be."""
 
     def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
         """Wait for an answer: the number of a choice, 0 for a plain yes, None for no. Raises JournalError where nobody can

@@ -18,6 +18,7 @@ from typing import Any
 from machine.firmware.line import BAUDS, LineRules
 from machine.link.identification import QUICK_S, Answer, Kind, ask, ask_at_any_rate
 from machine.link.port import Port, RefusedPortError, SerialDevice, open_port, serial_devices
+from machine.notices import say
 from machine.pipeline.requests import BAUD
 from machine.printing.destination import AtPrinter, Simulated
 from machine.simulator.contact.probe import ProbedTable
@@ -50,16 +51,15 @@ def rate_of(at: AtPrinter) -> int:
     return BAUD if isinstance(at, Simulated) else at.baud
 
 
-def identify_printer(wire: Port, baud: int, note: Callable[[str], object], halted: bool = False) -> Answer:
+def identify_printer(wire: Port, baud: int, halted: bool = False) -> Answer:
     """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is.
 
-    One that is still starting is waited for. note: told what is waited for; halted: one that has halted will do, if a command
-    lets it print again.
+    One that is still starting is waited for. halted: one that has halted will do, if a command lets it print again.
     """
     answer, rate = ask_at_any_rate(wire, baud)
     end_s = monotonic() + STARTING_S
     while answer.kind is Kind.STARTING and monotonic() < end_s:
-        note(f"{answer.firmware} at {wire.name} is still starting: waiting up to {end_s - monotonic():.0f} s more")
+        say(f"{answer.firmware} at {wire.name} is still starting: waiting up to {end_s - monotonic():.0f} s more")
         sleep(STARTING_AGAIN_S)
         answer = ask(wire)
     if not (halted and answer.kind is Kind.HALTED and rate == baud and answer.revival != LineRules.revival):

@@ -28,7 +28,7 @@ def open_printer(job: PrintJob, person: Person) -> Iterator[Printer]:
 def open_server_printer(job: PrintJob, at: Server, person: Person) -> Iterator[ServerPrinter]:
     """The printer behind a print server, for as long as the session with it lasts. Raises ServerError, ProfileError."""
     title = f"what {at.name} prints" if job.does is Does.FOLLOW else f"{job.name} to {at.name}"
-    with server_session(at, title, "print" if job.starts else "send", person.note, job.log) as (server, log):
+    with server_session(at, title, "print" if job.starts else "send", job.log) as (server, log):
         yield ServerPrinter(job, at, server, log, person)
 
 

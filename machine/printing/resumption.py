@@ -35,6 +35,7 @@ from machine.link.resume import (
     read_interrupted_print,
 )
 from machine.link.status import PrinterStatus
+from machine.notices import say
 from machine.pipeline.file_roles import check_roles, printing_files
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_dialect
@@ -141,9 +142,9 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
         with new_log("print", title, job.log) as log:
             outcome = stream_program(rest, cut_off.at, Scene(title, log, further), person, begin=begin)
         if outcome.cancelled and outcome.heaters_off is None:
-            person.note(NOT_MOVED.sentence)
+            say(NOT_MOVED.sentence)
             return NOT_MOVED
-        return report_end(outcome, person.note, journal=further)
+        return report_end(outcome, journal=further)
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
 from machine.link.stream import Outcome, print_lines
+from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import (
     CLEAN,
@@ -28,8 +29,7 @@ from machine.printing.checks import (
     with_starvation,
 )
 from machine.printing.destination import AtPrinter, SerialPort, Simulated
-from machine.printing.job import CANCELLED, DONE, End, Note, Person, PrintJob, Scene
-from machine.printing.job import Kind as NoteKind
+from machine.printing.job import CANCELLED, DONE, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import new_journal
 from machine.printing.ports import describe_answer, identify_printer
 from machine.printing.serial_log import SerialLog, new_log, tap
@@ -60,29 +60,31 @@ class SerialPrinter:
         """Ask who answers at the port."""
         if isinstance(self._at, SerialPort):
             with open_port(self._at.name, self._at.baud) as wire:
-                self._answer = identify_printer(wire, self._at.baud, self._person.note)
+                self._answer = identify_printer(wire, self._at.baud)
 
     def fit(self, machine: Machine) -> None:
         """Refuse a machine whose firmware takes no lines, or is not that of the printer."""
         check_dialect(machine)
-        check(machine_sentences(self._answer, machine), self._job.force, self._person.note, self._who(machine))
+        if check(machine_sentences(self._answer, machine), self._job.force):
+            self._person.passed(self._who(machine))
 
     def ready(self, loaded: LoadedProgram) -> Program:
         """The program with what the dry run finds of this line's rate."""
         sentences = chain(program_sentences(self._answer, loaded), error_sentences(loaded, self._job.force))
-        check(sentences, self._job.force, self._person.note, CLEAN)
+        if check(sentences, self._job.force):
+            self._person.passed(CLEAN)
         return with_starvation(self._at, loaded.program, loaded.profile)
 
     def print(self, loaded: LoadedProgram) -> End:
         """Stream it and say how it ended, with a log and a journal."""
-        note, simulated = self._person.note, isinstance(self._at, Simulated)
+        simulated = isinstance(self._at, Simulated)
         journalled = self._journal(loaded) if not simulated or self._job.journal is not None else nullcontext()
         title = f"{loaded.name} to {self._at.title}"
-        with new_log("print", title, self._job.log) as log, _pointing_to(log, note), journalled as journal:
+        with new_log("print", title, self._job.log) as log, _pointing_to(log), journalled as journal:
             if isinstance(self._at, Simulated):
                 return _print_simulated(loaded, self._at, Scene(title, log, journal), self._person)
             outcome = stream_program(loaded, self._at, Scene(title, log, journal), self._person)
-            return report_end(outcome, note, log, journal)
+            return report_end(outcome, log, journal)
 
     def _journal(self, loaded: LoadedProgram) -> AbstractContextManager[Journal | None]:
         """The journal; a print that was not told where to keep it goes on without one where none can be written."""
@@ -92,7 +94,7 @@ class SerialPrinter:
         except OutputError as error:
             if file is not None:
                 raise
-            self._person.note(f"this print cannot be resumed when it is cut off: {error}")
+            say(f"this print cannot be resumed when it is cut off: {error}")
             return nullcontext()
 
     def _who(self, machine: Machine) -> str:
@@ -107,7 +109,7 @@ class SerialPrinter:
 
 def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person: Person) -> End:
     """Stream to the simulated printer and tell what it has done."""
-    machine, note = loaded.profile.machine, person.note
+    machine = loaded.profile.machine
     usb = loaded.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
     speed = at.speed or inf
     with SimulatedPrinter(machine, speed, build=BuildOptions(queue=QUEUE)) as printer:
@@ -115,13 +117,13 @@ def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person:
         outcome = stream_program(replace(loaded, profile=usb), port, scene, person, pace=pace)
         record = printer.record
     if outcome.cancelled:
-        return report_end(outcome, note, scene.log)
+        return report_end(outcome, scene.log)
     segments, volumes = record.deposited(loaded.profile.material.diameter_mm)
     planned = float(loaded.program.run.segment_mm3.sum())
     laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
     heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C at the end"
     moves = f"{len(record.start)} moves in {duration(float(record.duration_s.sum()))}"
-    note(f"simulated printer: {moves}, {laid}, {heaters}", NoteKind.RESULT)
+    show(f"simulated printer: {moves}, {laid}, {heaters}\n")
     if record.clamped or record.unknown:
         raise PrinterError(
             f"the simulated printer met {record.clamped} coordinates out of limits and {record.unknown} unknown commands"
@@ -141,22 +143,22 @@ def stream_program(
         scene.messages.hear(direction, data)
 
     with ExitStack() as stack:
-        show = stack.enter_context(person.show(scene))
+        tell = stack.enter_context(person.show(scene))
         begun = begin is None
         if begun:
-            show(None)
+            tell(None)
 
         def begin_then_show(status: PrinterStatus) -> ResumePoint:
             nonlocal begun
             assert begin is not None
             start = begin(status)
             begun = True
-            show(None)
+            tell(None)
             return start
 
         def on_progress(status: PrintStatus) -> None:
             if begun:
-                show(replace(status, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))
+                tell(replace(status, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))
 
         return print_lines(
             loaded.program.lines,
@@ -175,46 +177,46 @@ def stream_program(
 
 
 @contextmanager
-def _pointing_to(log: SerialLog, note: Note) -> Iterator[None]:
+def _pointing_to(log: SerialLog) -> Iterator[None]:
     """Say where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
     if log.trouble:
-        note(f"the traffic is not logged: {log.file}: {log.trouble}")
+        say(f"the traffic is not logged: {log.file}: {log.trouble}")
     try:
         yield
     except PrinterError:
-        _point_to(log, note)
+        _point_to(log)
         raise
     except KeyboardInterrupt:  # the second one: nobody waited for the printer's word
-        note("ended at once: whether the heaters are off is not known, look at the printer")
+        say("ended at once: whether the heaters are off is not known, look at the printer")
         raise
 
 
-def _point_to(log: SerialLog, note: Note) -> None:
+def _point_to(log: SerialLog) -> None:
     """Say where the log is, and whether it is whole; it ends here."""
     log.close()
     if log.trouble:
-        note(f"what was sent and received is not wholly in {log.file}: {log.trouble}")
+        say(f"what was sent and received is not wholly in {log.file}: {log.trouble}")
     else:
-        note(f"all that was sent and received is in {log.file}")
+        say(f"all that was sent and received is in {log.file}")
 
 
-def report_end(outcome: Outcome, note: Note, log: SerialLog | None = None, journal: Journal | None = None) -> End:
+def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal | None = None) -> End:
     """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one, or
     that this is not possible. Closes the journal first: only what is on the disk is promised."""
     if journal is not None:
         journal.close()
         if journal.trouble:
-            note(journal.warning)
+            say(journal.warning)
     for warning in outcome.warnings:
-        note(f"the printer said: {warning}")
+        say(f"the printer said: {warning}")
     if outcome.warnings and log is not None:
-        _point_to(log, note)
+        _point_to(log)
     if outcome.cancelled:
         heaters = f"{Heaters.HALTED.value}: {outcome.halted}" if outcome.halted else HEATERS[outcome.heaters_off]
-        note(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
+        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
         if journal is not None and journal.last.executed and not journal.trouble:
-            note(f"tiltprint resume {journal.path} goes on with it")
+            say(f"tiltprint resume {journal.path} goes on with it")
         return CANCELLED
     summary = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
-    note(f"{summary} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})", NoteKind.RESULT)
+    show(f"{summary} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")
     return DONE

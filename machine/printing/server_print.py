@@ -12,6 +12,7 @@ from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.print_state import PrintState, PrintStatus, last_known
 from machine.link.progress import ProgramPosition
+from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import (
     CLEAN,
@@ -22,8 +23,7 @@ from machine.printing.checks import (
     server_program_sentences,
 )
 from machine.printing.destination import Server
-from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Note, Person, PrintJob, Scene
-from machine.printing.job import Kind as NoteKind
+from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog, new_log
 from machine.printing.servers.follow import OnStatus, follow_print
@@ -42,13 +42,11 @@ LIMITS = (
 
 
 @contextmanager
-def server_session(
-    server: Server, title: str, kind: str, note: Note, file: Path | None = None
-) -> Iterator[tuple[PrintServer, SerialLog]]:
+def server_session(server: Server, title: str, kind: str, file: Path | None = None) -> Iterator[tuple[PrintServer, SerialLog]]:
     """A session with a server and the log of it, without keys. kind, file: of the log. Raises ServerError, ProfileError."""
     with new_log(kind, title, file) as record:
         if record.trouble:
-            note(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
+            say(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
         with open_server(server, record.note) as session:
             yield session, record
 
@@ -64,7 +62,7 @@ class ServerPrinter:
     def greet(self) -> None:
         """Ask the server who it is, and whether it is free where something is to be printed."""
         self._greeting = self.server.greet()
-        self._person.note(f"{self._greeting.text} answers at {self.server.name}")
+        say(f"{self._greeting.text} answers at {self.server.name}")
         if self._job.starts and self._job.does is Does.PRINT:
             check_free(self.server.name, self.server.status())
 
@@ -73,15 +71,17 @@ class ServerPrinter:
         free = ", is free," if self._job.starts else ""
         passed = f"{self._greeting.text} answers at {self.server.name}{free} and prints for {machine.name}"
         sentences = server_machine_sentences(self._at, self._greeting, machine)
-        check(sentences, self._job.force, self._person.note, passed)
+        if check(sentences, self._job.force):
+            self._person.passed(passed)
 
     def ready(self, loaded: LoadedProgram) -> Program:
         """Refuse a program made for another machine, outside the limits that the server tells, or with macros it lacks."""
         force = self._job.force
         sentences = chain(server_program_sentences(self._greeting, loaded), error_sentences(loaded, force))
-        check(sentences, force, self._person.note, CLEAN)
+        if check(sentences, force):
+            self._person.passed(CLEAN)
         if self._job.starts:
-            self._person.note(LIMITS, NoteKind.PASSED)
+            self._person.passed(LIMITS)
         return loaded.program
 
     def send(self, loaded: LoadedProgram) -> End:
@@ -96,14 +96,14 @@ class ServerPrinter:
             check_free(self.server.name, self.server.status())
             self._start(file)
         sentence = f"{file} {'prints' if self._job.starts else 'waits'} on {self.server.name}"
-        self._person.note(sentence, NoteKind.RESULT)
+        show(f"{sentence}\n")
         return End(PrintState.DONE, sentence)
 
     def _start(self, file: str) -> None:
         try:
             self.server.start(file)
         except KeyboardInterrupt:
-            self._person.note(f"interrupted while {file} was being started: look whether {self.server.name} prints it")
+            say(f"interrupted while {file} was being started: look whether {self.server.name} prints it")
             raise
         except NoAnswerError as error:
             raise ServerError(f"{error}; whether it prints {file} is not known: look at the printer") from None
@@ -121,13 +121,13 @@ class ServerPrinter:
                 return NOT_BEGUN
         except CancelledError:
             return NOT_BEGUN
-        person.note(LIMITS)
+        say(LIMITS)
         known = KnownProgress(upload, loaded.program.lines, Timeline(loaded.program.run))
         with _shown(person, self._scene(), known) as on_status:
             state = follow_print(
                 server, file, len(upload.content), on_status=on_status, control=person.commands, left=person.left
             )
-        return _report_end(state, file, loaded.name, server.name, known, person.note)
+        return _report_end(state, file, loaded.name, server.name, known)
 
     def follow(self, now: PrintStatus) -> End:
         """Show a print that the server is at already until it ends or the person leaves. now: of running_print().
@@ -138,7 +138,7 @@ class ServerPrinter:
         scene = replace(self._scene(), beginning="a file that is not known here")
         with _shown(person, scene, reported) as on_status:
             state = follow_print(server, now.file, 0, on_status=on_status, control=person.commands, left=person.left, running=now)
-        return _report_end(state, file_name(now), file_name(now), server.name, reported, person.note)
+        return _report_end(state, file_name(now), file_name(now), server.name, reported)
 
     def _scene(self) -> Scene:
         return Scene(self._log.title, self._log, server=self.server.name)
@@ -148,11 +148,11 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, scene: Scene
     """Upload with progress; returns the name by which the server prints it. Raises ServerError, CancelledError when the person
     gives it up."""
     if upload.name != named:
-        person.note(f"{named} becomes {upload.name} there")
+        say(f"{named} becomes {upload.name} there")
     if server.has(upload.name):
-        person.note(f"replaces the {upload.name} that is there")
+        say(f"replaces the {upload.name} that is there")
     total, gone = len(upload.content), 0
-    with person.show(replace(scene, uploads=True)) as show:
+    with person.show(replace(scene, uploads=True)) as tell:
 
         def sent(count: int) -> None:
             nonlocal gone
@@ -161,15 +161,15 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, scene: Scene
             gone = count
             state = f"{_megabytes(count)} of {_megabytes(total)}" if count < total else "the server reads it"
             message = f"uploading {upload.name}: {state}"
-            show(PrintStatus(PrintState.UPLOADING, message=message, share=count / total if total else None))
+            tell(PrintStatus(PrintState.UPLOADING, message=message, share=count / total if total else None))
 
         try:
             file = server.upload(upload, sent)
         except (KeyboardInterrupt, CancelledError):
             holds = "keeps nothing of" if gone < total else "may hold all of"
-            person.note(f"upload broken off: {server.name} {holds} {upload.name}")
+            say(f"upload broken off: {server.name} {holds} {upload.name}")
             raise
-    person.note(f"{file} is on {server.name}, {_megabytes(total)}, complete")
+    say(f"{file} is on {server.name}, {_megabytes(total)}, complete")
     return file
 
 
@@ -189,26 +189,26 @@ def file_name(status: PrintStatus) -> str:
 @contextmanager
 def _shown(person: Person, scene: Scene, progress: "ReportedProgress") -> Iterator[OnStatus]:
     """Takes what the server tells, and shows it."""
-    with person.show(scene) as show:
-        show(None)
+    with person.show(scene) as tell:
+        tell(None)
         try:
-            yield lambda status, message: show(progress.at(status, message))
+            yield lambda status, message: tell(progress.at(status, message))
         except KeyboardInterrupt:
-            person.note("ended at once: whether the print has been cancelled is not known, look at the printer")
+            say("ended at once: whether the print has been cancelled is not known, look at the printer")
             raise
 
 
-def _report_end(state: PrintState, file: str, name: str, server: str, progress: "ReportedProgress", note: Note) -> End:
+def _report_end(state: PrintState, file: str, name: str, server: str, progress: "ReportedProgress") -> End:
     if state is PrintState.FAILED:
         raise FirmwareError(f"{STOPPED.format(server=server)}{progress.last_known}")
     if state is PrintState.DONE:
-        note(f"printed {file} on {server} in {duration(progress.elapsed_s)}", NoteKind.RESULT)
+        show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
         return DONE
     if state is PrintState.LEFT:
-        note(f"tiltprint: interrupted; {file} goes on printing on {server}")
+        say(f"tiltprint: interrupted; {file} goes on printing on {server}")
         return End(state, f"{name} goes on printing on {server}: this page follows it no more")
     after = f" after {progress.line} lines" if progress.line else ""
-    note(f"tiltprint: interrupted; the print was cancelled on {server}{after}")
+    say(f"tiltprint: interrupted; the print was cancelled on {server}{after}")
     return CANCELLED
 
 

@@ -18,9 +18,10 @@ from machine.cli.commands.measuring import at_port
 from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
 from machine.cli.commands.measuring.mover import PrinterMover
 from machine.cli.commands.measuring.prober import ProbingSession
+from machine.cli.terminal.requests import ConsoleRequest
 from machine.link.medium import Medium, Wire
 from machine.link.stream import print_lines
-from machine.pipeline.requests import ConsoleRequest, PortRequest
+from machine.pipeline.requests import PortRequest
 from machine.printing import ports
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.destination import SerialPort
@@ -108,7 +109,7 @@ def console_of_a_pipe(steps: Steps, printer: VirtualPrinter, monkeypatch: Monkey
     monkeypatch.setattr(ports, "open_port", medium.open)
     monkeypatch.setattr(console_module, "CommandSession", partial(CommandSession, medium=medium))
     monkeypatch.setattr(sys, "stdin", io.StringIO("M104 S200\nM140 S60\nG28\nG1 X5 F6000\nM400\n"))
-    console(ConsoleRequest(PROFILE, PATH))
+    console(ConsoleRequest(port=PATH), PROFILE.machine)
 
 
 def measuring(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:

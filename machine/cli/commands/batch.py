@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from machine.cli.terminal.plain import plain_line, show
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import BatchRequest
 from machine.gcode.blocks import check_blocks
+from machine.notices import plain_line, say, show
 from machine.pipeline import compilers
 from machine.pipeline.batch_model import (
     ACTIONS,
@@ -24,7 +24,6 @@ from machine.pipeline.batch_model import (
     row_of,
 )
 from machine.pipeline.output import check_folder, check_writable, delete
-from machine.pipeline.requests import BatchRequest
 from machine.quantities import duration
 from mdp.batch.pool import connected
 from mdp.batch.progress import BatchProgress
@@ -47,9 +46,10 @@ def batch(request: BatchRequest) -> int:
         raise UserError(f"--do {request.do}: {', '.join(ACTIONS)} is expected")
     files = model_files(request.folder)
     check_folder(request.out)
-    ranker_named(request.asked.ranker)
-    check_blocks(request.asked.profile)
-    job, table = job_of(request.do, request.asked, request.out.resolve()), request.out / f"{request.do}.csv"
+    asked = request.asked()
+    ranker_named(asked.ranker)
+    check_blocks(asked.profile)
+    job, table = job_of(request.do, asked, request.out.resolve()), request.out / f"{request.do}.csv"
     with writing_alone(request.out, LOCK):
         check_writable(table)
         clashes = {} if request.do == NO_FILES else same_files(files)
@@ -117,10 +117,10 @@ def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: 
     calls = {name: (file, job) for name, file in files.items() if name not in rows}
     if not calls:
         return
-    if request.workers.scheduler is None:
+    if request.scheduler is None:
         _compile(job)
     folders = (request.folder.resolve(), job.out)
-    with connected(replace(request.workers, folders=folders)) as queue, BatchProgress(len(calls), "models") as progress:
+    with connected(replace(request.workers(), folders=folders)) as queue, BatchProgress(len(calls), "models") as progress:
         for name, result in queue.completed(row_of, calls, progress.tick):
             if isinstance(result, CallError):
                 result = Row(name, FAILED, sentence=plain_line(f"{name}: {result}"), inputs=inputs_of(files[name], job))

@@ -11,17 +11,18 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from machine.cli.terminal.interrupts import calling, interrupting
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import ConsoleRequest
 from machine.firmware import dialect_of
 from machine.link.protocol import events
+from machine.notices import say
 from machine.pipeline.output import check_writable
-from machine.pipeline.requests import ConsoleRequest
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.destination import parse_printer
 from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
 from machine.printing.serial_log import TappedWire, new_log
 from profiles.errors import LocalProtocolError, PrinterError
 from profiles.folders import state_folder
+from profiles.machine import Machine
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession
@@ -44,12 +45,12 @@ COLOURS: dict[type[events.Event], str] = {
 }
 
 
-def console(request: ConsoleRequest) -> int:
+def console(request: ConsoleRequest, machine: Machine) -> int:
     """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
     at = parse_printer(request.port, request.baud, request.sim_speed)
     if request.log is not None:
         check_writable(request.log)
-    machine, rate = request.profile.machine, rate_of(at)
+    rate = rate_of(at)
     with ExitStack() as stack:
         log = stack.enter_context(new_log("console", f"console at {at.name}", request.log))
         wire = stack.enter_context(open_line(at, machine))
@@ -64,7 +65,7 @@ def console(request: ConsoleRequest) -> int:
                 shown.hear(data)
 
         hint = "; /help tells what can be typed" if sys.stdin.isatty() else ""
-        say(describe_answer(identify_printer(wire, rate, say, halted=True), rate) + hint)
+        say(describe_answer(identify_printer(wire, rate, halted=True), rate) + hint)
         session = CommandSession(TappedWire(wire, tell), dialect_of(machine).longest_line)
         return _Console(session, shown, request.leave_heaters).run()
 

@@ -3,16 +3,13 @@
 from pathlib import Path
 
 from machine.cli.terminal.advice import advice
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.report import joints_table, part_settings_lines, parts_table
+from machine.cli.terminal.report import compare_table, joints_table, part_settings_lines, parts_table
+from machine.notices import show
 from machine.pipeline import compilers
-from machine.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+from machine.pipeline.comparison import alternatives_json, compare_with_one_part
 from machine.pipeline.file_roles import check_model_files
-from machine.pipeline.output import check_outputs, write_bytes, write_json
-from machine.pipeline.parts_folder import PLAN, save_parts
-from machine.pipeline.pictures.front_picture import front_picture
-from machine.pipeline.pictures.picture import contact_sheet, parts_picture
-from machine.pipeline.pictures.png import write_png
+from machine.pipeline.output import PLAN, check_outputs, save_parts, write_bytes, write_json
+from machine.pipeline.pictures import contact_sheet, front_picture, parts_picture, write_png
 from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.project import with_meshes
 from machine.pipeline.requests import STDOUT, ModelRequest, Outputs

@@ -4,10 +4,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import EditRequest
+from machine.notices import say, show
 from machine.pipeline.project import is_project
-from machine.pipeline.requests import GCODE_SUFFIXES, EditRequest
+from machine.pipeline.requests import GCODE_SUFFIXES
 from machine.view.serving.browser import lead_browser
 from machine.workbench.access.lan import Lan, open_lan
 from machine.workbench.session.session import Session
@@ -34,10 +34,11 @@ class Opened:
 def edit(request: EditRequest) -> int:
     """Serve the page; a model that cannot be read is told in it, a file that is not there at once."""
     opened = None if request.model is None else _find(request.model)
+    profile, given = request.given.profile(), request.given.given()
     lan = _lan(request)
 
     def make(pools: WorkerPools) -> Session:
-        return Session(request.profile, request.given, pools)
+        return Session(profile, given, pools)
 
     def begin(session: Session) -> None:
         if opened is not None:
@@ -46,8 +47,8 @@ def edit(request: EditRequest) -> int:
     def announce(address: str, *of_lan: str) -> None:
         show("".join(f"{each}\n" for each in (address, *of_lan)))
         say(f"the workbench is there, for this computer{'' if of_lan else ' alone'}; Ctrl-C ends it")
-        if request.browser:
-            lead_browser(address, until_end, say)
+        if not request.no_browser:
+            lead_browser(address, until_end)
 
     with ExitStack() as until_end:
         serve_workbench(make, begin, announce, request.port, request.upload_mib, lan)

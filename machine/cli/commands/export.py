@@ -3,11 +3,10 @@
 import re
 from collections.abc import Sequence
 
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say_lines
-from machine.cli.terminal.report import joints_table, print_price, print_table
+from machine.cli.terminal.report import compare_table, joints_table, print_price, print_table
 from machine.dryrun.dryrun import summary
-from machine.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+from machine.notices import say_lines, show
+from machine.pipeline.comparison import alternatives_json, compare_with_one_part
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_outputs, write_bytes, write_json, write_lines
 from machine.pipeline.pipeline import build, decompose_model

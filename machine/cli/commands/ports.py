@@ -3,9 +3,8 @@
 import json
 from threading import Event
 
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
 from machine.firmware.line import check_baud
+from machine.notices import say, show
 from machine.printing.ports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
 
 

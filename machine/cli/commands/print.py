@@ -3,10 +3,9 @@
 from functools import partial
 from pathlib import Path
 
-from machine.cli.at_terminal import AtTerminal, exit_code
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.at_terminal import AtTerminal, exit_code
 from machine.cli.terminal.report import print_table
+from machine.notices import say, show
 from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
 from machine.pipeline.output import check_writable
 from machine.pipeline.programs import LoadedProgram, load_program
@@ -30,7 +29,7 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     with open_printer(job, person) as printer:
         loaded = check_print(job, printer)
         show(print_table(loaded.program, loaded.profile))
-        with serve_watch_page(loaded, printing.watch_port, person.commands, say, printing.browser) as watched:
+        with serve_watch_page(loaded, printing.watch_port, person.commands, printing.browser) as watched:
             person.follow = watched.follow
             end = printer.print(loaded)
             watched.end(end.state)

@@ -3,9 +3,8 @@
 from datetime import datetime
 from pathlib import Path
 
-from machine.cli.at_terminal import AtTerminal, exit_code
-from machine.cli.terminal.plain import plain_line, show
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.at_terminal import AtTerminal, exit_code
+from machine.notices import plain_line, say, show
 from machine.pipeline.requests import PrintRequest
 from machine.printing.destination import parse_destination
 from machine.printing.job import Does, PrintJob
@@ -41,7 +40,7 @@ def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, 
     if yes and not cut_off.story.computer_ran_on:
         raise JournalError(f"journal {journal}: a person must answer that question: resume at a terminal, without --yes")
     rest = rest_of(cut_off)
-    with serve_watch_page(rest, printing.watch_port, person.commands, say, printing.browser) as watched:
+    with serve_watch_page(rest, printing.watch_port, person.commands, printing.browser) as watched:
         person.follow = watched.follow
         end = print_rest(cut_off, rest, job, person)
         watched.end(end.state)

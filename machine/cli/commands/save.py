@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from machine.cli.terminal.plain import show
+from machine.notices import show
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_writable, write_bytes
-from machine.pipeline.pictures.picture import parts_together
-from machine.pipeline.pictures.png import png_bytes
+from machine.pipeline.pictures import parts_together, png_bytes
 from machine.pipeline.pipeline import Decomposed, decompose_model
 from machine.pipeline.project import PICTURE_PX, STANDING, SUFFIX, Project, figures_of, project_bytes
 from machine.pipeline.requests import Given, ModelRequest

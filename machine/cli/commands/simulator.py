@@ -5,11 +5,11 @@ from dataclasses import fields, replace
 from math import inf, isfinite
 
 from machine.cli.terminal.interrupts import stopping
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.options import machine_profile
+from machine.cli.terminal.requests import SimulatorRequest
 from machine.firmware import dialect_of, dialects
 from machine.firmware.line import check_baud
-from machine.pipeline.requests import SimulatorRequest
+from machine.notices import say, show
 from machine.printing.ports import announced
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
@@ -19,6 +19,7 @@ from machine.simulator.faults import FaultScript, read_script
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
+from profiles.machine import Machine
 
 KEPT = 10000  # moves on record; of the others only the sums are reported
 LOOK_S = 0.5
@@ -29,9 +30,10 @@ LEAST, MOST = {"rx_ring": 16, "queue": 1}, 65536  # bytes and lines that a firmw
 def simulate_printer(request: SimulatorRequest) -> int:
     """Run until Ctrl-C or a termination request, which is its end: 0. The path to open stands on stdout, then what was done."""
     script = read_script(request.faults) if request.faults is not None else FaultScript()
-    _check(request)
-    machine, baud = request.profile.machine, request.baud
-    build = read_build_options(request.habits, build_options(machine, baud))
+    machine, baud = request.given.profile().machine, request.baud
+    _check(request, machine)
+    table = _table(request, machine)
+    build = read_build_options(request.habits or "", build_options(machine, baud))
     stop = threading.Event()
     simulated = SimulatedPrinter(
         machine,
@@ -42,7 +44,7 @@ def simulate_printer(request: SimulatorRequest) -> int:
         tcp=request.tcp,
         baud=baud,
         kept_moves=KEPT,
-        table=_table(request),
+        table=table,
     )
     with (
         stopping(stop),
@@ -62,11 +64,11 @@ def simulate_printer(request: SimulatorRequest) -> int:
     return 0
 
 
-def _table(request: SimulatorRequest) -> ProbedTable | None:
-    """What its probe meets; None where nothing is said of it."""
-    if request.ball is None and request.true is None:
+def _table(request: SimulatorRequest, machine: Machine) -> ProbedTable | None:
+    """What the probe of a simulated machine meets; None where nothing is said of it."""
+    if request.ball is None and request.true_machine is None:
         return None
-    true = request.profile.machine if request.true is None else request.true.machine
+    true = machine if request.true_machine is None else machine_profile(request.true_machine).machine
     if request.ball is None:
         return ProbedTable(true, noise_mm=PROBE_NOISE_MM)
     try:
@@ -78,8 +80,8 @@ def _table(request: SimulatorRequest) -> ProbedTable | None:
     return ProbedTable(true, TrueBall(0.5 * diameter, (x, y, z)), noise_mm=PROBE_NOISE_MM)
 
 
-def _check(request: SimulatorRequest) -> None:
-    machine, speed, baud, tcp = request.profile.machine, request.speed, request.baud, request.tcp
+def _check(request: SimulatorRequest, machine: Machine) -> None:
+    speed, baud, tcp = request.speed, request.baud, request.tcp
     if not dialect_of(machine).serial:
         streamed = ", ".join(name for name, dialect in dialects().items() if dialect.serial)
         raise PrinterError(f"{machine.name} speaks {machine.dialect}, which takes no lines: {streamed} are simulated")

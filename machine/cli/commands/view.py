@@ -3,8 +3,7 @@
 import webbrowser
 from pathlib import Path
 
-from machine.cli.terminal.plain import plain_line, show
-from machine.cli.terminal.progress import say
+from machine.notices import plain_line, say, show
 from machine.pipeline.comparison import compare_with_one_part
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_writable, write_bytes

@@ -2,19 +2,11 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from machine.cli.terminal.report import estimates, table
-from machine.quantities import minutes
-from mdp.cost.footing import BuildPlate
+from machine.pipeline.orientation import in_parts
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.directions.orientation import in_words, side_in_words
-from mdp.mesh import Mesh
 from mdp.search.front import ASKED, BY_PLAN, Weights, choose
-from mdp.search.orient import Oriented
 from profiles.profile import Profile
-
-HARDLY_HELD = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
 
 
 def advice(decomposition: Decomposition, profile: Profile) -> str:
@@ -27,36 +19,6 @@ def advice(decomposition: Decomposition, profile: Profile) -> str:
     if advised is not None and not advised.chosen:
         best += f": --parts {advised.parts}"
     return _ways_table(ways) + f"advice: {best}\n"
-
-
-def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
-    """How a model was laid down, what that is better by, and how to change it; nothing where it stays. Then a warning where the
-    plate hardly holds it."""
-    orientation, standing, laid = oriented.orientation, oriented.standing, oriented.decomposition.chosen
-    warning = () if oriented.held else (HARDLY_HELD,)
-    if orientation is None:
-        return warning
-    side, turns = side_in_words(orientation), in_words(orientation, held=True)
-    where, better = f"{side} ({turns})" if side else turns, ""
-    if laid is not None:
-        was = f"{oriented.upright.risky_mm2:.0f} mm2 hang over" if standing is None else _with_scars(standing)
-        better = f": {_with_scars(laid)}, as it stands {was if oriented.upright_held else 'the plate would hardly hold it'}"
-    return (f"it is laid down {where}{better}; {otherwise}", *warning)
-
-
-def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
-    """A warning where the plate hardly holds a model as it stands."""
-    return () if BuildPlate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
-
-
-def _with_scars(row: FrontRow) -> str:
-    taking = "" if row.time_s is None else f" in {minutes(row.time_s)}"
-    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm2 of scars{taking}"
-
-
-def in_parts(count: int) -> str:
-    """A number of parts in words."""
-    return "in one piece" if count == 1 else f"in {count} parts"
 
 
 def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:

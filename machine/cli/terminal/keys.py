@@ -10,9 +10,10 @@ from time import monotonic
 from types import MappingProxyType
 from typing import Any, Self
 
-from machine.cli.terminal.progress import is_terminal, say
+from machine.cli.terminal.progress import is_terminal
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
 from machine.link.print_state import AWAY, PrintState, PrintStatus
+from machine.notices import say
 
 STEP_PERCENT = 10.0
 LOOK_S = 0.05

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from machine.pipeline.requests import MOST_COPIES, Cuts, Given, ModelRequest, PortRequest, ProbeRequest
+from machine.cli.terminal.option_groups import option
+from machine.pipeline.requests import MOST_COPIES, Cuts, Given, ModelRequest
 from profiles.errors import PlanError
 
 if TYPE_CHECKING:
@@ -52,56 +53,39 @@ ModelsOrGcode = Annotated[
 ]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
-Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
-PlansGiven = Annotated[
-    list[Path] | None,
-    typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search; one for each model"),
-]
-JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
-HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
-Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
-ForceAll = Annotated[bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")]
-LogFile = Annotated[
-    Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-]
-Baud = Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")]
-PortOrSim = Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")]
-SimSpeed = Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")]
-Watch = Annotated[bool, typer.Option("--watch", help="open a page of this computer that follows and commands the print")]
-NoBrowser = Annotated[bool, typer.Option("--no-browser", help="only tell the address")]
-WatchPort = Annotated[
-    int | None, typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one")
-]
+Settings = Annotated[tuple[str, ...], option("--set KEY=VALUE", "override a profile key; repeatable")]
+JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
+HtmlFile = Annotated[Path | None, option("--html FILE", "page that shows it in a browser, see view")]
+Force = Annotated[bool, option("--force", "go on although the dry run found errors")]
+ForceAll = Annotated[bool, option("--force", "go on although dry run, printer, machine and program do not agree")]
+LogFile = Annotated[Path | None, option("--log FILE", "what is sent and received; else a new file in the state folder")]
+Baud = Annotated[int, option("--baud N", "bits a second")]
+PortOrSim = Annotated[str, option("--port PORT|sim", "serial port; sim: the simulated printer")]
+SimSpeed = Annotated[float, option("--sim-speed X", "X times real time; 0: as fast as possible")]
+NoBrowser = Annotated[bool, option("--no-browser", "only tell the address")]
 
 
 @dataclass(frozen=True)
 class SearchOptions:
     """How a model is cut into parts."""
 
-    beam_width: Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")] = None
-    search: Annotated[
-        str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
-    ] = None
-    time_limit: Annotated[
-        float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")
-    ] = None
+    beam_width: Annotated[int | None, option("--beam-width B", "decompositions followed at a time")] = None
+    search: Annotated[str | None, option("--search best|published", "published: as the 2020 paper searches")] = None
+    time_limit: Annotated[float | None, option("--time-limit SECONDS", "then the best parts so far are used")] = None
     ranker: Annotated[
         str,
-        typer.Option(
-            "--ranker",
-            metavar="classic|learned|FILE.onnx",
-            help="which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
+        option(
+            "--ranker classic|learned|FILE.onnx",
+            "which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
         ),
     ] = "classic"
     orient: Annotated[
-        bool | None,
-        typer.Option("--orient/--as-is", help="lay the model down in the cheapest orientation, or print it as its file has it"),
+        bool | None, option("--orient/--as-is", "lay the model down in the cheapest orientation, or print it as its file has it")
     ] = None
-    parts: Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")] = None
+    parts: Annotated[int | None, option("--parts N", "into N parts at most, not as many as pay")] = None
     part: Annotated[
-        list[str] | None,
-        typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
-    ] = None
+        tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, as 2:walls=4; repeatable")
+    ] = ()
 
     @property
     def settings(self) -> list[str]:
@@ -115,14 +99,10 @@ class FileOptions(SearchOptions):
     """Options of a command for one model: how to cut it, and which plate and settings of a slicer file to use."""
 
     plate: Annotated[
-        int | None,
-        typer.Option(
-            "--plate", metavar="N", help="plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something"
-        ),
+        int | None, option("--plate N", "plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something")
     ] = None
     settings_of_file: Annotated[
-        bool,
-        typer.Option("--settings-of-file", help="print by the settings inside a .3mf of another slicer; see profiles import"),
+        bool, option("--settings-of-file", "print by the settings inside a .3mf of another slicer; see profiles import")
     ] = False
 
 
@@ -130,20 +110,16 @@ class FileOptions(SearchOptions):
 class ProgramOptions(FileOptions):
     """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
 
-    plan: PlansGiven = None
+    plan: Annotated[
+        tuple[Path, ...], option("--plan FILE", "cut by this plan of decompose, without a search; one for each model")
+    ] = ()
     pause: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--pause", metavar="PART:LAYER", help="wait for a person before this layer, or at a height: 1:8.4mm; repeatable"
-        ),
-    ] = None
+        tuple[str, ...], option("--pause PART:LAYER", "wait for a person before this layer, or at a height: 1:8.4mm; repeatable")
+    ] = ()
     filament_change: Annotated[
-        list[str] | None,
-        typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
-    ] = None
-    copies: Annotated[
-        int | None, typer.Option("--copies", metavar="N", help="number of copies of each model on the plate, 1 by default")
-    ] = None
+        tuple[str, ...], option("--filament-change PART:LAYER", "the same, for another filament; repeatable")
+    ] = ()
+    copies: Annotated[int | None, option("--copies N", "number of copies of each model on the plate, 1 by default")] = None
 
 
 @dataclass(frozen=True)
@@ -153,7 +129,7 @@ class ProfileOptions:
     machine: MachineGiven = None
     material: Annotated[str | None, _profile_option("material", OF_FILE)] = None
     process: Annotated[str | None, _profile_option("process", OF_FILE)] = None
-    settings: Settings = None
+    settings: Settings = ()
 
     @property
     def names(self) -> tuple[str | None, str | None, str | None]:
@@ -165,18 +141,18 @@ class ProfileOptions:
         names = {
             kind: name for kind, name in zip(("machine", "material", "process"), self.names, strict=True) if name is not None
         }
-        return Given(**names, settings=(*(self.settings or ()), *(search.settings if search else ())))
+        return Given(**names, settings=(*self.settings, *(search.settings if search else ())))
 
     def over(self, given: Given) -> "ProfileOptions":
         """These options over what a project was made with."""
-        new = given.replaced(self.names, self.settings or ())
-        return ProfileOptions(new.machine, new.material, new.process, list(new.settings))
+        new = given.replaced(self.names, self.settings)
+        return ProfileOptions(new.machine, new.material, new.process, new.settings)
 
     @property
     def sections(self) -> frozenset[str]:
         """The sections of the profile that the user has said something about."""
         named = {kind for kind in ("machine", "material", "process") if getattr(self, kind) is not None}
-        return frozenset(named | {setting.partition(".")[0] for setting in self.settings or ()})
+        return frozenset(named | {setting.partition(".")[0] for setting in self.settings})
 
     def profile(self, search: SearchOptions | None = None) -> "Profile":
         """The profile, with what the options of a search set in it. Raises ProfileError."""
@@ -184,7 +160,7 @@ class ProfileOptions:
         from profiles.profile import load, with_part_settings
 
         profile = load(**asdict(self.given(search)))
-        return with_part_settings(profile, map(parse_part_settings, search.part or () if search else ()))
+        return with_part_settings(profile, map(parse_part_settings, search.part if search else ()))
 
 
 @dataclass(frozen=True)
@@ -265,8 +241,8 @@ def _given_by(model: str, given: ProfileOptions) -> Given:
 
     Raises ProfileError if the model has no settings, or if both profiles are named.
     """
-    from machine.cli.terminal.progress import say
-    from machine.pipeline.file_settings import settings_inside
+    from machine.notices import say
+    from machine.pipeline.embedded_profile import settings_inside
     from profiles.errors import ProfileError
 
     file, kinds = Path(model), [kind for kind in ("material", "process") if getattr(given, kind) is None]
@@ -287,7 +263,7 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     from machine.pipeline.project import is_project
     from machine.planning.stops import parse_stops
 
-    stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(tuple(program.plan or ()), program.parts)
+    stops, cuts = parse_stops(program.pause, program.filament_change), Cuts(program.plan, program.parts)
     first, *others = named_models(models)
     if program.settings_of_file and len({first, *others}) > 1:
         several = ", ".join(dict.fromkeys((first, *others)))
@@ -300,47 +276,6 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     return model_request(first, program, given, program.copies, cuts=cuts, stops=stops, beside=tuple(others), **further)
 
 
-def machine_profile(machine: str | None, settings: list[str] | None = None) -> "Profile":
+def machine_profile(machine: str, settings: tuple[str, ...] = ()) -> "Profile":
     """The profile where only the machine matters."""
     return ProfileOptions(machine, settings=settings).profile()
-
-
-def page_port(watch: bool, watch_port: int | None) -> int | None:
-    """Where the page of a print is served, 0: at any free port; None: nowhere."""
-    return (watch_port or 0) if watch or watch_port is not None else None
-
-
-@dataclass(frozen=True)
-class ProbeOptions:
-    """A machine that measures a ball on its plate by itself."""
-
-    probe: Annotated[bool, typer.Option("--probe", help="the machine at --port measures a ball on its plate by itself")] = False
-    port: Annotated[
-        str | None,
-        typer.Option("--port", metavar="PORT|sim", help="serial port of the machine to measure; sim: simulated"),
-    ] = None
-    baud: Baud = 115200
-    ball_mm: Annotated[float, typer.Option("--ball-mm", metavar="MM", min=4, max=60, help="diameter of the ball")] = 20.0
-    probe_offset: Annotated[
-        str,
-        typer.Option("--probe-offset", metavar="X,Y,Z", help="from the nozzle's tip to what touches; 0,0,0: the nozzle senses"),
-    ] = "0,0,0"
-    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="of --probe: picture of what is left over")] = None
-    log: LogFile = None
-
-    @property
-    def at(self) -> PortRequest | None:
-        """The printer at --port, None: there is none."""
-        return None if self.port is None else PortRequest(self.port, self.baud, self.log)
-
-    def request(self) -> ProbeRequest:
-        """What is asked for with --probe; raises BadParameter."""
-        if self.at is None:
-            raise typer.BadParameter("--probe needs --port PORT, or sim for the simulated printer")
-        try:
-            x, y, z = (float(word) for word in self.probe_offset.split(","))
-        except ValueError:
-            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: three numbers X,Y,Z in mm are expected") from None
-        if not all(-200.0 <= value <= 200.0 for value in (x, y, z)):
-            raise typer.BadParameter(f"--probe-offset {self.probe_offset}: -200 to 200 mm are allowed")
-        return ProbeRequest(self.at, self.ball_mm, (x, y, z), self.png)

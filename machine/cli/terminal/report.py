@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from machine.dryrun.dryrun import DryRun, summary
-from machine.program import Program
+from machine.program import Alternative, Program
 from machine.quantities import duration, filament_g, minutes, newtons, percent, price_in_words, price_json
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
@@ -191,3 +191,22 @@ def agreement_line(agreed: "Agreement") -> str:
 
 def _count(number: int, things: str) -> str:
     return f"{number} {things if number != 1 else things.removesuffix('s')}"
+
+
+def compare_table(alternatives: tuple[Alternative, ...]) -> str:
+    """The alternatives for a person."""
+    rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
+    rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm2"] for way in alternatives]
+    head, *lines = table(rows).splitlines()
+    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
+    return "\n".join(["", head, *lines, *notes]) + "\n"
+
+
+def _costs(alternative: Alternative) -> list[str]:
+    """Time, filament, mass, support and interfaces; dashes where it cannot be printed."""
+    if alternative.time_s is None:
+        return ["-"] * 5
+    filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000
+    mass = f"{alternative.filament_g or 0.0:.1f} g"
+    volumes = [f"{support_cm3:.2f} cm3", f"{sum(alternative.interface_mm3.values()) / 1000:.2f} cm3"]
+    return [duration(alternative.time_s), f"{filament_m:.2f} m", mass, *volumes]

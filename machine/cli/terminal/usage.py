@@ -1,23 +1,21 @@
 """Usage: an error of the command line as one sentence that names what was given and what is allowed."""
 
 import os
-import re
 from collections.abc import Sequence
 from difflib import get_close_matches
-from itertools import pairwise
 from typing import Any
 
 from typer.exceptions import TyperException
 
-UNKNOWN_OPTION = re.compile(r"No such option: (\S+)")
-UNKNOWN_COMMAND = re.compile(r"No such command '(.*?)'")
-WRONG_VALUE = re.compile(r"Invalid value for .*?(--[\w-]+)': Input should be (.*)")
-PLAINLY = (
-    (re.compile(r"a valid integer.*"), "a whole number"),
-    (re.compile(r"a valid number.*"), "a number"),
-    (re.compile(r"greater than or equal to "), "at least "),
-    (re.compile(r"less than or equal to "), "at most "),
-)
+# Kind of a pydantic error -> what a value must be.
+EXPECTED = {
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "greater_than_equal": "at least {ge:g}",
+    "less_than_equal": "at most {le:g}",
+}
 
 
 def sentence(error: TyperException, given: Sequence[str]) -> str:
@@ -29,13 +27,14 @@ def sentence(error: TyperException, given: Sequence[str]) -> str:
     files = [word for word in given if word.startswith("-") and os.path.isfile(word)]
     if files:
         return f"{files[0]} begins with a dash: write ./{files[0]}"
-    if match := UNKNOWN_OPTION.match(message):
-        return _unknown("option", match[1], context.command_path, _options(context.command))
-    if match := UNKNOWN_COMMAND.match(message):
-        return _unknown("command", match[1], context.command_path, list(context.command.commands))
-    if match := WRONG_VALUE.match(message):
-        message = f"{match[1]} is {_value(match[1], given)!r}: it must be {_plainly(match[2])}"
-    return f"{message.removeprefix('Invalid value: ')}; see {context.command_path} --help"
+    command = context.command
+    if (option := getattr(error, "option_name", None)) is not None:
+        return _unknown("option", option, context.command_path, _options(command))
+    commands = list(getattr(command, "commands", ()))
+    words = [word for word in given if not word.startswith("-")][len(context.command_path.split()) - 1 :]
+    if commands and words and words[0] not in commands:
+        return _unknown("command", words[0], context.command_path, commands)
+    return f"{_wrong_value(error) or message.removeprefix('Invalid value: ')}; see {context.command_path} --help"
 
 
 def _unknown(what: str, word: str, command: str, known: Sequence[str]) -> str:
@@ -48,13 +47,12 @@ def _options(command: Any) -> list[str]:
     return [option for parameter in command.params for option in parameter.opts if option.startswith("--")]
 
 
-def _value(option: str, given: Sequence[str]) -> str:
-    """What was given for an option, as `--option value` or `--option=value`."""
-    joined = (word.partition("=")[2] for word in given if word.startswith(f"{option}="))
-    return next((value for word, value in pairwise(given) if word == option), next(joined, ""))
-
-
-def _plainly(expected: str) -> str:
-    for pattern, plain in PLAINLY:
-        expected = pattern.sub(plain, expected)
-    return expected
+def _wrong_value(error: TyperException) -> str:
+    """What an option is and must be, "" where the error is of another kind."""
+    option = next((name for name in getattr(getattr(error, "param", None), "opts", ()) if name.startswith("--")), "")
+    problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
+    if not option or not problems:
+        return ""
+    problem = problems[0]
+    expected = EXPECTED.get(problem["type"], problem["msg"]).format(**problem.get("ctx", {}))
+    return f"{option} is {problem['input']!r}: it must be {expected}"

@@ -8,12 +8,13 @@ import os
 import tempfile
 import time
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from html import escape
 from pathlib import Path
 from threading import Thread
 
+from machine.notices import say
 from profiles.folders import state_folder
 
 PREFIX, SUFFIX = "workbench-", ".html"
@@ -25,19 +26,19 @@ PAGE = """<!doctype html>
 """
 
 
-def lead_browser(address: str, until_end: ExitStack, note: Callable[[str], object]) -> None:
-    """Open a browser beside all else, by a file that is there until the program ends. note: told where that cannot be done."""
+def lead_browser(address: str, until_end: ExitStack) -> None:
+    """Open a browser beside all else, by a file that is there until the program ends."""
     try:
         file = until_end.enter_context(redirecting(address))
     except OSError as error:
-        note(f"no browser is opened, for no file can be written that leads it: {error.strerror}; open the address in one")
+        say(f"no browser is opened, for no file can be written that leads it: {error.strerror}; open the address in one")
         return
-    Thread(target=_show_in_browser, args=(file.as_uri(), note), name="browser", daemon=True).start()
+    Thread(target=_show_in_browser, args=(file.as_uri(),), name="browser", daemon=True).start()
 
 
-def _show_in_browser(address: str, note: Callable[[str], object]) -> None:
+def _show_in_browser(address: str) -> None:
     if not webbrowser.open(address):
-        note("no browser could be opened: open the address in one")
+        say("no browser could be opened: open the address in one")
 
 
 @contextmanager

@@ -6,7 +6,7 @@ Its buttons ask of the print what keys in the terminal do. Who is answered: see 
 import json
 import secrets
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from threading import Event, Thread
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import say
 from machine.pipeline.programs import LoadedProgram
 from machine.view.page import print_page
 from machine.view.serving.browser import lead_browser
@@ -67,19 +68,17 @@ class Watched:
 
 
 @contextmanager
-def serve_watch_page(
-    loaded: LoadedProgram, port: int | None, control: Control, note: Callable[[str], object], browser: bool = True
-) -> Iterator[Watched]:
+def serve_watch_page(loaded: LoadedProgram, port: int | None, control: Control, browser: bool = True) -> Iterator[Watched]:
     """Serve the page of a print on a port of this computer, 0: on any free one; None: nobody watches. control: of the print,
-    asked by the page's buttons; note: told where the page is; browser: open it there. Raises OutputError."""
+    asked by the page's buttons; browser: open it there. Raises OutputError."""
     if port is None:
         yield Watched()
         return
     page = print_page(loaded.name, loaded.program, loaded.profile, live=True)
     with serve(page, port, control) as watched, ExitStack() as until_end:
-        note(f"watch the print at {watched.address}")
+        say(f"watch the print at {watched.address}")
         if browser:
-            lead_browser(watched.address, until_end, note)
+            lead_browser(watched.address, until_end)
         yield watched
 
 

@@ -23,7 +23,7 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.checks import check_machine
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.destination import Simulated, at_printer
-from machine.printing.job import End, Kind, PrintJob
+from machine.printing.job import End, PrintJob
 from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
 from machine.workbench.printing.at_page import AtPage, HandCommand, HandDoes
 from mdp.pose import level
@@ -46,9 +46,9 @@ def by_hand(job: PrintJob, person: AtPage) -> End:
     with ExitStack() as stack:
         stack.enter_context(calling(person.leave))  # a termination request lets go of the printer, its heaters off
         wire = stack.enter_context(open_line(at, machine))
-        answer = identify_printer(wire, rate_of(at), person.note)
+        answer = identify_printer(wire, rate_of(at))
         check_machine(None if isinstance(at, Simulated) else answer, machine)
-        person.note(describe_answer(answer, rate_of(at)), Kind.PASSED)
+        person.passed(describe_answer(answer, rate_of(at)))
         session = CommandSession(wire, dialect_of(machine).longest_line)
         person.interrupt = lambda word: session.order(StopError if word == Command.EMERGENCY_STOP else LeftError)
         return Hand(job.profile, session, person).serve()

@@ -13,10 +13,10 @@ from time import time
 from typing import Any, BinaryIO
 
 from machine.cli.terminal.interrupts import stopping
-from machine.cli.terminal.plain import plain_line, plain_lines
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
-from machine.printing.job import Kind, Scene, Show
+from machine.notices import Notice, plain_line
+from machine.printing.job import Scene, Show
 from machine.printing.serial_log import SerialLog
 from machine.workbench.printing.job_state import Check, JobState
 from mdp.kernels.workers import frame
@@ -127,15 +127,20 @@ class AtPage:
         self._answers.put(False)
         self.interrupt(LEAVE)
 
-    def note(self, text: str, kind: Kind = Kind.LINE) -> None:
-        """What is found is a check; what the program says are its last lines."""
-        text = plain_lines(text) if kind is Kind.RESULT else plain_line(text)
-        if kind in (Kind.PASSED, Kind.FORCED):
-            self._checks = (*self._checks, Check(text, kind is Kind.FORCED))
-            self.tell(checks=self._checks)
-        if kind is not Kind.PASSED:
-            self._lines.extend(line for line in text.split("\n") if line.strip())
-            self.tell(said=tuple(self._lines))
+    def passed(self, sentence: str) -> None:
+        """What a check has found."""
+        self._add(Check(plain_line(sentence)))
+
+    def hear_notice(self, notice: Notice) -> None:
+        """What the program says; what --force goes past is a check."""
+        if notice.forced:
+            self._add(Check(notice.text.rstrip(), forced=True))
+        self._lines.extend(line for line in notice.text.split("\n") if line.strip())
+        self.tell(said=tuple(self._lines))
+
+    def _add(self, check: Check) -> None:
+        self._checks = (*self._checks, check)
+        self.tell(checks=self._checks)
 
     def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
         """Wait for the person's word to begin. Raises JournalError where one must look at the printer."""

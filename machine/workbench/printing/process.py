@@ -11,14 +11,14 @@ import sys
 from threading import Thread
 from typing import Any
 
-from machine.cli.terminal.plain import said_to
 from machine.crash import bug_in_words
 from machine.dryrun.dryrun import summary
 from machine.link.print_state import PrintState
+from machine.notices import FrontEnd, notices_to
 from machine.pipeline import compilers
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import Server
-from machine.printing.job import NOT_BEGUN, Does, End, Kind, PrintJob
+from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.printers import check_print, open_printer, open_server_printer
 from machine.printing.resumption import print_rest, read_resumption, rest_of
 from machine.printing.server_print import ServerPrinter, file_name, running_print
@@ -41,7 +41,7 @@ def main() -> None:
     reporter = StateReporter(answers, first_state(job))
     person = AtPage(reporter, job.cut_off)
     Thread(target=listen, args=(asked, lambda words: person.hear(*words), person.leave), daemon=True).start()
-    with said_to(lambda text, forced: person.note(text, Kind.FORCED if forced else Kind.LINE)):
+    with notices_to(FrontEnd(person.hear_notice)):
         end, forcible = carry_out(job, person)
     reporter.tell(state=end.state, sentence=end.sentence, forcible=forcible, stop_given=person.has_stopped())
     reporter.close()
@@ -83,7 +83,7 @@ def _print_rest(job: PrintJob, person: AtPage) -> End:
     cut_off = read_resumption(job)
     person.tell(name=cut_off.name, machine=cut_off.profile.machine.name)
     for sentence in cut_off.sentences():
-        person.note(sentence, Kind.PASSED)
+        person.passed(sentence)
     compilers.wait_for(compilers.DRY_RUN)
     end = print_rest(cut_off, rest_of(cut_off), job, person)
     if end.state is PrintState.DECLINED:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from weakref import finalize
 
-from machine.pipeline.file_settings import settings_inside
+from machine.pipeline.embedded_profile import settings_inside
 from machine.pipeline.given_plan import with_plan_settings
 from machine.pipeline.project import Project, unpack
 from machine.pipeline.requests import Given

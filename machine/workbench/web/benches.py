@@ -4,7 +4,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from machine.cli.terminal.progress import say
+from machine.notices import say
 from machine.workbench.bench.page_words import page_words
 from machine.workbench.bench.values import is_small_number
 from machine.workbench.session.workbench import Workbench

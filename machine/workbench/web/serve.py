@@ -12,7 +12,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from machine.cli.terminal.interrupts import calling
-from machine.cli.terminal.progress import say
+from machine.notices import say
 from machine.pipeline.requests import UPLOAD_MIB
 from machine.view.serving.guard import HOST
 from machine.workbench.access.door import Door

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.cli.terminal.advice import orientation_in_words, standing_in_words
 from machine.pipeline import compilers
 from machine.pipeline.given_plan import lies_freely, with_file_marks
-from machine.pipeline.pictures.picture import parts_together
-from machine.pipeline.pictures.png import png_bytes
+from machine.pipeline.orientation import orientation_in_words, standing_in_words
+from machine.pipeline.pictures import parts_together, png_bytes
 from machine.pipeline.pricing import pricing
 from machine.pipeline.project import PICTURE_PX, project_bytes, with_meshes_beside
 from machine.planning.stops import check_stop_parts

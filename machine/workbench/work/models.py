@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from machine.pipeline import compilers
-from machine.pipeline.file_settings import has_settings
+from machine.pipeline.embedded_profile import has_settings
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.marks import named_faces
 from machine.workbench.bench.model import Model

@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from machine.pipeline import compilers
-from machine.pipeline.pictures.front_picture import front_picture
-from machine.pipeline.pictures.picture import contact_sheet, parts_picture
-from machine.pipeline.pictures.png import png_bytes
+from machine.pipeline.pictures import contact_sheet, front_picture, parts_picture, png_bytes
 from machine.planning.fit import check_parts
 from machine.view.encoding import pack
 from machine.view.parts import page_colours

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
+from machine.cli.terminal.report import compare_table
 from machine.pipeline.comparison import (
     alternatives_json,
-    compare_table,
     compare_with_one_part,
     in_one_part,
     in_parts,

@@ -9,7 +9,6 @@ import pytest
 import serial
 
 from machine.cli.cli import main
-from machine.cli.terminal.progress import say
 from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
@@ -145,7 +144,7 @@ def test_a_klipper_that_is_still_starting_is_waited_for(
 ) -> None:
     monkeypatch.setattr(ports, "STARTING_AGAIN_S", 0.0)
     with on_terminal(klipper(STARTING, STARTING, READY)) as path, open_port(path, 115200) as wire:
-        answer = ports.identify_printer(wire, 115200, say)
+        answer = ports.identify_printer(wire, 115200)
     assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZ")
     told = capsys.readouterr().err.splitlines()
     assert [line.partition(":")[0] for line in told] == [f"Klipper v0.13.0 at {path} is still starting"] * 2
@@ -159,7 +158,7 @@ def test_a_klipper_that_never_becomes_ready_is_given_up(monkeypatch: pytest.Monk
         open_port(path, 115200) as wire,
         pytest.raises(PrinterError, match=r"is still starting \(Klipper v0.13.0\): if it does not become ready"),
     ):
-        ports.identify_printer(wire, 115200, say)
+        ports.identify_printer(wire, 115200)
 
 
 def test_a_busy_port_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

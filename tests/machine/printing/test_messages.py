@@ -22,7 +22,7 @@ def test_of_what_the_printer_says_only_words_are_kept(line: bytes, text: str) ->
 
 
 def test_words_cut_anywhere_are_put_together_and_the_last_four_kept() -> None:
-    messages, said = PrinterMessages(), b"".join(b"ok\necho:word %d\n" % n for n in range(9))
+    messages, said = PrinterMessages(4), b"".join(b"ok\necho:word %d\n" % n for n in range(9))
     for at in range(0, len(said), 7):
         messages.hear("<", said[at : at + 7])
     messages.hear(">", b"echo:sent\n")

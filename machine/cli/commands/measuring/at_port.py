@@ -6,8 +6,8 @@ from contextlib import ExitStack, contextmanager
 from machine.cli.commands.measuring.mover import PrinterMover
 from machine.cli.commands.measuring.prober import ProbingSession
 from machine.cli.terminal.interrupts import interrupting
-from machine.cli.terminal.progress import say
 from machine.firmware import dialect_of
+from machine.notices import say
 from machine.pipeline.requests import PortRequest
 from machine.printing.checks import check_machine
 from machine.printing.destination import parse_printer
@@ -31,7 +31,7 @@ def cold_session(port: PortRequest, machine: Machine, table: ProbedTable | None 
         if log.trouble:
             say(f"the traffic is not logged: {log.file}: {log.trouble}")
         stack.enter_context(interrupting())
-        answer = identify_printer(wire, rate_of(at), say)
+        answer = identify_printer(wire, rate_of(at))
         say(describe_answer(answer, rate_of(at)))
         check_machine(answer, machine)
         session = stack.enter_context(ProbingSession(TappedWire(wire, log.note), dialect_of(machine).longest_line))

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from machine.cli.commands.measuring.calibrate_dialogue import ask_touches
-from machine.cli.terminal.plain import show
+from machine.cli.terminal.requests import CalibrationRequest
+from machine.notices import show
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
-from machine.pipeline.requests import CalibrationRequest
 from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.program import calibration_lines, plan_touches
 from machine.setup.calibration.saved import fitted_tables, own_profile

@@ -9,8 +9,9 @@ from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip
 from machine.cli.commands.measuring.calibrate import judged, mark_height_mm, refuse_if_saved, save_calibration, tilting_machine
 from machine.cli.commands.measuring.mover import PrinterMover
 from machine.cli.terminal.keys import can_type, typing
-from machine.cli.terminal.progress import say
-from machine.pipeline.requests import CalibrationRequest, PortRequest
+from machine.cli.terminal.requests import CalibrationRequest
+from machine.notices import say
+from machine.pipeline.requests import PortRequest
 from machine.printing.command_session import CommandSession
 from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, Touch

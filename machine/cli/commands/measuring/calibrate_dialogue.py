@@ -8,8 +8,8 @@ from statistics import median
 
 import numpy as np
 
-from machine.cli.terminal.plain import plain_line
 from machine.kinematics.table import machine_points
+from machine.notices import plain_line
 from machine.setup.calibration.fit import SIGNS, Touch
 from machine.setup.calibration.program import TouchPlan, plan_touches
 from machine.setup.calibration.sheet import Sheet

@@ -8,12 +8,12 @@ import numpy as np
 
 from machine.cli.commands.measuring.calibrate import refuse_if_saved, save_tables, through, tilting_machine
 from machine.cli.commands.measuring.calibrate_dialogue import read_reply
-from machine.cli.terminal.plain import show
+from machine.cli.terminal.requests import CalibrationRequest
 from machine.gcode.lines import GcodeFile
 from machine.gcode.reader.parse import parse_gcode
+from machine.notices import show
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes
-from machine.pipeline.requests import CalibrationRequest
 from machine.setup.calibration.piece.fit import Correction, correct
 from machine.setup.calibration.piece.pads import Piece, read_piece
 from machine.setup.calibration.piece.page import piece_page

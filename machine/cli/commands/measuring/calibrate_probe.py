@@ -6,12 +6,12 @@ from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip
 from machine.cli.commands.measuring.calibrate import MOST_OFF_MM, comparison, refuse_if_saved, save_calibration, tilting_machine
 from machine.cli.commands.measuring.calibrate_dialogue import read_reply
 from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
-from machine.cli.terminal.plain import show
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import CalibrationRequest
 from machine.firmware import dialect_of, firmware_of
 from machine.firmware.probing import ProbingRules
+from machine.notices import say, show
 from machine.pipeline.output import check_writable
-from machine.pipeline.requests import CalibrationRequest, ProbeRequest
+from machine.pipeline.requests import ProbeRequest
 from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.probing.ball import Ball
@@ -50,8 +50,8 @@ def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Prof
         f"{residual_table(calibration, machine, measuring)}"
     )
     if probing.png is not None:
-        from machine.pipeline.pictures.png import write_png
-        from machine.pipeline.pictures.residual_picture import residual_picture
+        from machine.pipeline.pictures import write_png
+        from machine.pipeline.residual_picture import residual_picture
 
         write_png(probing.png, residual_picture(calibration, [touch.pose for touch in touches], machine))
     if calibration.rms_mm > MOST_OFF_MM and not request.force:

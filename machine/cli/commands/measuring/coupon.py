@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from machine.cli.commands.measuring.coupon_dialogue import ask_loads
-from machine.cli.terminal.plain import show
 from machine.cli.terminal.report import print_table
+from machine.cli.terminal.requests import CouponRequest
+from machine.notices import show
 from machine.pipeline.output import check_outputs, check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
-from machine.pipeline.pictures.picture import contact_sheet
-from machine.pipeline.pictures.png import write_png
+from machine.pipeline.pictures import contact_sheet, write_png
 from machine.pipeline.pipeline import build
 from machine.pipeline.programs import refuse_errors
-from machine.pipeline.requests import STDOUT, CouponRequest, Outputs
+from machine.pipeline.requests import STDOUT, Outputs
 from machine.setup.calibration.saved import own_profile
 from machine.setup.coupon.bars import SHAPES, Shape
 from machine.setup.coupon.design import factors, settings_of_bars

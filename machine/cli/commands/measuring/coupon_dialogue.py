@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from machine.cli.commands.measuring.calibrate_dialogue import read_reply
-from machine.cli.terminal.plain import plain_line
+from machine.notices import plain_line
 from machine.setup.coupon.sheet import Sheet, load_problem, settings_in_words
 
 N_PER_KG = 9.80665

@@ -2,9 +2,9 @@
 
 from contextlib import suppress
 
-from machine.cli.terminal.progress import say
 from machine.gcode.pen import Pen
 from machine.link.shutdown import lift_tip
+from machine.notices import say
 from machine.printing.command_session import CommandSession
 from machine.setup.calibration.program import cold_start, turn_lines
 from mdp.pose import Pose

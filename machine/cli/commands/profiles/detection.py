@@ -7,12 +7,11 @@ from collections.abc import Iterator, Sequence
 from glob import glob, has_magic
 from pathlib import Path
 
-from machine.cli.terminal.plain import plain_lines
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import DetectRequest
 from machine.firmware.line import check_baud
+from machine.notices import plain_lines, say
 from machine.pipeline.output import check_writable, plain_name, refuse_to_overwrite, write_own
 from machine.pipeline.profile_file import profile_text
-from machine.pipeline.requests import DetectRequest
 from machine.printing.destination import parse_destination
 from machine.printing.settings_queries import settings_text
 from machine.setup.detect.found import ConfigText, Found

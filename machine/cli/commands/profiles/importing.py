@@ -5,11 +5,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from machine.cli.terminal.plain import plain_lines
-from machine.cli.terminal.progress import say
+from machine.cli.terminal.requests import ImportRequest
+from machine.notices import plain_lines, say
 from machine.pipeline.output import check_folder, plain_name, refuse_to_overwrite, write_own
 from machine.pipeline.profile_file import profile_text
-from machine.pipeline.requests import ImportRequest
 from profiles.errors import ProfileError
 from profiles.foreign.config import Config
 from profiles.foreign.imported import KINDS, Imported, Row, imported, stay, unused

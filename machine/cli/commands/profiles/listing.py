@@ -5,8 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from machine.cli.terminal.plain import plain_line, plain_lines
-from machine.cli.terminal.progress import say
+from machine.notices import plain_line, plain_lines, say
 from profiles.frozen import Frozen
 from profiles.machine import Machine
 from profiles.places import own, own_folder

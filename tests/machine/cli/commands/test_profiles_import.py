@@ -12,7 +12,7 @@ import pytest
 
 from machine.cli.cli import main
 from machine.cli.commands.profiles.importing import import_profiles
-from machine.pipeline.requests import ImportRequest
+from machine.cli.terminal.requests import ImportRequest
 from mdp.save import stl
 from profiles.errors import OutputError
 from profiles.profile import load_one
@@ -48,7 +48,7 @@ KINDS = ("Perimeter", "External perimeter", "Internal infill")
 def request(folder: Path, **given: object) -> ImportRequest:
     file = folder / "config.ini"
     file.write_text(CONFIG)
-    return ImportRequest(file, {}, name="theirs", out=folder, **given)  # type: ignore[arg-type]
+    return ImportRequest(file, name="theirs", out=folder, **given)  # type: ignore[arg-type]
 
 
 def test_material_and_process_are_written_and_read_back(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from machine.cli.at_terminal import AtTerminal
 from machine.cli.cli import main
+from machine.cli.terminal.at_terminal import AtTerminal
 from machine.cli.terminal.keys import LEAVING
 from machine.link.pending_commands import CancelledError
 from machine.printing.job import Scene

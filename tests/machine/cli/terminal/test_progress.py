@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from machine import notices
 from machine.cli.terminal import progress
-from machine.cli.terminal.progress import PLAIN_AGAIN_S, PLAIN_EVERY_S, PlainLines
+from machine.notices import PLAIN_AGAIN_S, PLAIN_EVERY_S, PlainLines
 from mdp.kernels import threads
 from mdp.save import stl
 from tests.machine.person import Person
@@ -19,7 +20,7 @@ def test_a_log_hears_of_what_changes_every_five_seconds_and_of_what_does_not_onc
 ) -> None:
     said = [(1.0, "a"), (PLAIN_EVERY_S, "a"), (3 * PLAIN_EVERY_S, "a"), (4 * PLAIN_EVERY_S, "b"), (2 * PLAIN_AGAIN_S, "b")]
     clock = iter([0.0, *(now for now, _ in said)])
-    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(notices, "monotonic", lambda: next(clock))
     lines = PlainLines()
     for _, text in said:
         lines.show(text)
@@ -41,6 +42,6 @@ def test_the_thread_that_draws_a_live_line_does_not_keep_work_from_being_shared_
 ) -> None:
     monkeypatch.setattr(progress, "is_terminal", lambda: True)
     alone = threading.active_count()
-    with progress.reporting():
+    with progress.progress():
         assert threading.active_count() == alone + 1
         assert threads.come_to_rest()

@@ -8,8 +8,8 @@ import pytest
 
 from machine.cli.cli import main
 from machine.cli.commands.measuring.calibrate import ask_for_touches
+from machine.cli.terminal.requests import CalibrationRequest, MachineOptions
 from machine.kinematics.table import machine_points
-from machine.pipeline.requests import CalibrationRequest
 from machine.setup.calibration.fit import Touch
 from machine.setup.calibration.program import plan_touches
 from profiles.machine import Machine
@@ -82,7 +82,7 @@ def talked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
     person = Person(*lines)
     monkeypatch.setattr("builtins.input", person)
     try:
-        ask_for_touches(CalibrationRequest("open5x_voron0"))
+        ask_for_touches(CalibrationRequest(given=MachineOptions("open5x_voron0")))
     except KeyboardInterrupt:
         person.lines.append("Ctrl-C")
     return person

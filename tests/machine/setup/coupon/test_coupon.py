@@ -10,7 +10,8 @@ import pytest
 
 from machine.cli.cli import main
 from machine.cli.commands.measuring.coupon import UNSUPPORTED, ask_for_loads
-from machine.pipeline.requests import CouponRequest
+from machine.cli.terminal.options import DefaultProfileOptions
+from machine.cli.terminal.requests import CouponRequest
 from machine.setup.coupon.bars import SHAPES
 from machine.setup.coupon.plate import coupon
 from machine.setup.coupon.sheet import Sheet, read_sheet, sheet_text
@@ -159,7 +160,7 @@ def test_a_wrong_word_is_told_in_one_sentence_and_nothing_is_written(
 def asked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
     person = Person(*lines)
     monkeypatch.setattr("builtins.input", person)
-    ask_for_loads(CouponRequest(NAMES))
+    ask_for_loads(CouponRequest(given=DefaultProfileOptions()))
     return person
 
 
@@ -206,4 +207,4 @@ def test_what_is_there_already_is_told_before_anything_is_asked(monkeypatch: pyt
     assert main(["coupon", "--measured", written(broken(TRUTH, 3, 0.01))]) == 0
     monkeypatch.setattr("builtins.input", Person())
     with pytest.raises(OutputError, match="--replace writes over it"):
-        ask_for_loads(CouponRequest(NAMES))
+        ask_for_loads(CouponRequest(given=DefaultProfileOptions()))

@@ -239,7 +239,7 @@ def test_print_watch_opens_the_browser_unless_it_is_told_not_to(
 ) -> None:
     monkeypatch.setattr("machine.view.serving.watch_page.LAST_WORD_S", 0.0)
     shown: list[str] = []
-    monkeypatch.setattr("machine.view.serving.watch_page.lead_browser", lambda address, until_end, note: shown.append(address))
+    monkeypatch.setattr("machine.view.serving.watch_page.lead_browser", lambda address, until_end: shown.append(address))
     file = tmp_path / "moves.gcode"
     file.write_text("G28\nM109 S200\nG1 Z0.2 F6000\nG1 X10 E1\nM104 S0\nM140 S0\n")
     assert main(["print", str(file), "--port", "sim", "--watch", "--force", *more]) == 0

@@ -19,14 +19,13 @@ from typing import Any
 
 import pytest
 
-from machine.cli.terminal.plain import said_to
-from machine.cli.terminal.progress import say
 from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import FrontEnd, notices_to, say
 from machine.printing.checks import check
 from machine.printing.destination import parse_destination
-from machine.printing.job import Does, End, Kind, PrintJob, Scene
+from machine.printing.job import Does, End, PrintJob, Scene
 from machine.printing.serial_log import SerialLog
 from machine.printing.servers import follow
 from machine.printing.servers.credentials import VARIABLE
@@ -413,12 +412,13 @@ def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
 def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> None:
     heard = Heard()
     person = AtPage(heard)  # type: ignore[arg-type]
-    with said_to(lambda text, forced: person.note(text, Kind.FORCED if forced else Kind.LINE)):
-        check(["", "an axis is missing"], force=True, note=person.note, passed="the axes are there")
+    with notices_to(FrontEnd(person.hear_notice)):
+        assert not check(["", "an axis is missing"], force=True)
         say("one moment")
-        check([""], force=True, note=person.note, passed="the file is whole")
+        assert check([""], force=True)
+        person.passed("the file is whole")
         with pytest.raises(PrinterError, match="too hot") as refused:
-            check(["too hot"], force=False, note=person.note, passed="it is cool")
+            check(["too hot"], force=False)
     assert refused.value.forcible
     assert heard.state["checks"] == (Check("an axis is missing", forced=True), Check("the file is whole"))
     assert heard.state["said"] == ("an axis is missing", "one moment")

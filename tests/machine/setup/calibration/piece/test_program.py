@@ -9,10 +9,10 @@ import pytest
 
 from machine.cli.cli import main
 from machine.cli.commands.measuring.calibrate_piece import ask_for_readings
+from machine.cli.terminal.requests import CalibrationRequest
 from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import workpiece_path
-from machine.pipeline.requests import CalibrationRequest
 from machine.setup.calibration.piece.fit import correct
 from machine.setup.calibration.piece.pads import Piece, read_piece
 from machine.setup.calibration.piece.page import piece_page
@@ -143,7 +143,7 @@ def test_in_a_terminal_the_pads_are_asked_for_one_by_one(
 ) -> None:
     person = Person("2 -1 1.2", "0.5", "b", "2,-1,1.25", "0,0.5,-", "1,0,1.2", "-1,0,1.15")
     monkeypatch.setattr("builtins.input", person)
-    assert ask_for_readings(CalibrationRequest("generic_ac", save="mine"), gcode) == 0
+    assert ask_for_readings(CalibrationRequest(save="mine"), gcode) == 0
     assert person.asked[-1] == "pad 4 (4 holes): right, up, height: "
     out = capsys.readouterr().out
     assert "pad 2: '0.5' cannot be read: two marks and a height are expected" in out
@@ -162,7 +162,7 @@ def test_nobody_types_readings_that_could_not_be_saved(gcode: Path, mine: Path, 
     person = Person()
     monkeypatch.setattr("builtins.input", person)
     with pytest.raises(OutputError, match=r"mine\.toml exists: --replace writes over it"):
-        ask_for_readings(CalibrationRequest("generic_ac", save="mine"), gcode)
+        ask_for_readings(CalibrationRequest(save="mine"), gcode)
     assert person.asked == []
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from machine.cli.cli import main
-from machine.cli.terminal.plain import plain_line, plain_lines
+from machine.notices import plain_line, plain_lines
 
 
 @pytest.mark.parametrize(

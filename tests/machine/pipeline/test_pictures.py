@@ -1,8 +1,11 @@
 """Pictures: PNG bytes, pixels against geometry, and what the two sheets show."""
 
+import struct
+from base64 import b64decode
 from dataclasses import replace
 from functools import cache
 from io import BytesIO
+from itertools import pairwise
 from math import cos, pi, radians, sin
 from pathlib import Path
 
@@ -13,14 +16,26 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
-from machine.pipeline.pictures.picture import contact_sheet, parts_picture
-from machine.pipeline.pictures.png import png_bytes, write_png
-from machine.pipeline.pictures.raster import corner_normals, draw, seen_from, z_buffer
+from machine.gcode.lines import Lines
+from machine.gcode.reader.parse import parse_gcode
+from machine.pipeline.pictures import (
+    BORDER,
+    contact_sheet,
+    front_picture,
+    parts_picture,
+    png_bytes,
+    thumbnail,
+    with_thumbnails,
+    write_png,
+)
+from machine.pipeline.raster import corner_normals, draw, seen_from, z_buffer
 from machine.view.parts import part_colours
-from mdp.decomposition import Decomposition
-from mdp.search.search import decompose
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.search.plan_file import PlanFile, PlannedPart
+from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from profiles.errors import OutputError
 from profiles.profile import load
+from tests.machine.hand import printed, text
 from tests.shapes import ball, box, branch
 
 PROFILE = load()
@@ -160,3 +175,44 @@ def test_colours_of_parts_differ_and_stay_inside_the_range() -> None:
     colours = part_colours(18)
     assert len(np.unique(colours.round(), axis=0)) == 18
     assert 0.0 <= colours.min() <= colours.max() <= 255.0
+
+
+PIXELS, TITLE = 240, 20
+ARM = PlannedPart((1.0, 0.0, 0.0), 10.0)
+
+
+def test_every_row_has_a_frame_with_its_parts_in_colour_and_the_one_taken_a_border() -> None:
+    tree = cut_by_plan(branch(70.0), "branch", PROFILE, SearchRequest(plan=PlanFile("", parts=(ARM,))))
+    rows = (FrontRow((), 100.0, 0.0, 100.0), replace(tree.front[-1], chosen=True))
+    sheet = front_picture(replace(tree, front=rows), PROFILE, PIXELS)
+    assert sheet.shape == (PIXELS + TITLE, 2 * PIXELS, 3)
+    whole, parts = sheet[TITLE:, :PIXELS], sheet[TITLE:, PIXELS:]
+    second = part_colours(2)[1]
+    assert (share_like(whole, second), share_like(parts, second) > 0.01) == (0.0, True)
+    assert np.array_equal(parts[0], np.full((PIXELS, 3), BORDER))
+    assert (whole[0] == 255).all()
+
+
+def test_the_pictures_asked_for_stand_after_the_first_comments_and_are_png_of_that_size() -> None:
+    profile, decomposition, _, _ = printed("generic_ac")
+    asked = load(settings=["machine.thumbnails_px=[[32, 24], [160, 120]]"])
+    lines = with_thumbnails(Lines.of(text("generic_ac")), decomposition, asked)
+    begins = [k for k, line in enumerate(lines) if line.startswith("; thumbnail begin")]
+    ends = [k for k, line in enumerate(lines) if line == "; thumbnail end"]
+    pngs = [b64decode("".join(line[2:] for line in lines[a + 1 : b])) for a, b in zip(begins, ends, strict=True)]
+    assert [struct.unpack(">II", png[16:24]) for png in pngs] == [(32, 24), (160, 120)]
+    assert all(line.startswith("; ") for line in lines[: ends[-1] + 1])
+    assert lines[ends[-1] + 1] == next(line for line in text("generic_ac") if not line.startswith("; "))
+    assert len(parse_gcode(lines, profile.machine).line) == len(parse_gcode(text("generic_ac"), profile.machine).line)
+
+
+def test_the_length_told_is_that_of_the_base64_and_no_line_is_longer_than_80() -> None:
+    lines = thumbnail(bytes(range(256)) * 3, 16, 16)
+    assert lines[0] == "; thumbnail begin 16x16 1024"
+    assert sum(len(line) - 2 for line in lines[1:-1]) == 1024
+    assert {len(a) for a, _ in pairwise(lines[1:-1])} == {80}
+
+
+def test_without_a_wish_there_is_no_picture() -> None:
+    profile, decomposition, _, _ = printed("generic_ac")
+    assert with_thumbnails(Lines.of(text("generic_ac")), decomposition, profile) == tuple(text("generic_ac"))

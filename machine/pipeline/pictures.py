@@ -1,18 +1,31 @@
-"""Picture: a decomposition as images: the model and its parts side by side, and the print as a sheet of frames."""
+"""Pictures: a decomposition as images, as PNG files, and in the head of G-code.
 
+The model and its parts side by side, the print as a sheet of frames, and a frame for every number of parts that a search found.
+In G-code pictures have PrusaSlicer's form, base64 between comments, which Mainsail, Fluidd, RepRapFirmware and Prusa's printers
+show beside the file's name.
+"""
+
+from base64 import b64encode
 from collections.abc import Sequence
+from io import BytesIO
 from math import ceil, sqrt
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 from PIL import ImageDraw, ImageFont
 
-from machine.pipeline.pictures.raster import Image, View, draw, seen_from
+from machine.gcode.lines import Lines
+from machine.pipeline.output import write_bytes
+from machine.pipeline.raster import Image, View, draw, seen_from
+from machine.quantities import minutes
 from machine.view.parts import part_colours, residual_faces
 from mdp.cost.cost import needing_upright
-from mdp.decomposition import Decomposition, Part
+from mdp.cut import cut, mesh_of, solid_of
+from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.mesh import Floats, Mesh
+from mdp.overhang import Mask, risky_above, risky_upright
 from mdp.pose import UP, unit
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -173,3 +186,82 @@ def _label(frame: Image, part: Part, machine: Machine) -> Image:
         text = f"{word} {letter} {round(value, 1) + 0.0:.1f}°"
         labelled = write_text(labelled, text, (left, pixels * (0.93 + 0.04 * row)), pixels / 28, 120)
     return labelled
+
+
+BORDER = (0, 114, 178)
+
+
+def front_picture(decomposition: Decomposition, profile: Profile, frame_pixels: int = 480) -> Image:
+    """A frame for every row of the front: its parts in colour with what needs support red, its figures below.
+
+    Returns (h, w, 3), uint8: the model's name, below it frames of frame_pixels squared in rows.
+    """
+    model = decomposition.mesh
+    view = best_view(model, risky_upright(model, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces))
+    frames = [_frame(row, model, profile, view, frame_pixels) for row in decomposition.front]
+    return add_title(tile(frames), decomposition.name, frame_pixels)
+
+
+def _frame(row: FrontRow, model: Mesh, profile: Profile, view: View, pixels: int) -> Image:
+    parts, reds = _cut(row, model, profile)
+    span = 1.25 * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
+    colours = [FLOOR, *part_colours(len(parts))]
+    frame = draw([floor_of(model), *parts], colours, reds=[None, *reds], view=view, size=(pixels, pixels), span_mm=span)
+    left, height = pixels / 32, pixels / 24
+    frame = write_text(frame, "one piece" if row.parts == 1 else f"{row.parts} parts", (left, pixels / 12), pixels / 16, 90)
+    figures = f"{max(row.support_area_mm2, 0.0):.0f} mm2 on support, {row.seam_mm:.0f} mm of seams"
+    frame = write_text(frame, figures, (left, 0.93 * pixels), height, 110)
+    if row.time_s is not None and row.filament_mm is not None:
+        takes = f"{minutes(row.time_s)}, {row.filament_mm / 1000:.1f} m"
+        frame = write_text(frame, takes, (left, 0.98 * pixels), height, 110)
+    return _with_border(frame, max(2, pixels // 120)) if row.chosen else frame
+
+
+def _cut(row: FrontRow, model: Mesh, profile: Profile) -> tuple[list[Mesh], list[Mask]]:
+    """The parts in print order and which of their faces need support."""
+    angle_deg, rest = profile.process.self_supporting_angle_deg, solid_of(model)
+    parts, reds = list[Mesh](), list[Mask]()
+    for plane in row.planes:
+        upper, rest = cut(rest, plane)
+        parts.insert(0, mesh_of(upper))
+        reds.insert(0, risky_above(parts[0], plane, angle_deg))
+    parts.insert(0, mesh_of(rest))
+    return parts, [risky_upright(parts[0], angle_deg, profile.search.count_platform_faces), *reds]
+
+
+def _with_border(frame: Image, width: int) -> Image:
+    bordered = frame.copy()
+    for edge in (np.s_[:width], np.s_[-width:], np.s_[:, :width], np.s_[:, -width:]):
+        bordered[edge] = BORDER
+    return bordered
+
+
+ROW = 78  # characters of base64 a line, as PrusaSlicer writes them
+
+
+def png_bytes(image: NDArray[np.uint8]) -> bytes:
+    """The PNG file of an image (h, w, 3), uint8."""
+    file = BytesIO()
+    Pillow.fromarray(image).save(file, "PNG")
+    return file.getvalue()
+
+
+def write_png(path: Path, image: NDArray[np.uint8]) -> None:
+    """Write an image (h, w, 3), uint8; the file appears complete or not at all. Raises OutputError."""
+    write_bytes(path, png_bytes(image))
+
+
+def with_thumbnails(lines: Lines, decomposition: Decomposition, profile: Profile) -> Lines:
+    """The G-code with the pictures that machine.thumbnails_px asks for after its first comments."""
+    head = next((k for k, line in enumerate(lines) if not line.startswith("; ")), len(lines))
+    comments: list[str] = []
+    for width, height in profile.machine.thumbnails_px:
+        comments += thumbnail(png_bytes(parts_together(decomposition, profile, (width, height))), width, height)
+    return lines[:head] + Lines.of(comments) + lines[head:]
+
+
+def thumbnail(png: bytes, width: int, height: int) -> list[str]:
+    """One picture's comment lines."""
+    text = b64encode(png).decode("ascii")
+    rows = [text[k : k + ROW] for k in range(0, len(text), ROW)]
+    return [f"; thumbnail begin {width}x{height} {len(text)}", *(f"; {row}" for row in rows), "; thumbnail end"]

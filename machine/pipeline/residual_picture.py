@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image as Pillow
 from PIL import ImageDraw, ImageFont
 
-from machine.pipeline.pictures.raster import Image
+from machine.pipeline.raster import Image
 from machine.setup.calibration.fit import Calibration
 from machine.view.parts import part_colours
 from mdp.pose import Pose

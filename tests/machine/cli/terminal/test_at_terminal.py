@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from machine.cli.at_terminal import KEYS, ScreenState, render, status_line
+from machine.cli.terminal.at_terminal import KEYS, ScreenState, render, status_line
 from machine.cli.terminal.keys import MORE
 from machine.link.print_state import PrintStatus
 from machine.link.protocol.events import Temperature

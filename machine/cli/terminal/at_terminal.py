@@ -1,4 +1,4 @@
-"""At terminal: the person who attends a print at a terminal: told and asked on stderr, with a screen and keys or plain lines.
+"""At terminal: the person who attends a print at a terminal: asked on stderr, with a screen and keys or plain lines.
 
 The screen shows part, layer, pose, heat, time left, the printer's words, and keys.
 """
@@ -19,11 +19,11 @@ from rich.text import Text
 
 from machine.cli.terminal.interrupts import calling, interrupting, stopping
 from machine.cli.terminal.keys import Keyboard, can_type, typing
-from machine.cli.terminal.plain import plain_line, show
-from machine.cli.terminal.progress import PlainLines, is_terminal, reporting, say, say_lines
+from machine.cli.terminal.progress import is_terminal
 from machine.link.pending_commands import Control
 from machine.link.print_state import PrintState, PrintStatus
-from machine.printing.job import End, Kind, Scene, Show
+from machine.notices import PlainLines, plain_line, reporting, say, say_lines
+from machine.printing.job import End, Scene, Show
 from machine.quantities import duration
 from profiles.errors import JournalError
 
@@ -47,12 +47,8 @@ class AtTerminal:
         self.follow: Callable[[PrintStatus], None] = lambda status: None
         self._yes, self._board = yes, Keyboard(self.commands)
 
-    def note(self, text: str, kind: Kind = Kind.LINE) -> None:
-        """Results on stdout, all else on stderr; what a check has found to be right is not told."""
-        if kind is Kind.RESULT:
-            show(f"{text}\n")
-        elif kind is not Kind.PASSED:
-            say(text, forced=kind is Kind.FORCED)
+    def passed(self, sentence: str) -> None:
+        """What is as it must be is not told."""
 
     def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
         """Ask on stderr. Raises JournalError where nobody can answer, or look."""

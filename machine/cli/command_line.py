@@ -1,0 +1,337 @@
+"""The commands as typer reads them: which options each has, and which command it runs. Heavy imports stay inside the commands."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from machine.cli.terminal import options, requests
+from machine.cli.terminal.option_groups import option, with_option_groups
+from machine.pipeline.requests import Outputs, PrintRequest
+
+
+def decompose(
+    model: options.Model, search: options.FileOptions, asked: requests.DecomposeOptions, given: options.ProfileOptions
+) -> int:
+    """Cut a model into parts, each with its own printing direction."""
+    options.check_model(model)
+    from machine.cli.commands.decompose import decompose
+
+    return decompose(asked.request(model, search, given))
+
+
+def export(
+    models: options.Models,
+    out: Annotated[Path, option("-o --out OUT.gcode", "G-code file to write; - for standard output")],
+    program: options.ProgramOptions,
+    asked: requests.ExportOptions,
+    given: options.ProfileOptions,
+) -> int:
+    """Write the G-code of one or several models, dry-run first."""
+    for model in dict.fromkeys(options.named_models(models)):
+        options.check_model(model)
+    from machine.cli.commands.export import export
+
+    outputs = Outputs(gcode=out, json=asked.json, html=asked.html, svg=asked.svg, layer=asked.layer)
+    return export(options.program_request(models, program, given, outputs=outputs, compare=asked.compare, force=asked.force))
+
+
+def simulate(
+    models: options.ModelsOrGcode,
+    program: options.ProgramOptions,
+    json: options.JsonFile = None,
+    reference: Annotated[str | None, option("--model MODEL", "hold a G-code file's plastic against this model")] = None,
+    html: options.HtmlFile = None,
+    baud: Annotated[int | None, option("--baud N", "find moves that a line of N bits a second brings too late")] = None,
+    *,
+    given: options.ProfileOptions,
+) -> int:
+    """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
+    from machine.cli.commands.simulate import simulate
+
+    return simulate(options.program_request(models, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
+
+
+def view(
+    models: options.ModelsOrGcode,
+    program: options.ProgramOptions,
+    out: Annotated[Path | None, option("-o --out VIEW.html", "page to write; else named after the model, here")] = None,
+    *,
+    open_: Annotated[bool, option("--open", "show the page in the browser")] = False,
+    compare: Annotated[bool, option("--compare", "tell also time and material printed in one part")] = False,
+    given: options.ProfileOptions,
+) -> int:
+    """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
+    from machine.cli.commands.view import view
+
+    return view(options.program_request(models, program, given, outputs=Outputs(html=out), compare=compare), open_)
+
+
+def edit(asked: requests.EditRequest) -> int:
+    """Open the workbench: a page to look, cut, slice and print. It is on this computer alone, but with --lan; Ctrl-C ends it."""
+    from machine.cli.commands.edit import edit
+
+    return edit(asked)
+
+
+def save(
+    model: options.Model,
+    program: options.ProgramOptions,
+    out: Annotated[Path, option("-o --out NAME.3mf", "project file to write")],
+    given: options.ProfileOptions,
+) -> int:
+    """Write a project: one 3MF with model, plan and profiles. Every command takes it, and other slicers open it."""
+    options.check_model(model)
+    from machine.cli.commands.save import save
+
+    return save(options.program_request([model], program, given), out)
+
+
+def batch(asked: requests.BatchRequest) -> int:
+    """Export every model of a folder, on all cores or many machines. Or decompose or estimate them; started again it goes on."""
+    from machine.cli.commands.batch import batch
+
+    return batch(asked)
+
+
+def print_(
+    models: options.ModelsOrGcode,
+    port: options.PortOrSim,
+    program: options.ProgramOptions,
+    asked: requests.PrintOptions,
+    given: options.ProfileOptions,
+) -> int:
+    """Print models or a G-code file on a printer or a simulated one.
+
+    PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT, or a print server: octoprint:HOST, moonraker:HOST,
+    duet:HOST, to which the program is handed over first. The printer is asked who it is before anything moves.
+    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
+    """
+    from machine.cli.commands.print import print_model
+
+    return print_model(options.program_request(models, program, given, force=asked.force), asked.at(port))
+
+
+def send(
+    file: Annotated[str, typer.Argument(metavar="FILE.gcode", help="a G-code file")],
+    to: Annotated[str, option("--to SERVER", "octoprint:HOST, moonraker:HOST or duet:HOST; HOST may be http(s)://HOST:PORT")],
+    *,
+    start: Annotated[bool, option("--start", "print it at once; print --port SERVER follows it, too")] = False,
+    log: options.LogFile = None,
+    force: options.ForceAll = False,
+    given: options.ProfileOptions,
+) -> int:
+    """Hand a G-code file to a print server. It is dry-run and held against machine and server first.
+
+    A key or password stands in servers.toml in the settings folder (see docs/network.md) or in the variable TILTPRINT_SERVER_KEY.
+    """
+    from machine.cli.commands.print import send
+
+    return send(options.model_request(file, options.SearchOptions(), given, force=force), to, start=start, log=log)
+
+
+def follow(
+    server: Annotated[str, typer.Argument(metavar="SERVER", help="octoprint:HOST, moonraker:HOST or duet:HOST")],
+    log: options.LogFile = None,
+) -> int:
+    """Follow and command what a print server prints already.
+
+    Keys at a terminal are those of print; l, or Ctrl-C and no answer, leaves it printing. Ctrl-C twice cancels.
+    """
+    from machine.cli.commands.print import follow
+
+    return follow(server, log)
+
+
+def resume(asked: requests.ResumeOptions) -> int:
+    """Go on with a print after a power cut, a crash or a pulled plug."""
+    from machine.cli.commands.resume import list_resumable, resume
+    from machine.link.journal import read_journal
+    from profiles.errors import JournalError
+
+    if asked.journal is None:
+        return list_resumable()
+    if asked.port is None:
+        read_journal(asked.journal)  # report an unreadable one first
+        raise JournalError(f"journal {asked.journal}: at which port is the printer? --port PORT is expected")
+    named = None if asked.machine is None else options.machine_profile(asked.machine)
+    return resume(asked.journal, asked.at(asked.port), named, asked.yes)
+
+
+def ports(
+    baud: Annotated[int, option("--baud N", "rate tried first, bits a second")] = PrintRequest.baud,
+    *,
+    json: Annotated[bool, option("--json", "the list as JSON")] = False,
+    ask: Annotated[
+        bool, option("--ask/--no-ask", "open each port and ask what is there; many boards restart when opened")
+    ] = True,
+) -> int:
+    """List serial ports and what answers at each. It tells firmware, axes and rate, or why nothing answers."""
+    from machine.cli.commands.ports import ports
+
+    return ports(baud, json, ask)
+
+
+def console(asked: requests.ConsoleRequest) -> int:
+    """Talk to a printer. Lines typed, or piped in, are sent; its answers are shown.
+
+    /help tells what else can be typed; Ctrl-D leaves. Heaters that are on are then switched off, after a question at a terminal.
+    """
+    from machine.cli.commands.console import console
+
+    return console(asked, asked.given.profile().machine)
+
+
+def simulator(asked: requests.SimulatorRequest) -> int:
+    """A simulated printer for any host to print on; Ctrl-C ends it."""
+    from machine.cli.commands.simulator import simulate_printer
+
+    return simulate_printer(asked)
+
+
+def calibrate(asked: requests.CalibrationRequest) -> int:
+    """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
+
+    With --port the machine goes from touch to touch and you take the tip onto the mark by keys; with --probe it measures a ball
+    by itself. Without a port a terminal asks for the touches one by one; with --printed they are read off a printed piece.
+    """
+    from machine.cli.commands.measuring.calibrate import ask_for_touches, evaluate_sheet, write_program
+
+    out, measured, probing = asked.out, asked.measured, asked.probing
+    if asked.printed:
+        if out is not None or measured is not None or probing.probe or probing.at is not None or asked.directions:
+            raise typer.BadParameter("--printed is a way of its own: -o, --measured, --port and --directions are for touches")
+        return _read_off(asked)
+    if asked.readings or asked.html is not None:
+        raise typer.BadParameter("--readings and --html go with --printed FILE.gcode")
+    if probing.probe:
+        from machine.cli.commands.measuring.calibrate_probe import probe_axes
+
+        if out is not None or measured is not None:
+            raise typer.BadParameter("--probe measures by itself: -o and --measured are for touches by hand")
+        return probe_axes(asked, probing.request(), asked.given.profile())
+    if probing.png is not None:
+        raise typer.BadParameter("--png goes with --probe")
+    if probing.at is not None:
+        from machine.cli.commands.measuring.calibrate_by_keys import touch_by_keys
+
+        if out is not None or measured is not None:
+            raise typer.BadParameter(
+                "--port takes the machine to the touches: -o and --measured are for a program sent otherwise"
+            )
+        return touch_by_keys(asked, probing.at, asked.given.profile())
+    if out is not None and measured is None:
+        return write_program(asked, asked.given.profile(), out)
+    if measured is not None and out is None:
+        return evaluate_sheet(asked, measured)
+    if out is None and _is_at_terminal():
+        return ask_for_touches(asked)
+    raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+
+
+def _read_off(asked: requests.CalibrationRequest) -> int:
+    """From pieces that were printed: by a page, by readings, or by what a terminal asks for."""
+    from machine.cli.commands.measuring.calibrate_piece import ask_for_readings, correct_axes, write_page
+
+    if asked.html is not None and not asked.readings:
+        return write_page(asked, asked.printed, asked.html)
+    if asked.readings and asked.html is None:
+        return correct_axes(asked, asked.printed, asked.readings)
+    if asked.html is None and len(asked.printed) == 1 and _is_at_terminal():
+        return ask_for_readings(asked, asked.printed[0])
+    raise typer.BadParameter("--printed goes with one of --readings TEXT and --html FILE; in a terminal with neither")
+
+
+def _is_at_terminal() -> bool:
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def coupon(asked: requests.CouponRequest) -> int:
+    """Measure how joints hold on your machine. Twelve bars with different joints are printed at once, and broken by hand.
+
+    Without -o and --measured a terminal asks for the loads at which the bars broke.
+    """
+    from machine.cli.commands.measuring.coupon import ask_for_loads, evaluate_sheet, write_program
+
+    out, measured = asked.out, asked.measured
+    if asked.report is not None and measured is None:
+        raise typer.BadParameter(f"--report {asked.report} goes with --measured FILE, whose loads it tells")
+    for name, file in (("--html", asked.html), ("--png", asked.png)):
+        if file is not None and out is None:
+            raise typer.BadParameter(f"{name} {file} goes with -o OUT.gcode, whose bars it shows")
+    if out is not None and measured is None:
+        return write_program(asked, out)
+    if measured is not None and out is None:
+        return evaluate_sheet(asked, measured)
+    if out is None and _is_at_terminal():
+        return ask_for_loads(asked)
+    raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+
+
+ProfileName = Annotated[str, typer.Argument(metavar="NAME", help="name of a profile, or a .toml file")]
+
+
+def list_() -> int:
+    """The shipped profiles and your own."""
+    from machine.cli.commands.profiles.listing import list_profiles
+
+    return list_profiles()
+
+
+def show(
+    name: ProfileName,
+    json: Annotated[bool, option("--json", "resolved values as JSON")] = False,
+    settings: options.Settings = (),
+) -> int:
+    """Resolved values of one profile, with what each key means."""
+    from machine.cli.commands.profiles.listing import show
+
+    return show(name, json, settings)
+
+
+def save_profile(
+    name: ProfileName,
+    out: Annotated[Path, option("-o --out FILE.toml", "profile to write, for --machine and the like")],
+    settings: options.Settings = (),
+) -> int:
+    """A profile with changes of yours as a profile of your own, that says what differs and inherits the rest."""
+    from machine.cli.commands.profiles.listing import save
+
+    return save(name, settings, out)
+
+
+def import_(asked: requests.ImportRequest) -> int:
+    """Another slicer's settings as a material and a process of yours, with what was taken, worked out and left."""
+    from machine.cli.commands.profiles.importing import import_profiles
+
+    return import_profiles(asked)
+
+
+def detect(asked: requests.DetectRequest) -> int:
+    """A machine profile by what the printer's firmware tells of itself. Nothing moves: only questions are asked."""
+    from machine.cli.commands.profiles.detection import detect
+
+    if (asked.port is None) == (asked.file is None):
+        raise typer.BadParameter("one of FILE and --port PORT is expected")
+    return detect(asked)
+
+
+def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="a .toml profile")]) -> int:
+    """All problems of a profile file at once; exit 1 when there are any."""
+    from machine.cli.commands.profiles.listing import check
+
+    return check(file)
+
+
+def _named(*commands: Callable[..., int]) -> dict[str, Callable[..., int]]:
+    return {command.__name__.rstrip("_"): with_option_groups(command) for command in commands}
+
+
+COMMANDS = _named(
+    *(decompose, export, simulate, view, edit, save, batch),
+    *(print_, send, follow, resume, ports, console, simulator),
+    *(calibrate, coupon),
+)
+PROFILES_COMMANDS = _named(list_, show) | {"save": with_option_groups(save_profile)} | _named(import_, detect, check)

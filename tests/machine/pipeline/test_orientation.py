@@ -1,0 +1,56 @@
+"""How a model was laid down is told with what that is better by, and whether the plate holds it."""
+
+from dataclasses import replace
+
+import manifold3d as m3
+import numpy as np
+
+from machine.pipeline.orientation import orientation_in_words, standing_in_words
+from mdp.cut import mesh_of
+from mdp.decomposition import FrontRow
+from mdp.directions.orientation import best_orientation, facet_orientations
+from mdp.plane import Plane
+from mdp.search.orient import Oriented
+from profiles.profile import load
+from tests.machine.cli.terminal.test_report import alone
+from tests.shapes import tee
+
+PLANES = (Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0))
+WHOLE = FrontRow((), 300.0, 0.0, 425.4, stairs_mm2=125.4, time_s=3723.0, filament_mm=4040.0)
+CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, stairs_mm2=6.0, time_s=3600.0, filament_mm=3900.0)
+
+
+def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> None:
+    oriented = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
+    side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
+    assert orientation_in_words(Oriented(side, oriented, 900.0, CUT, upright, True, True), "--as-is keeps it so") == (
+        "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands in 3 parts with"
+        " 78 mm2 of scars in 1h 0m; --as-is keeps it so",
+    )
+    assert orientation_in_words(Oriented(side, oriented, 900.0, None, upright, True, True), "--as-is keeps it so") == (
+        "it is laid down on its front (turned 90 about x): in one piece with 0 mm2 of scars in 30m, as it stands 300 mm2 hang"
+        " over; --as-is keeps it so",
+    )
+    assert orientation_in_words(Oriented(None, oriented, 900.0, WHOLE, upright, True, True), "--as-is keeps it so") == ()
+
+
+def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
+    oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, facet_orientations(tee(), 45.0)[0], False, False)
+    warning = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
+    assert orientation_in_words(oriented, "--as-is keeps it so") == (warning,)
+    turned = replace(oriented, orientation=best_orientation(tee(), 45.0))
+    assert orientation_in_words(turned, "--as-is keeps it so")[1:] == (warning,)
+
+
+def test_a_model_that_is_turned_because_the_plate_would_not_hold_it_is_told_so() -> None:
+    laid = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
+    side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
+    (told,) = orientation_in_words(Oriented(side, laid, 900.0, None, upright, True, False), "--as-is keeps it so")
+    assert ", as it stands the plate would hardly hold it; --as-is" in told
+
+
+def test_a_model_that_is_not_turned_is_tested_on_the_plate() -> None:
+    cone = m3.Manifold.cylinder(40.0, 0.01, 12.0, 64)
+    assert len(standing_in_words(mesh_of(cone), load())) == 1
+    assert standing_in_words(mesh_of(cone.rotate((180.0, 0.0, 0.0)).translate((0.0, 0.0, 40.0))), load()) == ()
+    assert standing_in_words(mesh_of(cone), load(settings=["search.pedestal_mm=5"]))  # which holds no more than a plate
