@@ -147,7 +147,7 @@ def follow(
 
 def resume(asked: requests.ResumeOptions) -> int:
     """Go on with a print after a power cut, a crash or a pulled plug."""
-    from machine.cli.commands.resume import list_resumable, resume
+    from machine.cli.commands.print import list_resumable, resume
     from machine.link.journal import read_journal
     from profiles.errors import JournalError
 

@@ -17,8 +17,7 @@ from machine.link.pending_commands import Control
 from machine.link.print_state import PrintState, PrintStatus
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import Destination
-from machine.printing.messages import PrinterMessages
-from machine.printing.serial_log import SerialLog
+from machine.printing.serial_log import PrinterMessages, SerialLog
 from machine.program import Program
 from profiles.machine import Machine
 from profiles.profile import Profile

@@ -1,22 +1,25 @@
-"""The commands print, send and follow: a program on a printer or a print server, and what a server prints already."""
+"""The commands print, send, follow and resume: a program on a printer or a server, what prints there, what was cut off."""
 
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 
 from machine.cli.terminal.at_terminal import AtTerminal, exit_code
 from machine.cli.terminal.report import print_table
-from machine.notices import say, show
+from machine.notices import plain_line, say, show
 from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
 from machine.pipeline.output import check_writable
 from machine.pipeline.programs import LoadedProgram, load_program
 from machine.pipeline.requests import ModelRequest, PrintRequest
 from machine.printing.destination import Destination, Server, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
-from machine.printing.journal_folder import check_new_journal
+from machine.printing.journal_folder import check_new_journal, resumable_journals
 from machine.printing.printers import check_print, open_printer, open_server_printer
+from machine.printing.resumption import print_rest, read_resumption, rest_of
 from machine.printing.server_print import file_name, running_print
 from machine.view.serving.watch_page import serve_watch_page
-from profiles.errors import GcodeError, ServerError
+from profiles.errors import GcodeError, JournalError, ServerError
+from profiles.profile import Profile
 
 
 def print_model(request: ModelRequest, printing: PrintRequest) -> int:
@@ -58,6 +61,38 @@ def follow(address: str, log: Path | None = None) -> int:
         now = running_print(printer.server)
         say(f"it is {now.state} {file_name(now)}")
         return exit_code(printer.follow(now))
+
+
+def list_resumable() -> int:
+    """The prints that can be gone on with, the newest first, on stdout; 0 also when there is none."""
+    journals = resumable_journals()
+    if not journals:
+        say("no print of this computer was cut off or cancelled")
+    for journal in journals:
+        what = plain_line(f"{journal.name} on {journal.machine}, up to line {journal.line}")
+        show(f"{plain_line(str(journal.path))}\n    {what}, {datetime.fromtimestamp(journal.written_s):%Y-%m-%d %H:%M}\n")
+    return 0
+
+
+def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, yes: bool = False) -> int:
+    """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
+
+    named: the profile whose machine the user has named. yes: go on without asking, unless the height of the tip is in doubt or
+    the newest records may be missing. The journal of the request is a new one. Raises JournalError and other UserErrors.
+    """
+    destination = parse_destination(printing.port, printing.baud, printing.sim_speed)
+    job = PrintJob(destination, Does.RESUME, profile=named, cut_off=journal, log=printing.log, journal=printing.journal)
+    cut_off, person = read_resumption(job), AtTerminal(yes)
+    for sentence in cut_off.sentences():
+        say(sentence)
+    if yes and not cut_off.story.computer_ran_on:
+        raise JournalError(f"journal {journal}: a person must answer that question: resume at a terminal, without --yes")
+    rest = rest_of(cut_off)
+    with serve_watch_page(rest, printing.watch_port, person.commands, printing.browser) as watched:
+        person.follow = watched.follow
+        end = print_rest(cut_off, rest, job, person)
+        watched.end(end.state)
+    return exit_code(end)
 
 
 def _job(

@@ -33,6 +33,7 @@ class Moonraker(PrintServer):
     """PrintServer of a Moonraker."""
 
     key_header = "X-Api-Key"
+    tells_percents = True
 
     def __init__(self, http: HttpSession) -> None:
         super().__init__(http)

@@ -28,7 +28,6 @@ class OctoPrint(PrintServer):
     """PrintServer of an OctoPrint."""
 
     key_header = "X-Api-Key"
-    tells_percents = False
 
     def greet(self) -> ServerIdentity:
         """Its version; what it drives is not told by the API."""

@@ -31,7 +31,7 @@ class PrintServer(ABC):
     """
 
     key_header = ""
-    tells_percents = True  # whether status() tells feed and flow
+    tells_percents = False  # whether status() tells feed and flow
 
     def __init__(self, http: HttpSession) -> None:
         self._http, self.name = http, http.name

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from machine.cli.cli import main
-from machine.cli.commands.resume import list_resumable
+from machine.cli.commands.print import list_resumable
 from machine.gcode.lines import GcodeFile
 from machine.link.journal import BLOCK_BYTES, FORMAT, SLOTS
 from machine.printing.destination import SerialPort

@@ -218,7 +218,7 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.workbench.printing.job_state import JobState
 from mdp.kernels.workers import frame, read_frames
 for state in (PrintState.PRINTING, PrintState.LEFT):
-    told = JobState(state, server=True, progress=PrintStatus(), told_s=time.time(), sentence="it goes on")
+    told = JobState(state, "hour", server=True, progress=PrintStatus(), told_s=time.time(), sentence="it goes on")
     sys.stdout.buffer.write(frame(told))
     sys.stdout.flush()
     for _ in zip(range(2 if state == WAITS_FOR else 0), read_frames(sys.stdin.buffer)):
