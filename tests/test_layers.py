@@ -90,6 +90,8 @@ def offences(path: str, source: str) -> list[str]:
             wrong["layer", top] = f"{path} imports {module}, which lies to the right of {layer}"
         if f"{module.replace('.', '/')}/".startswith(FRONT_ENDS) and not path.startswith(FRONT_ENDS):
             wrong["front end", top] = f"{path} imports {module}: only the two front ends know each other"
+        if module.startswith("machine.view") and path.startswith("machine/printing/"):
+            wrong["view", top] = f"{path} imports {module}: the page that watches a print is handed in"
         if top in CONFINED and not path.startswith(CONFINED[top]):
             wrong["confined", top] = f"{path} imports {module}, which is confined to {CONFINED[top] or 'no package'}"
     return list(wrong.values())
@@ -126,6 +128,7 @@ def test_a_module_imports_only_from_its_left_and_third_parties_only_where_they_b
         ("slicer/walls/a.py", "import numba, shapely, manifold3d", 3),
         ("machine/pipeline/a.py", "from machine.cli.terminal import say", 1),
         ("machine/workbench/a.py", "from machine.cli.terminal import say", 0),
+        ("machine/printing/a.py", "from machine.view.page import print_page", 1),
     ],
 )
 def test_the_check_finds_what_is_forbidden_and_only_that(path: str, source: str, count: int) -> None:

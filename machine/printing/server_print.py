@@ -1,13 +1,13 @@
 """Server print: a program handed over to a print server, started there and followed to its end; one that runs there followed."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from time import monotonic
 
-from machine.dryrun.timeline import Timeline
+from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.print_state import PrintState, PrintStatus, last_known
@@ -122,7 +122,7 @@ class ServerPrinter:
         except CancelledError:
             return NOT_BEGUN
         say(LIMITS)
-        known = KnownProgress(upload, loaded.program.lines, Timeline(loaded.program.run))
+        known = ReportedProgress(upload, loaded)
         with _shown(person, self._scene(), known) as on_status:
             state = follow_print(
                 server, file, len(upload.content), on_status=on_status, control=person.commands, left=person.left
@@ -213,10 +213,14 @@ def _report_end(state: PrintState, file: str, name: str, server: str, progress: 
 
 
 class ReportedProgress:
-    """What a server tells of a print whose program is not known here."""
+    """What a server tells of a print. Of a program that is known here, part and layer are those of the place up to which the
+    server has read the file."""
 
-    def __init__(self) -> None:
+    def __init__(self, upload: GcodeUpload | None = None, loaded: LoadedProgram | None = None) -> None:
         self.line, self.elapsed_s = 0, 0.0
+        self._upload, self._position = upload, ProgramPosition()
+        self._lines: Sequence[str] = () if loaded is None else loaded.program.lines
+        self._timeline = UnknownTimeline() if loaded is None else Timeline(loaded.program.run)
         self._last_status: PrintStatus | None = None
         self._last_status_s = monotonic()
 
@@ -226,33 +230,24 @@ class ReportedProgress:
         return "" if self._last_status is None else last_known(self._last_status.temperature, monotonic() - self._last_status_s)
 
     def at(self, status: PrintStatus, message: str) -> PrintStatus:
-        """The status with how old it is. message: goes before the server's own."""
+        """The status with how old it is, and what the program tells of the line that it has reached. message: goes before the
+        server's own."""
         if status is not self._last_status:  # a server that does not answer leaves what it told last
             self._last_status, self._last_status_s = status, monotonic()
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s)
         heat_age_s = monotonic() - self._last_status_s
-        return replace(status, elapsed_s=self.elapsed_s, heat_age_s=heat_age_s, message=message or status.message)
-
-
-class KnownProgress(ReportedProgress):
-    """What a server tells of a known program; part and layer are those of the place up to which it has read the file."""
-
-    def __init__(self, upload: GcodeUpload, lines: Sequence[str], timeline: Timeline) -> None:
-        super().__init__()
-        self._line_at: Callable[[int], int] = upload.line_at
-        self._lines, self._timeline, self._position = lines, timeline, ProgramPosition()
-
-    def at(self, status: PrintStatus, message: str) -> PrintStatus:
-        """The status with what the program tells of the line that it has reached."""
-        progress, position, timeline = super().at(status, message), self._position, self._timeline
-        self._read_to(self._line_at(status.bytes_read or 0))
+        status = replace(status, elapsed_s=self.elapsed_s, heat_age_s=heat_age_s, message=message or status.message)
+        if self._upload is None:
+            return status
+        self._read_to(self._upload.line_at(status.bytes_read or 0))
+        position, timeline = self._position, self._timeline
         return replace(
-            progress,
+            status,
             sent=self.line,
             acknowledged=self.line,
             total=len(self._lines),
             file_line=self.line,
-            left_s=timeline.remaining_s(self.line) * 100.0 / progress.feed_percent,
+            left_s=timeline.remaining_s(self.line) * 100.0 / status.feed_percent,
             share=position.share(self.line, len(self._lines)),
             part=position.part,
             parts=position.parts,

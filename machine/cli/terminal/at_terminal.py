@@ -5,11 +5,10 @@ The screen shows part, layer, pose, heat, time left, the printer's words, and ke
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import replace
 from datetime import datetime, timedelta
 from threading import Event as Flag
-from typing import Self
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -82,7 +81,7 @@ class AtTerminal:
             def tell(status: PrintStatus | None) -> None:
                 nonlocal draw
                 if draw is None:
-                    draw = stack.enter_context(_drawn(scene, board))
+                    draw = stack.enter_context(_screen(scene, board) if is_terminal() else _status_lines())
                 if status is not None:
                     status = replace(status, message=plain_line(status.message))
                     draw(status)
@@ -107,35 +106,45 @@ def _answer(prompt: str) -> str:
 
 
 @contextmanager
-def _drawn(scene: Scene, board: Keyboard) -> Iterator[Callable[[PrintStatus], None]]:
-    if not is_terminal():
-        yield _StatusLines()
-        return
-    with ExitStack() as stack:
-        keys = can_type()
-        if keys:
-            stack.enter_context(typing(board.press))
-        screen = stack.enter_context(Screen(scene, lambda: board.hint, keys))
-
-        def follow(status: PrintStatus) -> None:
-            board.follow(status)
-            screen.tell(status)
-
-        yield follow
-
-
-class _StatusLines:
+def _status_lines() -> Iterator[Callable[[PrintStatus], None]]:
     """Plain lines: one every few seconds, and at once when something has changed."""
+    lines, last, warned = PlainLines(), (PrintState.PRINTING, ""), ""
 
-    def __init__(self) -> None:
-        self._lines, self._last, self._warning = PlainLines(), (PrintState.PRINTING, ""), ""
-
-    def __call__(self, status: PrintStatus) -> None:
-        if status.warning != self._warning:
-            self._warning = status.warning
+    def tell(status: PrintStatus) -> None:
+        nonlocal last, warned
+        if status.warning != warned:
+            warned = status.warning
             say(status.warning)
-        before, self._last = self._last, (status.state, status.message)
-        self._lines.show(status_line(status), at_once=before != self._last)
+        before, last = last, (status.state, status.message)
+        lines.show(status_line(status), at_once=before != last)
+
+    yield tell
+
+
+@contextmanager
+def _screen(scene: Scene, board: Keyboard) -> Iterator[Callable[[PrintStatus], None]]:
+    """The screen with keys; the terminal is as before afterwards. One that has gone away (a closed window) ends the drawing, not
+    the print."""
+    keys, gone = can_type(), False
+    live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
+
+    def tell(status: PrintStatus) -> None:
+        nonlocal gone
+        board.follow(status)
+        scene.messages.add(status.message)
+        if not gone:
+            try:
+                live.update(render(scene, status, board.hint, keys, datetime.now()), refresh=True)
+            except OSError:
+                gone = True
+
+    with typing(board.press) if keys else nullcontext():
+        live.start()
+        try:
+            yield tell
+        finally:
+            with suppress(OSError):
+                live.stop()
 
 
 def status_line(status: PrintStatus) -> str:
@@ -156,85 +165,69 @@ def status_line(status: PrintStatus) -> str:
     return f"{status.state}: " + ", ".join(phrases) + (f"; {status.message}" if status.message else "")
 
 
-@dataclass(frozen=True)
-class ScreenState:
-    """What stands on the screen. title: what is printed where; words: the printer's last ones; hint: a question or an explanation
-    in place of the keys; beginning: what stands there as long as there is no part."""
-
-    title: str
-    progress: PrintStatus
-    words: tuple[str, ...] = ()
-    hint: str = ""
-    keys: bool = True
-    beginning: str = "starting"
-
-
-def render(state: ScreenState, now: datetime) -> RenderableType:
-    """The whole screen at a moment."""
-    progress = state.progress
-    lines = [_head(state), _position(state), _heat(progress), _bar(progress), _times(progress, now)]
-    if progress.warning:
-        lines.append(Text(plain_line(progress.warning), style="bold red"))
-    lines += _words(state.words)
-    if state.hint or state.keys:
-        lines.append(Text(plain_line(state.hint or KEYS), style="bold yellow" if state.hint else "dim"))
+def render(scene: Scene, status: PrintStatus, hint: str, keys: bool, now: datetime) -> RenderableType:
+    """The whole screen at a moment. hint: a question or an explanation in place of the keys, which are there if there are any."""
+    lines = [_head(scene.title, status), _position(scene, status), _heat(status), _bar(status), _times(status, now)]
+    if status.warning:
+        lines.append(Text(plain_line(status.warning), style="bold red"))
+    lines += _words(tuple(scene.messages.last)[-MOST_WORDS:])
+    if hint or keys:
+        lines.append(Text(plain_line(hint or KEYS), style="bold yellow" if hint else "dim"))
     return Group(*lines)
 
 
-def _head(state: ScreenState) -> RenderableType:
+def _head(title: str, status: PrintStatus) -> RenderableType:
     row = Table.grid(expand=True)
     row.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
     row.add_column(justify="right", no_wrap=True)
-    shown = state.progress.state
-    row.add_row(Text(plain_line(state.title), style="bold"), Text(shown, style=f"bold {COLOURS.get(shown, 'red')}"))
+    row.add_row(Text(plain_line(title), style="bold"), Text(status.state, style=f"bold {COLOURS.get(status.state, 'red')}"))
     return row
 
 
-def _position(state: ScreenState) -> Text:
-    progress = state.progress
+def _position(scene: Scene, status: PrintStatus) -> Text:
     phrases = []
-    if progress.part is not None:
-        phrases.append(f"part {progress.part}{_of(progress.parts)}")
-    if progress.layer is not None:
-        phrases.append(f"layer {progress.layer}{_of(progress.layers)}")
-    turned = zip(("tilt", "turn"), list(progress.at.items())[3:], strict=False)
+    if status.part is not None:
+        phrases.append(f"part {status.part}{_of(status.parts)}")
+    if status.layer is not None:
+        phrases.append(f"layer {status.layer}{_of(status.layers)}")
+    turned = zip(("tilt", "turn"), list(status.at.items())[3:], strict=False)
     phrases += [f"{axis} {letter} {value:.1f} deg" for axis, (letter, value) in turned]
-    return _phrases_line(phrases or [state.beginning])
+    return _phrases_line(phrases or [scene.beginning])
 
 
 def _of(count: int | None) -> str:
     return f" of {count}" if count else ""
 
 
-def _heat(progress: PrintStatus) -> Text:
-    heat = progress.temperature
-    old = [f"as last known {progress.heat_age_s:.0f} s ago:"] if progress.heat_is_old and heat.words else []
+def _heat(status: PrintStatus) -> Text:
+    heat = status.temperature
+    old = [f"as last known {status.heat_age_s:.0f} s ago:"] if status.heat_is_old and heat.words else []
     phrases = [
         f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " deg C"
         for name, now_c, target_c in (("nozzle", heat.nozzle_c, heat.nozzle_target_c), ("bed", heat.bed_c, heat.bed_target_c))
         if now_c is not None
     ]
-    overrides = [f"feed {progress.feed_percent:.0f} %", f"flow {progress.flow_percent:.0f} %"]
+    overrides = [f"feed {status.feed_percent:.0f} %", f"flow {status.flow_percent:.0f} %"]
     return _phrases_line([*old, *phrases, *overrides])
 
 
-def _bar(progress: PrintStatus) -> RenderableType:
+def _bar(status: PrintStatus) -> RenderableType:
     row = Table.grid(expand=True, padding=(0, 1))
     row.add_column(ratio=1)
     row.add_column(justify="right", no_wrap=True)
-    share = progress.share
+    share = status.share
     row.add_row(ProgressBar(total=1.0, completed=share or 0.0), Text("" if share is None else f"{100 * share:.0f} %"))
     return row
 
 
-def _times(progress: PrintStatus, now: datetime) -> Text:
-    phrases = [f"{duration(progress.elapsed_s)} so far"]
-    if progress.left_s is not None:
-        end = now + timedelta(seconds=progress.left_s)
+def _times(status: PrintStatus, now: datetime) -> Text:
+    phrases = [f"{duration(status.elapsed_s)} so far"]
+    if status.left_s is not None:
+        end = now + timedelta(seconds=status.left_s)
         day = "" if end.date() == now.date() else f"{end:%a %d %b} "
-        phrases += [f"{duration(progress.left_s)} left", f"done at {day}{end:%H:%M}"]
-    if progress.total is not None or progress.acknowledged:
-        phrases.append(f"line {progress.acknowledged}{_of(progress.total)}")
+        phrases += [f"{duration(status.left_s)} left", f"done at {day}{end:%H:%M}"]
+    if status.total is not None or status.acknowledged:
+        phrases.append(f"line {status.acknowledged}{_of(status.total)}")
     return _phrases_line(phrases)
 
 
@@ -245,38 +238,3 @@ def _words(words: tuple[str, ...]) -> list[Text]:
 
 def _phrases_line(phrases: list[str]) -> Text:
     return Text("   ".join(phrases), no_wrap=True, overflow="ellipsis")
-
-
-class Screen:
-    """`with Screen(...) as screen:` screen.tell(progress) redraws; the terminal is as before afterwards.
-
-    A terminal that has gone away (a closed window) ends the drawing, not the print.
-    """
-
-    def __init__(self, scene: Scene, hint: Callable[[], str], keys: bool) -> None:
-        self._scene, self._hint, self._keys = scene, hint, keys
-        self._live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
-        self._gone = False
-
-    def tell(self, status: PrintStatus) -> None:
-        """Draw where the print stands."""
-        if self._gone:
-            return
-        scene = self._scene
-        scene.messages.add(status.message)
-        words = tuple(scene.messages.last)[-MOST_WORDS:]
-        state = ScreenState(scene.title, status, words, self._hint(), self._keys, scene.beginning)
-        try:
-            self._live.update(render(state, datetime.now()), refresh=True)
-        except OSError:
-            self._gone = True
-
-    def __enter__(self) -> Self:
-        self._live.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        try:
-            self._live.stop()
-        except OSError:
-            return

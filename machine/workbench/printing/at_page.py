@@ -18,7 +18,7 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import Notice, plain_line
 from machine.printing.job import Scene, Show
 from machine.printing.serial_log import SerialLog
-from machine.workbench.printing.job_state import Check, JobState
+from machine.workbench.printing.job_state import JobState
 from mdp.kernels.workers import frame
 from profiles.errors import JournalError
 
@@ -95,7 +95,7 @@ class AtPage:
         self.commands, self.stop = Control(), Flag()
         self.agreed = False
         self.tell, self._cut_off = reporter.tell, cut_off
-        self._checks: tuple[Check, ...] = ()
+        self._checks: tuple[Notice, ...] = ()
         self._lines: deque[str] = deque(maxlen=LINES_KEPT)
         self._answers: SimpleQueue[bool] = SimpleQueue()
         self._gives_up, self._halts = Flag(), Flag()
@@ -129,16 +129,16 @@ class AtPage:
 
     def passed(self, sentence: str) -> None:
         """What a check has found."""
-        self._add(Check(plain_line(sentence)))
+        self._add(Notice(plain_line(sentence)))
 
     def hear_notice(self, notice: Notice) -> None:
         """What the program says; what --force goes past is a check."""
         if notice.forced:
-            self._add(Check(notice.text.rstrip(), forced=True))
+            self._add(Notice(notice.text.rstrip(), forced=True))
         self._lines.extend(line for line in notice.text.split("\n") if line.strip())
         self.tell(said=tuple(self._lines))
 
-    def _add(self, check: Check) -> None:
+    def _add(self, check: Notice) -> None:
         self._checks = (*self._checks, check)
         self.tell(checks=self._checks)
 

@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 from machine.cli.terminal.options import machine_profile
 from machine.link.pending_commands import Command as LinkCommand
@@ -27,13 +27,7 @@ LONGEST_PORT = 300  # letters
 
 
 Work = Coroutine[Any, Any, None]
-T = TypeVar("T")
-
-
-class OnBench(Protocol):
-    """Calls a function in the event loop of the benches."""
-
-    def __call__(self, function: Callable[[], T]) -> Awaitable[T]: ...
+OnBench = Callable[[Callable[[], Any]], Awaitable[Any]]  # calls a function in the event loop of the benches
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.findings import KnownFindings
 from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import Notice
 from machine.pipeline import compilers
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import Server
@@ -17,22 +18,14 @@ from profiles.profile import Profile
 
 
 @dataclass(frozen=True)
-class Check:
-    """What has been found before a print; forced: what speaks against it, which --force goes past."""
-
-    text: str
-    forced: bool = False
-
-
-@dataclass(frozen=True)
 class JobState:
     """A print as pages see it. resumes: the journal of the print whose rest it is; key: of the slices; starts: False where a
     print server only gets the file; server: whether a print server prints it.
 
     question: what a person is asked before it begins; log, journal: files; webcam: where its picture is; sentence: how it ended;
-    checks: what was found before; words: what the printer has said; said: what the program has; figures: of the program;
-    progress: the newest moment, told_s: when it was, seconds since 1970; forcible: force goes past why it was refused;
-    stop_given: an emergency stop was heard.
+    checks: what was found before, forced where it speaks against the print; words: what the printer has said; said: what the
+    program has; figures: of the program; progress: the newest moment, told_s: when it was, seconds since 1970; forcible: force
+    goes past why it was refused; stop_given: an emergency stop was heard.
     """
 
     state: PrintState = PrintState.CHECKING
@@ -49,7 +42,7 @@ class JobState:
     journal: str = ""
     webcam: str = ""
     sentence: str = ""
-    checks: tuple[Check, ...] = ()
+    checks: tuple[Notice, ...] = ()
     words: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
     figures: dict[str, Any] | None = None
@@ -62,7 +55,7 @@ class JobState:
         """The state for a page. over: whether nothing of it goes on; heat_s: since when the temperatures are known, seconds since
         1970, for the page goes on counting when nothing more comes."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        checks = [vars(check) for check in self.checks]
+        checks = [{"text": check.text, "forced": check.forced} for check in self.checks]
         progress = self.progress and self.progress.json() | {"heat_s": self.told_s - self.progress.heat_age_s}
         return values | {"checks": checks, "progress": progress, "over": self.state.is_over}
 

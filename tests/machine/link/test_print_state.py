@@ -6,6 +6,8 @@ import pytest
 
 from machine.link.print_state import OVER, TABLE, PrintState, PrintStatus, follows
 from machine.link.protocol.events import Temperature
+from machine.printing import server_print
+from machine.printing.server_print import ReportedProgress
 
 
 def test_every_state_has_a_row_and_can_be_reached_from_the_first() -> None:
@@ -33,3 +35,15 @@ def test_a_moment_is_told_to_a_page_as_it_is() -> None:
     assert (page["state"], page["file_line"], page["at"], page["nozzle_c"]) == ("paused", 7, {"X": 1.0}, 210.0)
     assert page["heat_is_old"]
     assert "temperature" not in page
+
+
+def test_the_temperatures_of_a_server_that_does_not_answer_grow_old(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 100.0
+    monkeypatch.setattr(server_print, "monotonic", lambda: now_s)
+    progress = ReportedProgress()
+    first, second = (PrintStatus(PrintState.PRINTING, temperature=Temperature(209.6, 210.0, 60.0, 60.0)) for _ in range(2))
+    assert progress.at(first, "").heat_age_s == 0.0
+    now_s += 20.0
+    assert (progress.at(first, "no answer").heat_age_s, progress.at(first, "no answer").heat_is_old) == (20.0, True)
+    assert progress.last_known == "; nozzle 210 deg C, bed 60 deg C as last known, 20 s before"
+    assert (progress.at(second, "").heat_age_s, progress.at(second, "").heat_is_old) == (0.0, False)

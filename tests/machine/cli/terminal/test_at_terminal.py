@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from machine.cli.terminal.at_terminal import KEYS, ScreenState, render, status_line
+from machine.cli.terminal.at_terminal import KEYS, render, status_line
 from machine.cli.terminal.keys import MORE
 from machine.link.print_state import PrintStatus
 from machine.link.protocol.events import Temperature
+from machine.printing.job import Scene
 from tests.machine.dryrun.test_timeline import TIMELINE
 
 NOON = datetime(2026, 11, 21, 12, 0, 0)
@@ -25,7 +26,9 @@ def lines(progress: PrintStatus, words: tuple[str, ...] = (), hint: str = "", ke
     """The screen as plain lines without the spaces at their ends."""
     console = Console(file=io.StringIO(), record=True, width=width, force_terminal=True, no_color=True)
     at = replace(progress, layers=TIMELINE.layers(progress.part), at=TIMELINE.at(progress.file_line))
-    console.print(render(ScreenState("tree.gcode to /dev/ttyACM0", at, words, hint, keys), NOON))
+    scene = Scene("tree.gcode to /dev/ttyACM0", None)  # type: ignore[arg-type]
+    scene.messages.last.extend(words)
+    console.print(render(scene, at, hint, keys, NOON))
     return [line.rstrip() for line in console.export_text().splitlines()]
 
 

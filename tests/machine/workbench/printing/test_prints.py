@@ -22,7 +22,7 @@ import pytest
 from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
-from machine.notices import FrontEnd, notices_to, say
+from machine.notices import FrontEnd, Notice, notices_to, say
 from machine.printing.checks import check
 from machine.printing.destination import parse_destination
 from machine.printing.job import Does, End, PrintJob, Scene
@@ -33,7 +33,7 @@ from machine.simulator.simulator import SimulatedPrinter
 from machine.workbench.printing import running_print
 from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage
 from machine.workbench.printing.commands import COMMANDS, PageOfPrints, obey
-from machine.workbench.printing.job_state import Check, JobState, Slices
+from machine.workbench.printing.job_state import JobState, Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.process import carry_out
 from machine.workbench.printing.running_print import RunningPrint
@@ -420,7 +420,7 @@ def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> No
         with pytest.raises(PrinterError, match="too hot") as refused:
             check(["too hot"], force=False)
     assert refused.value.forcible
-    assert heard.state["checks"] == (Check("an axis is missing", forced=True), Check("the file is whole"))
+    assert heard.state["checks"] == (Notice("an axis is missing", forced=True), Notice("the file is whole"))
     assert heard.state["said"] == ("an axis is missing", "one moment")
 
 

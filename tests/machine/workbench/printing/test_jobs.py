@@ -9,15 +9,17 @@ import pytest
 
 from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
-from machine.printing.destination import parse_destination
+from machine.printing.destination import Destination, SerialPort, Simulated, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
 from machine.program import Alternative
 from machine.workbench.printing.at_page import AtPage
 from machine.workbench.printing.commands import job_of
 from machine.workbench.printing.job_state import Slices
+from machine.workbench.printing.prints import FILE, Prints, keep_printer, last_printer
 from machine.workbench.printing.process import carry_out
 from machine.workbench.work.slices import Sliced
 from profiles.errors import PlanError, PrinterError, UserError
+from profiles.folders import state_folder
 from profiles.profile import Profile, load
 
 PROFILE = load()
@@ -127,3 +129,27 @@ def test_a_line_that_would_be_two_when_the_text_is_read_again_is_dry_run_anew() 
     in_one = [*GOOD[:-2], "\n".join(GOOD[-2:])]
     assert file(in_one) == file(GOOD)
     assert OTHER not in program(GOOD, PROFILE, known_findings(in_one, PROFILE, [OTHER]))
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+
+@pytest.mark.parametrize("at", [SerialPort("/dev/ttyACM0", 250000), Simulated(2.0), parse_server_address("duet:printer")])
+def test_the_printer_of_last_time_is_known_at_the_next_start(at: Destination) -> None:
+    assert last_printer() is None
+    assert Prints().snapshot()["last_printer"] is None
+    keep_printer(at)
+    assert last_printer() == at
+    assert Prints().snapshot()["last_printer"]["port"] == at.name
+    assert Prints().ports_known == {at.name}
+
+
+@pytest.mark.parametrize("text", [
+    "", "{", "[]", "{}", "null", '{"port": "sim"}', '{"port": "sim", "baud": "fast", "sim_speed": 1}',
+    '{"port": 1, "baud": "x", "sim_speed": 0}', '{"port": "/dev/ttyS0", "baud": 7, "sim_speed": 0}',
+])  # fmt: skip
+def test_a_file_that_names_no_printer_is_as_none(text: str) -> None:
+    (state_folder() / FILE).write_text(text)
+    assert last_printer() is None
