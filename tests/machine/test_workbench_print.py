@@ -155,7 +155,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert browser.value(PRINTING) == "paused"  # the print that is looked at stays, and so does the one that the button stops
         second_page.until(lambda seen: seen["over"])
         second_page.command("forget")
-        second_page.until(lambda seen: seen["state"] == "printing")
+        second_page.until(lambda seen: seen["state"] == "paused")
         browser.value("{ $('printer-field').open = true; $('port-typed').focus(); }")
         browser.key("e")  # a letter of the port's name
         assert browser.value("$('port-typed').value") == "e"
@@ -218,7 +218,7 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
         browser.wait("$('feed-told').textContent === '150 %'")  # although this server does not tell it
-        second_page.until(lambda seen: seen.get("port") == address and seen["state"] == "printing")
+        second_page.until(lambda seen: seen.get("port") == address and seen["state"] == "paused")
         second_page.command("resume")
         assert second_page.refused() == "another page commands this print: take the command over first"
 
