@@ -51,21 +51,19 @@ S = PrintState
 OVER = frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.REFUSED, S.FAILED})
 UNHEARD = frozenset({S.CANCELLING, S.RECONNECTING})  # no report is taken
 AWAY = frozenset({S.PAUSING, S.PAUSED})  # the tip, from the print
-_LIVE = {S.PRINTING, S.PAUSING, S.PAUSED, S.RESUMING, S.RECONNECTING, S.FINISHING}
-ACTIVE = frozenset({*_LIVE, S.CANCELLING})
-_ENDS = {S.CANCELLING, S.CANCELLED, S.FAILED}
+_LIVE = frozenset({S.PRINTING, S.PAUSING, S.PAUSED, S.RESUMING, S.RECONNECTING, S.FINISHING})
+ACTIVE = _LIVE | {S.CANCELLING}
+_ANY = ACTIVE | OVER  # a server tells of its print now and then, so these follow in any order; a cancel may be refused
 
 TABLE: Mapping[PrintState, frozenset[PrintState]] = {
-    # A state may stay as it is. A server tells of its print now and then, so that its states follow in any order.
-    S.CHECKING: frozenset({S.READY, S.IN_HAND, S.REFUSED, S.DECLINED, *_LIVE, *_ENDS, S.LEFT}),
-    S.READY: frozenset({S.CHECKING, S.UPLOADING, S.DECLINED, S.REFUSED, *_LIVE, *_ENDS, S.LEFT, S.DONE}),
-    S.UPLOADING: frozenset({S.READY, S.DECLINED, S.DONE, S.LEFT, *_LIVE, *_ENDS}),
-    **{state: frozenset({*_LIVE, *_ENDS, S.DONE, S.LEFT, S.READY, S.OFFLINE}) for state in _LIVE},
-    S.IN_HAND: frozenset({*_ENDS, S.DONE}),
-    S.CANCELLING: frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.FAILED, S.READY, S.OFFLINE, *_LIVE}),  # it may be refused
+    S.CHECKING: _ANY | {S.READY, S.UPLOADING, S.IN_HAND},
+    S.READY: _ANY | {S.UPLOADING},
+    S.UPLOADING: _ANY,
+    **{state: _ANY | {S.READY, S.OFFLINE} for state in ACTIVE},
+    S.IN_HAND: OVER | {S.CANCELLING},
     S.LEFT: frozenset({S.CANCELLING}),  # a print that its server goes on with is stopped after all
     **{state: frozenset() for state in OVER - {S.LEFT}},
-    S.OFFLINE: frozenset(S) - OVER,
+    S.OFFLINE: _ANY | {S.READY},
 }
 
 
