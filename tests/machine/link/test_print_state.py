@@ -21,7 +21,7 @@ def test_every_state_has_a_row_and_can_be_reached_from_the_first() -> None:
 
 @pytest.mark.parametrize("state", sorted(PrintState))
 def test_a_print_can_end_in_every_way_whatever_it_is_at_and_stays_over(state: PrintState) -> None:
-    """What its process tells in quick succession is put together, so that any end may follow the first state that was heard of."""
+    """What its process tells in quick succession is put together, so that any end may follow the first state."""
     assert follows(state, state)
     if state not in OVER:
         assert all(follows(state, end) for end in OVER)
