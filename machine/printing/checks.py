@@ -1,6 +1,6 @@
 """Checks: whether a printer, the machine's profile and a program belong together, before anything moves.
 
-What speaks against a job is a sentence: it is raised, or with --force told.
+A reason against a job is a sentence: it is raised, or reported when --force is given.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -34,7 +34,7 @@ AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 
 
 def check(sentences: Iterable[str], force: bool) -> bool:
-    """Raise PrinterError for the first sentence that speaks against a job, or with force tell all; whether there is none."""
+    """Raise PrinterError for the first reason against a job, or with force report all; True when there is none."""
     found = False
     for sentence in filter(None, sentences):
         if not force:
@@ -69,13 +69,13 @@ def check_dialect(machine: Machine) -> None:
 
 
 def machine_sentences(answer: Answer | None, machine: Machine) -> Iterator[str]:
-    """What speaks against a machine at a printer that has answered so; None: nothing is known of it."""
+    """Reasons against a machine at a printer with this answer; None: the printer is not known."""
     if answer is not None:
         yield firmware_mismatch(answer, machine)
 
 
 def program_sentences(answer: Answer | None, loaded: LoadedProgram) -> Iterator[str]:
-    """What speaks against a program: it was made for another machine, or leaves the limits that the firmware tells."""
+    """Reasons against a program: it was made for another machine, or leaves the limits that the firmware reports."""
     program, profile = loaded.program, loaded.profile
     own, sections = read_embedded_profile(program.lines, profile, frozenset())
     if "machine" in sections:
@@ -102,7 +102,7 @@ def with_starvation(destination: Destination, program: Program, profile: Profile
 
 
 def server_machine_sentences(server: Server, greeting: ServerIdentity, machine: Machine) -> Iterator[str]:
-    """What speaks against a machine behind a print server. Raises PrinterError for a dialect that it does not read."""
+    """Reasons against a machine behind a print server. Raises PrinterError for a dialect that the server does not read."""
     check_destination(server, machine)
     yield from machine_sentences(printer_of(greeting), machine)
     yield lacking_steppers(greeting, machine)
@@ -110,7 +110,7 @@ def server_machine_sentences(server: Server, greeting: ServerIdentity, machine: 
 
 
 def server_program_sentences(greeting: ServerIdentity, loaded: LoadedProgram) -> Iterator[str]:
-    """What speaks against a program behind a print server: macros that its Klipper lacks, too."""
+    """Reasons against a program behind a print server, missing Klipper macros included."""
     yield from program_sentences(printer_of(greeting), loaded)
     lacking = lacking_macros(greeting, _block_lines(loaded.profile.machine))
     unknown = [name for name in lacking_macros(greeting, loaded.program.lines) if name not in lacking]
@@ -227,7 +227,7 @@ def _unknown_macros(names: list[str], caller: str) -> str:
 
 
 def printer_of(greeting: ServerIdentity) -> Answer | None:
-    """What a server tells of its printer, as a printer at a port would have answered."""
+    """The printer behind a server, described as a printer at a port would answer."""
     if not greeting.firmware:
         return None
     return Answer(Kind.PRINTER, f"FIRMWARE_NAME:{greeting.firmware}", greeting.letters, greeting.limits)

@@ -82,7 +82,7 @@ class Server:
 
     @property
     def hosts(self) -> tuple[str, str]:
-        """What the user's file of servers may call it: host and port, or the host alone."""
+        """Names in the user's file of servers: host and port, or the host alone."""
         return f"{self.host}:{self.port}", self.host
 
 

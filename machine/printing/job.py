@@ -24,7 +24,7 @@ from profiles.profile import Profile
 
 
 class Does(StrEnum):
-    """What a job does at its printer."""
+    """Kind of work that a job does at its printer."""
 
     PRINT = "print"
     RESUME = "resume"  # the rest of a print that was cut off
@@ -34,7 +34,7 @@ class Does(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class PrintJob:
-    """What is to be done where.
+    """A job: its printer, its program and how it is recorded.
 
     load: makes the program; profile: what is known of the machine before that, None: the program itself tells. starts: False: a
     print server only gets the file and keeps it. force: go past what --force goes past. cut_off: the journal of the print whose
@@ -74,8 +74,11 @@ Show = Callable[[PrintStatus | None], None]  # None: it begins, nothing is known
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is watched. beginning: what is told of it as long as no part is; server: the name of the print server that goes on
-    without this program, "" for a print that ends with it; uploads: it only gets the file."""
+    """A job as it is shown.
+
+    beginning: shown as its position as long as no part is known; server: the name of the print server that goes on without this
+    program, "" for a print that ends with it; uploads: the server only gets the file.
+    """
 
     title: str
     log: SerialLog
@@ -103,7 +106,7 @@ class Person(Protocol):
         answer."""
 
     def show(self, scene: Scene) -> AbstractContextManager[Show]:
-        """What shows each moment of the job, and lets the person command it, until the block ends."""
+        """Show each moment of the job and take commands for it until the block ends."""
 
     def left(self) -> bool:
         """Whether the person has left what goes on without this program."""
@@ -113,7 +116,7 @@ class Person(Protocol):
 
 
 class Printer(Protocol):
-    """What a job is printed by: a printer at a port, or behind a print server. All raise UserError."""
+    """The machine that carries out a job: a printer at a port, or behind a print server. All methods raise UserError."""
 
     def greet(self) -> None:
         """Ask who is there."""

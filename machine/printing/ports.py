@@ -52,7 +52,7 @@ def rate_of(at: AtPrinter) -> int:
 
 
 def identify_printer(wire: Port, baud: int, halted: bool = False) -> Answer:
-    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is.
+    """Identify the printer at a port; raises PrinterError where anything else answers, or at another rate.
 
     One that is still starting is waited for. halted: one that has halted will do, if a command lets it print again.
     """
@@ -77,7 +77,7 @@ def check_answer(answer: Answer, port: str, baud: int, rate: int) -> None:
 
 
 def _words(answer: Answer) -> dict[str, str]:
-    """What a sentence about an answer may name. Marlin says of its work only that it does something, or waits."""
+    """Words for the sentences about an answer. Marlin reports of its work only that it does something, or waits."""
     words = answer.words[:60]
     usual = answer.words.startswith(("processing", "paused for", "busy")) or not words
     work = "it heats, moves or waits for a person" if usual else words
@@ -123,7 +123,7 @@ NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
 
 
 def describe_answer(answer: Answer, baud: int) -> str:
-    """What answers, for a person."""
+    """Description of an answer for a person."""
     if answer.kind is Kind.PRINTER:
         axes = f", axes {' '.join(answer.letters)}" if answer.letters else ""
         return f"{answer.firmware or 'a printer that does not name its firmware'}{axes}, at {baud} baud"
@@ -147,7 +147,7 @@ def known_ports() -> tuple[SerialDevice, ...]:
 
 
 def ask_ports(devices: Sequence[SerialDevice], baud: int, over: Event, in_use: Iterable[str] = ()) -> list[PortReport]:
-    """What answers at each; a set `over` ends the asking. in_use: those at which this program prints are not opened."""
+    """Ask at each port who answers; a set `over` ends the asking. in_use: ports where this program prints, which stay closed."""
     names = frozenset(in_use)
 
     def ask(device: SerialDevice) -> PortReport:
@@ -188,14 +188,14 @@ def describe(report: PortReport) -> str:
 
 
 def answer_words(report: PortReport) -> str:
-    """What answers, or why the port could not be asked, for a person who sees the port's name; "" where it was not asked."""
+    """The answer, or why the port could not be asked, for a person who sees the port's name; "" where it was not asked."""
     if report.answer is None:
         return report.reason
     return describe_answer(report.answer, report.baud)
 
 
 def port_json(report: PortReport) -> dict[str, Any]:
-    """The same for a program: every key always there, null where it is not known."""
+    """A report as JSON for other programs: every key is always there, null where it is not known."""
     answer, device = report.answer, report.device
     printer = answer is not None and answer.kind.is_printer
     return {

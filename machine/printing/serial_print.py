@@ -98,7 +98,7 @@ class SerialPrinter:
             return nullcontext()
 
     def _who(self, machine: Machine) -> str:
-        """Who answers, where it is a printer for the machine."""
+        """Description of a printer that fits the machine."""
         if isinstance(self._at, Simulated):
             speed = f"{self._at.speed:g} times as fast as a real one" if self._at.speed else "as fast as it can"
             return f"a simulated {machine.name}, {speed}"

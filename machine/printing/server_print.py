@@ -182,7 +182,7 @@ def running_print(server: PrintServer) -> PrintStatus:
 
 
 def file_name(status: PrintStatus) -> str:
-    """What a server prints, as a person is told."""
+    """Name of the file that a server prints, for a person."""
     return status.file or "its file"
 
 
@@ -213,7 +213,7 @@ def _report_end(state: PrintState, file: str, name: str, server: str, progress: 
 
 
 class ReportedProgress:
-    """What a server tells of a print. Of a program that is known here, part and layer are those of the place up to which the
+    """Progress of a print on a server. Where the program is known here, part and layer follow from the position up to which the
     server has read the file."""
 
     def __init__(self, upload: GcodeUpload | None = None, loaded: LoadedProgram | None = None) -> None:

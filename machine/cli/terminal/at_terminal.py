@@ -47,7 +47,7 @@ class AtTerminal:
         self._yes, self._board = yes, Keyboard(self.commands)
 
     def passed(self, sentence: str) -> None:
-        """What is as it must be is not told."""
+        """A passed check is not shown."""
 
     def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
         """Ask on stderr. Raises JournalError where nobody can answer, or look."""

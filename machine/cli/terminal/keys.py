@@ -89,7 +89,7 @@ class Keyboard:
         return self._left or (self._deadline_s is not None and self._now_s() > self._deadline_s)
 
     def _answer(self, key: str) -> None:
-        """What a key means to the question that stands."""
+        """Take a key as the answer to the question that stands."""
         leaving, self._leaving = self._leaving, False
         if leaving and key == "l":
             self._left = True
@@ -193,7 +193,7 @@ class Typing:
 
 
 class ConsoleTyping:
-    """The same on Windows, whose console gives keys one by one and is never changed. keys: its module msvcrt."""
+    """`Typing` on Windows, whose console gives keys one by one and is never changed. keys: its module msvcrt."""
 
     def __init__(self, press: Callable[[str], None], keys: Any) -> None:
         self._press, self._keys = press, keys
@@ -219,7 +219,7 @@ class ConsoleTyping:
 
 
 def typing(press: Callable[[str], None], named: Mapping[bytes, bytes] = MappingProxyType({})) -> "Typing | ConsoleTyping":
-    """What hands keys to press() on this system; named: as Typing takes it."""
+    """Hand keys to press() as this system does it; named: as Typing takes it."""
     console = _windows_console()
     return Typing(press, named) if console is None else ConsoleTyping(press, console)
 

@@ -29,7 +29,7 @@ ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the quest
 
 
 class HandDoes(StrEnum):
-    """What a person may do by hand."""
+    """Actions of a person at a printer in hand."""
 
     HEAT = "heat"
     COOL = "cool"
@@ -103,7 +103,7 @@ class AtPage:
         self.interrupt: Callable[[Command | str], None] = lambda word: None  # called with what ends it at once
 
     def hear(self, word: Command | HandCommand | str, value: float = 100.0) -> None:
-        """What the person wants: a command of a print or by hand, BEGIN or LEAVE."""
+        """Take a command of the person: for a print, by hand, BEGIN or LEAVE."""
         if isinstance(word, HandCommand):
             self.by_hand.put(word)
             return
@@ -128,11 +128,11 @@ class AtPage:
         self.interrupt(LEAVE)
 
     def passed(self, sentence: str) -> None:
-        """What a check has found."""
+        """Add a passed check."""
         self._add(Notice(plain_line(sentence)))
 
     def hear_notice(self, notice: Notice) -> None:
-        """What the program says; what --force goes past is a check."""
+        """Add a notice of the program; an error that --force goes past is a check, too."""
         if notice.forced:
             self._add(Notice(notice.text.rstrip(), forced=True))
         self._lines.extend(line for line in notice.text.split("\n") if line.strip())

@@ -87,7 +87,7 @@ def _forget(page: PageOfPrints, asked: Asked) -> None:
 
 
 def _slices(session: Session, asked: Asked) -> PrintJob:
-    """What lies on the page's bench."""
+    """A print of the slices on the page's bench."""
     sends_only = asked.get("send_only") is True
     destination = _server(asked) if sends_only else _destination(asked)
     return job_of(session, destination, asked.get("force") is True, not sends_only)

@@ -1,4 +1,4 @@
-"""Job state: all that a page is told of a print, as its process tells it, and how a bench's slices become its program."""
+"""Job state: a print as its process reports it and pages show it, and the loading of a bench's slices."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -61,7 +61,7 @@ class JobState:
 
 
 def first_state(job: PrintJob) -> JobState:
-    """What is known of a print before its process has said anything."""
+    """The state of a print before its process has reported anything."""
     name = job.name or {Does.HAND: "by hand", Does.FOLLOW: "what it prints"}.get(job.does, "")
     return JobState(
         name=name if job.cut_off is None else job.cut_off.stem,

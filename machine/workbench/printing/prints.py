@@ -65,12 +65,12 @@ class Prints(Observable):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What people have named themselves, of all that is told here."""
+        """Names that people have chosen, among all that is shown here."""
         journals = (name for journal in self._journals or () for name in (str(journal.path), journal.name, journal.machine))
         return (*(name for job in self.prints for name in job.names), *sorted(self.ports_known), *journals)
 
     def snapshot(self) -> dict[str, Any]:
-        """What every page is told."""
+        """The state of all prints for every page."""
         return {
             "version": self.version,
             "ports": self._ports,

@@ -111,7 +111,7 @@ def _webcam(printer: ServerPrinter) -> str:
 
 
 def figures(loaded: LoadedProgram) -> dict[str, Any]:
-    """What a person is told of a program."""
+    """Figures of a program for a person: time, filament, price, findings."""
     program, material = loaded.program, loaded.profile.material
     values, findings = summary(program.run), program.run.findings
     return {

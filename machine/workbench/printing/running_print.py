@@ -40,7 +40,7 @@ class RunningPrint:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What people have named themselves: the model, the machine, the port, and their files."""
+        """Names that people have chosen: of the model, the machine, the port, and their files."""
         state, profile = self.state, self.job.profile
         told = (state.name, state.machine, state.port, state.resumes, state.journal, state.log)
         further = (profile.machine.name, profile.material.name, profile.process.name) if profile else ()
@@ -145,7 +145,7 @@ class RunningPrint:
         return ended.server and self._begun and (stop_lost or (self._cancelled and _goes_on(ended)))
 
     def _order_late(self) -> None:
-        """The same for what comes when the print has just been left."""
+        """Give a stop or a cancel that comes when the print has just been left."""
         if _goes_on(self.state):
             self._take(replace(self.state, state=PrintState.CANCELLING))
             self._late = asyncio.get_running_loop().create_task(self._order_anew())

@@ -9,11 +9,19 @@ from threading import Thread
 
 import pytest
 
-from machine.printing.destination import is_server_address, parse_server_address
+from machine.printing.destination import (
+    SerialPort,
+    Server,
+    Simulated,
+    is_server_address,
+    parse_destination,
+    parse_printer,
+    parse_server_address,
+)
 from machine.printing.servers.credentials import VARIABLE, Credentials, read_credentials, servers_file
 from machine.printing.servers.gcode_upload import GcodeUpload, server_name
 from machine.printing.servers.http import HttpSession, fetch_picture, picture_address
-from profiles.errors import ServerError
+from profiles.errors import PrinterError, ServerError
 
 
 @pytest.mark.parametrize(
@@ -29,6 +37,28 @@ from profiles.errors import ServerError
 def test_an_address_names_kind_host_and_port(text: str, url: str) -> None:
     assert is_server_address(text)
     assert parse_server_address(text).url == url
+
+
+@pytest.mark.parametrize(("text", "kind"), [
+    ("sim", Simulated), ("/dev/ttyACM0", SerialPort), ("socket://host:1", SerialPort), ("Duet:printer", Server),
+])  # fmt: skip
+def test_a_destination_is_read_once_and_keeps_its_name(text: str, kind: type) -> None:
+    destination = parse_destination(text, 250000, 2.0)
+    assert isinstance(destination, kind)
+    assert destination.name == text
+
+
+@pytest.mark.parametrize(("given", "sentence"), [
+    (("/dev/ttyS0", 7, 0.0), "baud rate 7 is not possible"), (("sim", 115200, float("nan")), "--sim-speed is nan"),
+])  # fmt: skip
+def test_a_line_that_is_not_possible_is_refused_at_the_door(given: tuple[str, int, float], sentence: str) -> None:
+    with pytest.raises(PrinterError, match=sentence):
+        parse_destination(*given)
+
+
+def test_a_print_server_is_no_line_to_a_printer() -> None:
+    with pytest.raises(ServerError, match="--port duet:printer is a print server, which takes whole files"):
+        parse_printer("duet:printer")
 
 
 @pytest.mark.parametrize("text", ["/dev/ttyACM0", "COM3", "sim", "socket://host:1", "rfc2217://host:1", "octoprint"])
