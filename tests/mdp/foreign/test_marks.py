@@ -1,6 +1,7 @@
 """Marks: what the volumes that are not printed, their settings and the paint of a slicer file become, and where they lie."""
 
 import zipfile
+from itertools import product
 from pathlib import Path
 
 import manifold3d as m3
@@ -63,6 +64,23 @@ def test_volumes_that_are_not_printed_become_marks_where_they_lie_in_the_model(t
         "support enforcer 'support' and 1 more are taken as [[support]]",
         "support blocker 'no_support' is taken as [[no_support]]",
     )
+
+
+@pytest.mark.parametrize("turn_deg", [(0.0, 0.0, 0.0), (20.0, 30.0, 40.0)])
+@pytest.mark.parametrize("corner_mm", [(4.9, 3.9, 4.9), (5.0, 4.0, 0.0), (2.0, 4.0, 5.0)])
+def test_a_modifier_of_eight_corners_that_is_no_box_keeps_its_own_shape(
+    tmp_path: Path, corner_mm: tuple[float, float, float], turn_deg: tuple[float, float, float]
+) -> None:
+    corners = [*product((-5.0, 5.0), (-4.0, 4.0), (-5.0, 5.0))]
+    solid = m3.Manifold.hull_points([*corners[:-1], corner_mm]).rotate(turn_deg)  # three edges of the first corner stay square
+    model = read_model(
+        prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(solid, "modifier", {"perimeters": "4"})], [AT_ORIGIN])])
+    )
+    (modifier,) = model.zones.modifiers
+    assert solid.num_vert() == 8
+    assert isinstance(modifier.volume, MeshVolume)
+    assert modifier.volume.mesh.volume_mm3 == pytest.approx(solid.volume())
+    assert modifier.volume.mesh.volume_mm3 < 799.0  # of 10 x 8 x 10 mm
 
 
 @pytest.mark.parametrize(
