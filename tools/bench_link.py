@@ -26,8 +26,8 @@ from machine.printing.stream import QUEUE, USB_BYTES
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PARTS = ["terminal", "sim", "uart", "virtual", "memory", "alone"]
 BAUDS = (115200, 250000)

@@ -21,11 +21,11 @@ import numpy as np
 
 from machine.link.stream import print_lines
 from machine.simulator.board import BuildOptions
-from machine.simulator.faults import HEALED, KINDS, Fault, FaultScript, random_script
+from machine.simulator.faults import KINDS, Fault, FaultScript
 from machine.simulator.record import Record
-from machine.simulator.virtual import PATH, EndlessError, VirtualPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
+from tests.machine.virtual_printer import HEALED, PATH, EndlessError, VirtualPrinter, random_script
 
 PROFILE = load()
 # Firmwares that never ask for a line again, over a line that loses no bytes of theirs.

@@ -40,9 +40,9 @@ from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import JournalError
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 LIMIT = 95

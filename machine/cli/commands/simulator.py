@@ -14,8 +14,7 @@ from machine.firmware.line import check_baud
 from machine.printing.running_simulators import announced
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.contact.surface import TrueBall
+from machine.simulator.contact import ProbedTable, TrueBall
 from machine.simulator.faults import FaultScript, read_script
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter

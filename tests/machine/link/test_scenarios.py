@@ -34,7 +34,6 @@ from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import (
     FirmwareError,
     LocalProtocolError,
@@ -43,6 +42,7 @@ from profiles.errors import (
     SilenceError,
 )
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 PLAIN = BuildOptions(advanced_ok=False)

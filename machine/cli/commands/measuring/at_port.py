@@ -13,7 +13,7 @@ from machine.link.port import open_port
 from machine.pipeline.requests import SIMULATED, PortRequest
 from machine.printing.compatibility import check_machine, describe_answer, identify_printer
 from machine.printing.serial_log import TappedWire, new_log
-from machine.simulator.contact.probe import ProbedTable
+from machine.simulator.contact import ProbedTable
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError, add_words
 from profiles.machine import Machine

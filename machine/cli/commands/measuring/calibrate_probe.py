@@ -18,8 +18,7 @@ from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.probing.ball import Ball
 from machine.setup.calibration.probing.measure import Measuring, Probe
 from machine.setup.calibration.program import calibration_pen, usual_radius_mm
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.contact.surface import TrueBall
+from machine.simulator.contact import ProbedTable, TrueBall
 from profiles.errors import PrinterError, ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile
