@@ -18,14 +18,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
+from machine.cli.commands.measuring.at_port import PrinterProber, ProbingSession
 from machine.firmware import dialect_of, firmware_of
 from machine.kinematics.table import machine_points
 from machine.setup.calibration.fit import calibrate
 from machine.setup.calibration.piece.fit import correct
 from machine.setup.calibration.piece.pads import Piece
-from machine.setup.calibration.probing.ball import contact_heights
-from machine.setup.calibration.probing.clear import find_in_the_way
+from machine.setup.calibration.probing.ball import contact_heights, find_in_the_way
 from machine.setup.calibration.probing.measure import AROUND, WIDE, Measuring
 from machine.setup.calibration.program import calibration_pen
 from machine.simulator.contact import ProbedTable

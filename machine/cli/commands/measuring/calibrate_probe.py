@@ -2,10 +2,9 @@
 
 import sys
 
-from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
+from machine.cli.commands.measuring.at_port import PrinterProber, ProbingSession, begin_cold, cold_session, tip_raised_after
 from machine.cli.commands.measuring.calibrate import MOST_OFF_MM, comparison, refuse_if_saved, save_calibration, tilting_machine
-from machine.cli.commands.measuring.calibrate_dialogue import read_reply
-from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
+from machine.cli.commands.measuring.questionnaire import read_reply
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import CalibrationRequest
