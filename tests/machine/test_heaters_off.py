@@ -16,6 +16,7 @@ from machine.cli.commands import console as console_module
 from machine.cli.commands.console import console
 from machine.cli.commands.measuring import at_port
 from machine.cli.commands.measuring.at_port import PrinterMover, ProbingSession, begin_cold, cold_session, tip_raised_after
+from machine.cli.terminal.requests import ConsoleRequest
 from machine.link.medium import Medium, Wire
 from machine.link.stream import print_lines
 from machine.pipeline.requests import PortRequest, PrintRequest
