@@ -1,6 +1,6 @@
 """Measure the serial link: its share of a UART's bandwidth, lines a second over a pseudo-terminal, memory over millions of lines.
 
-Run: python tools/bench_link.py [terminal] [sim] [uart] [virtual] [memory] [alone] [--lines 100000] [--file FILE.gcode]
+Run: python -m tools.bench_link [terminal] [sim] [uart] [virtual] [memory] [alone] [--lines 100000] [--file FILE.gcode]
 (without a name: all of them)
 
 sim: as `print --port sim` streams, its serial log, limits of the machine and display of progress included;

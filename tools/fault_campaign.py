@@ -4,7 +4,7 @@ A print must end in exactly the program's strokes, each once and in order, or wi
 machine safe: heaters off by the printer's own account, nothing moving; or, where nobody can reach the printer any more, with
 a message that says so. Sender and printer share a virtual clock: a print takes a second, and is the same at every run.
 
-Run: python tools/fault_campaign.py [--scripts 1000] [--first 0] [--lines 2000] [--jobs 2]
+Run: python -m tools.fault_campaign [--scripts 1000] [--first 0] [--lines 2000] [--jobs 2]
 """
 
 import argparse

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from heapq import heapify, heappop, heapreplace
 from math import inf
 
-from machine.firmware.line import BYTE_BITS
+from machine.firmware.firmware import BYTE_BITS
 from machine.simulator.faults import OK_KINDS, Fault, FaultScript
 from machine.simulator.firmware import SimulatedFirmware
 

@@ -5,7 +5,7 @@ from threading import Event
 
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.progress import say
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.printing.port_reports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from machine.cli.commands.send import print_on_server
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.report import print_table
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
 from machine.pipeline.output import check_writable
 from machine.pipeline.programs import load_program

@@ -9,7 +9,7 @@ from pathlib import Path
 from machine.cli.terminal.plain import show
 from machine.cli.terminal.report import agreement_line, print_price, print_table
 from machine.dryrun.dryrun import summary
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_outputs, write_bytes, write_json
 from machine.pipeline.programs import load_program

@@ -23,10 +23,10 @@ from machine.link.medium import Wire
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
 from machine.link.progress import Progress
+from machine.link.protocol.answers import ASKED_LIMIT
 from machine.link.protocol.connection import Connection
 from machine.link.protocol.events import Position, Temperature, read_event
 from machine.link.protocol.framing import command_of, frame
-from machine.link.protocol.resends import ASKED_LIMIT
 from machine.link.stream import Outcome, print_lines
 from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions

@@ -8,7 +8,7 @@ from math import inf
 from machine.cli.terminal.interrupts import interrupting
 from machine.cli.terminal.progress import say
 from machine.firmware import dialect_of
-from machine.firmware.probing import ProbingRules
+from machine.firmware.firmware import ProbingRules
 from machine.gcode.pen import Pen
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.port import open_port

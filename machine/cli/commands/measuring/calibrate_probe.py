@@ -9,7 +9,7 @@ from machine.cli.terminal.plain import show
 from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.firmware import dialect_of, firmware_of
-from machine.firmware.probing import ProbingRules
+from machine.firmware.firmware import ProbingRules
 from machine.pipeline.output import check_writable
 from machine.pipeline.requests import ProbeRequest
 from machine.printing.server_checks import check_no_server

@@ -10,7 +10,7 @@ from pathlib import Path
 from machine.cli.terminal.plain import plain_lines
 from machine.cli.terminal.progress import say
 from machine.cli.terminal.requests import DetectRequest
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.pipeline.output import check_writable, plain_name, refuse_to_overwrite, write_own
 from machine.pipeline.profile_file import profile_text
 from machine.printing.settings_queries import text_of_port
