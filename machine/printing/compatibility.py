@@ -9,7 +9,7 @@ from time import monotonic, sleep
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import find_starvation
 from machine.firmware import dialect_of, dialects, firmware_of, identify
-from machine.firmware.line import LineRules
+from machine.firmware.firmware import LineRules
 from machine.link.identification import Answer, Kind, ask, ask_at_any_rate
 from machine.link.port import Port, open_port
 from machine.notices import say

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from threading import Event
 from typing import Any
 
-from machine.firmware.line import BAUDS
+from machine.firmware.firmware import BAUDS
 from machine.link.identification import QUICK_S, Answer, Kind, ask_at_any_rate
 from machine.link.port import RefusedPortError, SerialDevice, open_port, serial_devices
 from machine.printing.compatibility import describe_answer

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from machine.view.bundle import bundle
+from machine.view.page import bundle
 from machine.workbench.web.page import OWN
 
 NODE = shutil.which("node")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from machine.cli.commands.send import print_on_server
 from machine.cli.terminal.report import print_table
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.notices import show
 from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
 from machine.pipeline.output import check_writable

@@ -4,7 +4,7 @@ from html import escape
 
 from starlette.responses import HTMLResponse
 
-from machine.view.bundle import hash_source
+from machine.view.page import hash_source
 from machine.workbench.access.door import Door
 from machine.workbench.access.pairing import CODE_LENGTH, Verdict
 

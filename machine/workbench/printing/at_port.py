@@ -2,7 +2,7 @@
 one that was cut off, with what `resume` tells and asks."""
 
 from machine.cli.terminal.options import machine_profile
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.link.identification import Answer
 from machine.pipeline import compilers
 from machine.pipeline.programs import LoadedProgram

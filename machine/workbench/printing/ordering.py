@@ -1,6 +1,6 @@
 """Ordering: what lies sliced on a workbench, as an order to print it; refused here is what is known before a printer is asked."""
 
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.pipeline.programs import refuse_errors
 from machine.pipeline.requests import PrintRequest
 from machine.printing.compatibility import check_dialect, check_speed

@@ -13,7 +13,7 @@ from os.path import realpath
 from threading import Event as Flag
 from typing import Any
 
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.link.port import stable_name
 from machine.printing.journal_folder import ResumableJournal, resumable_journals
 from machine.printing.port_reports import answer_words, ask_ports, known_ports, port_json

@@ -4,8 +4,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from machine.view.bundle import bundle, hash_source
-from machine.view.page import TEMPLATE
+from machine.view.page import TEMPLATE, bundle, hash_source
 
 OWN = Path(__file__).parent / "page"
 MARKER = re.compile(r"/\*(?:STYLE|SCRIPT|NETWORK)\*/")

@@ -4,8 +4,7 @@ from dataclasses import asdict
 from hashlib import sha256
 from typing import Any
 
-from machine.view.front import front_record
-from machine.view.parts import page_colours
+from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.model import Model

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.view.bundle import EXPORT, IMPORT, bundle
-from machine.view.page import TEMPLATE
+from machine.view.page import EXPORT, IMPORT, TEMPLATE, bundle
 from machine.workbench.web.page import OWN
 
 SCRIPTS = sorted([*TEMPLATE.glob("*.js"), *OWN.glob("*.js")])

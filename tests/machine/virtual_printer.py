@@ -1,21 +1,28 @@
-"""A simulated printer in memory on a clock of its own: a print of hours takes seconds and is the same at every run."""
+"""A simulated printer in memory on a clock of its own, and random faults for it.
 
+A print of hours takes seconds and is the same at every run.
+"""
+
+import random
+from collections.abc import Sequence
 from math import inf
 
 from machine.link.medium import Medium
 from machine.link.port import READ_S, WRITE_S
 from machine.simulator.board import BuildOptions, build_options
-from machine.simulator.cable import Cable
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.faults import FaultScript
+from machine.simulator.cable import Cable, Uart
+from machine.simulator.contact import ProbedTable
+from machine.simulator.faults import BYTE_KINDS, KINDS, OK_KINDS, Fault, FaultScript, Kind
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.record import Record
-from machine.simulator.uart import Uart
 from profiles.errors import PortError
 from profiles.machine import Machine
 
 TURN_S = 1e-4  # what a turn of the host takes: time passes even where an answer is always there
 PATH = "virtual"
+LINE_BYTES = 36  # of a stroke on the wire, so that byte faults fall among the lines
+MOST_S = 3.0  # that random delays and stalls last
+HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # what a sender can heal without stopping
 
 
 class EndlessError(Exception):
@@ -120,3 +127,25 @@ class _Line:
         except OSError:
             self._gone = True
             raise PortError(f"the connection at {self.name} was lost: is the cable or the printer unplugged?") from None
+
+
+def random_script(
+    seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS, line_bytes: int = LINE_BYTES
+) -> FaultScript:
+    """`count` faults of these kinds at random places of those lines, the same for the same seed.
+
+    line_bytes: how long a line is on the wire, so that byte faults fall among them. Answers are taken to be half as long. One in
+    eight of stalls, blocks and disconnections lasts for ever.
+    """
+    rng = random.Random(seed)
+    return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines, line_bytes) for _ in range(count)), seed)
+
+
+def _random_fault(rng: random.Random, kind: Kind, lines: range, line_bytes: int) -> Fault:
+    line, to_host = rng.choice(lines), rng.random() < 0.5
+    seconds = inf if rng.random() < 0.125 and kind != "delay" else rng.uniform(0.05, MOST_S)
+    if kind in BYTE_KINDS:
+        at = int((line + rng.random()) * line_bytes / (2 if to_host else 1))
+        return Fault(kind, at, to_host, rng.randrange(8), seconds=seconds)
+    value = max(1, line - rng.randint(-2, 12)) if kind == "spurious resend" else None
+    return Fault(kind, line, value=value, seconds=seconds)

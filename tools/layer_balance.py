@@ -1,4 +1,5 @@
-"""Layers: the plastic between two layers of a part against the height that lies between them, where walls and skins are laid.
+"""The plastic between two layers of a part against the height that lies between them, where walls and skins are laid; and whether
+the outer walls of a part that stands on others lie on plastic.
 
 Sparse infill, bridges and supports have room beside them and are left out, as are columns with nothing just below.
 """
@@ -10,8 +11,8 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.balance.columns import Bars, Mask, laid, lattice_over, over_room
-from machine.dryrun.balance.interfaces import LEAST, MOST
+from machine.dryrun.balance.columns import Bars, Lattice, Mask, laid, lattice_over, over_room
+from machine.dryrun.balance.interfaces import LEAST, MOST, Interface
 from machine.dryrun.strokes import Beads
 from machine.gcode.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices
@@ -21,6 +22,7 @@ from slicer.paths import Kind
 CELL_MM = 0.1
 SOLID = (Kind.OUTER_WALL.value, Kind.INNER_WALL.value, Kind.SKIN.value, Kind.TOP_SKIN.value, Kind.GAP.value)
 OTHERS = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value, Kind.IRONING.value)
+SAMPLE_MM, FAR_MM, AROUND_MM = 0.1, 1.5, 0.05  # of looks along outer walls, and across them
 LEVEL_MM = 0.01  # a layer whose beads differ more in height climbs, as a vase does
 
 
@@ -99,3 +101,35 @@ def _bars(program: ParsedProgram, deposited: Beads, which: Indices) -> Bars:
     """Some beads as wide as they are told to be; the bars of neighbours overlap by what their round sides leave."""
     rows, up = deposited.rows[which], np.zeros((len(which), 3))
     return Bars(program.start[rows, :3], program.end[rows, :3], up, 0.5 * deposited.width_mm[which], deposited.height_mm[which])
+
+
+def wall_edges(face: Interface) -> tuple[Mask, Floats]:
+    """At places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to them near their
+    middle, and (n,) how far inside their outer edge it ends, mm; inf where it is farther than FAR_MM.
+    """
+    walls, side = face.walls, face.walls.end[:, :2] - face.walls.begin[:, :2]
+    length = np.hypot(*side.T)
+    counts = np.ceil(length / SAMPLE_MM).astype(np.int64)
+    which = np.repeat(np.arange(len(length)), counts)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[which]
+    middle = walls.begin[which, :2] + share[:, None] * side[which]
+    across = np.column_stack([-side[:, 1], side[:, 0]])[which] / length[which, None]
+    steps = np.arange(-FAR_MM, AROUND_MM, 0.5 * face.lattice.cell)
+    held, ends = [], []
+    for outward in (across, -across):
+        edge = middle + walls.half[which, None] * outward
+        outer = ~_at(face.section, edge + 2.0 * AROUND_MM * outward, face.lattice)
+        way = edge[outer, None] + steps[:, None] * outward[outer, None]
+        there = _at(face.touching, way, face.lattice)
+        last = len(steps) - 1 - there[:, ::-1].argmax(axis=1)
+        beside = middle[outer, None] + np.array([-2.0 * AROUND_MM, 0.0, 2.0 * AROUND_MM])[:, None] * outward[outer, None]
+        held.append(_at(face.touching, beside, face.lattice).any(axis=1))
+        ends.append(np.where(there.any(axis=1), np.maximum(-steps[last], 0.0), np.inf))
+    return np.concatenate(held), np.concatenate(ends)
+
+
+def _at(mask: Mask, points: Floats, lattice: Lattice) -> Mask:
+    """Whether the columns of (..., 2) points are marked."""
+    i, j = np.moveaxis(((points - lattice.origin) / lattice.cell).astype(np.int64), -1, 0)
+    found: Mask = mask[i.clip(0, lattice.shape[0] - 1), j.clip(0, lattice.shape[1] - 1)]
+    return found
