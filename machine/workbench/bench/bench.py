@@ -9,7 +9,6 @@ import numpy as np
 from machine.pipeline.project import STANDING
 from machine.pipeline.requests import Given
 from machine.planning.stops import Stop
-from machine.workbench.bench.effect import Effect, effect_of_change
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.part_settings import option, renumbered
 from machine.workbench.bench.placing import Placing, moved_part, moved_zones
@@ -22,7 +21,8 @@ from mdp.overhang import UP
 from mdp.search.front import Weights, choose, pays
 from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
-from profiles.frozen import Vector
+from profiles.effect import effect_of_change
+from profiles.frozen import Effect, Vector
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile
 

@@ -159,7 +159,8 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
         yield {
             "key": f"{prefix}.{name}",
             "label": field.title,
-            **field.json_schema_extra,
+            "level": field.json_schema_extra["level"],
+            "synonyms": field.json_schema_extra["synonyms"],
             "unit": unit_of(name),
             "group": group or own,
             "title": TITLES[group or own],

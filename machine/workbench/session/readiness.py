@@ -5,9 +5,10 @@ from itertools import count
 from typing import Any
 
 from machine.workbench.bench.bench import Bench
-from machine.workbench.bench.effect import Effect, effect_of_change
 from machine.workbench.session.base import SessionBase
 from mdp.read import MANY_FACES
+from profiles.effect import effect_of_change
+from profiles.frozen import Effect
 from profiles.profile import Profile
 
 CHANGING_S = 0.2  # of a bench, until it is made ready as it is

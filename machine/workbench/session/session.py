@@ -23,7 +23,6 @@ from machine.workbench.bench.bench import (
     with_rows,
     with_scaled_model,
 )
-from machine.workbench.bench.effect import Effect, effect_of_change
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.settings import check_block, profile_as_given, with_given, with_typed
 from machine.workbench.session.base import LONGEST_SENTENCE, SessionBase, asking
@@ -46,7 +45,9 @@ from mdp.read import MANY_FACES
 from mdp.search.plan_file import PlanFile, planned_parts
 from mdp.search.plan_reading import read_plan
 from mdp.zone import NO_ZONES
+from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
+from profiles.frozen import Effect
 from profiles.profile import Profile
 
 READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a model is read
