@@ -19,9 +19,8 @@ from machine.workbench.bench.bench import Bench
 from machine.workbench.session import keeping
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.session import Session
-from machine.workbench.work import kept_work
-from machine.workbench.work.kept_work import MOST_KEPT, folders_kept, new_folder, write_work
-from machine.workbench.work.received import Received, tidy_left
+from machine.workbench.work import folders as kept_work
+from machine.workbench.work.folders import MOST_KEPT, Received, folders_kept, new_folder, tidy_left, write_work
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.save import stl
 from mdp.search.plan_file import PlannedPart

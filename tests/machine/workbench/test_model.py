@@ -18,11 +18,11 @@ from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, plan_of_bench, with_model, with_rotation
 from machine.workbench.bench.model import Model
 from machine.workbench.session.commands import obey
+from machine.workbench.session.keeping import AFTER_S
 from machine.workbench.session.session import Session
 from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work.cutting import cut_bench, make_folder
-from machine.workbench.work.models import read_model
-from machine.workbench.work.standing import stand
+from machine.workbench.work.models import read_model, stand
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.mesh import Mesh
 from mdp.save import stl
@@ -105,12 +105,15 @@ def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more
     async def forget(session: Session) -> tuple[bool, bool]:
         file = the_model(session).mesh_file
         obey(session, {"do": "undo"})
+        await until_idle(session)
         gc.collect()
         undone = file.is_file()
         obey(session, {"do": "redo"})
         obey(session, {"do": "undo"})
+        await until_idle(session)
         session.do("something else", replace(session.bench, copies=2))
         await until_idle(session)
+        await asyncio.sleep(1.2 * AFTER_S)  # in which the autosave has nothing to write any more
         gc.collect()
         return undone, file.is_file()
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from machine.workbench.work.received import BEGUN_S, FOUND, KEPT_S, Received, files_in, tidy_left
+from machine.workbench.work.folders import BEGUN_S, FOUND, KEPT_S, Received, files_in, tidy_left
 from mdp.save import stl
 from tests.machine.running_workbench import workbench
 from tests.shapes import tee
 
 HOLDS = """
 import sys, time
-from machine.workbench.work.received import Received
+from machine.workbench.work.folders import Received
 received = Received()
 for name in sys.argv[1:]:
     received.new_file(name).write_text("solid")

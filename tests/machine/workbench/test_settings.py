@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from machine.pipeline.requests import Given
+from machine.workbench.bench.bench import USUAL
 from machine.workbench.bench.settings import (
-    USUAL,
     check_block,
     profile_as_given,
     settings_list,

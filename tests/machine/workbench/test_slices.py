@@ -13,8 +13,7 @@ from starlette.responses import FileResponse
 from machine.dryrun.findings import Finding, known_findings
 from machine.program import Alternative
 from machine.workbench.web.downloads import gcode
-from machine.workbench.work.slices import Sliced
-from machine.workbench.work.walls import walls
+from machine.workbench.work.slices import Sliced, walls
 from profiles.errors import PlanError
 from slicer.slice import slice_parts
 from tests.shapes import box

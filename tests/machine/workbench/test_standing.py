@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from machine.workbench.bench.bench import Bench, with_model
-from machine.workbench.work import standing as work
-from machine.workbench.work.standing import Standing, stand
+from machine.workbench.work import models as work
+from machine.workbench.work.models import Standing, stand
 from mdp.mesh import Mesh
 from mdp.pose import turned_by
 from mdp.search.plan_file import PlannedPart

@@ -1,7 +1,7 @@
 """The verdict of slices: ready, or one thing to do."""
 
 from machine.dryrun.findings import Finding
-from machine.workbench.session.verdict import SLICE_AGAIN, SUPPORT_ON, verdict_of
+from machine.workbench.web.snapshot import SLICE_AGAIN, SUPPORT_ON, verdict_of
 from profiles.profile import load
 
 
