@@ -11,10 +11,9 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from machine.printing.servers.answers import entry, number, table, temperature, whole
 from machine.printing.servers.credentials import how_to_give_a_key
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
-from machine.printing.servers.http import HttpSession, Reply, plain
+from machine.printing.servers.http import HttpSession, Reply, entry, number, plain, table, temperature, whole
 from machine.printing.servers.server import ACTIVE, JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 

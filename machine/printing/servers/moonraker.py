@@ -9,9 +9,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from machine.printing.servers.answers import entry, number, table, temperature, whole
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
-from machine.printing.servers.http import HttpSession
+from machine.printing.servers.http import HttpSession, entry, number, table, temperature, whole
 from machine.printing.servers.server import JobStatus, Phase, PrintServer, ServerIdentity
 from machine.printing.servers.webcam import picture_address
 from profiles.errors import ServerError

@@ -7,8 +7,8 @@ Any refusal for want of a key is 403. The file is kept under temporary names unt
 from collections.abc import Mapping
 from typing import Any
 
-from machine.printing.servers.answers import number, table, temperature, whole
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
+from machine.printing.servers.http import number, table, temperature, whole
 from machine.printing.servers.server import JobStatus, Phase, PrintServer, ServerIdentity
 from machine.printing.servers.webcam import picture_address
 from profiles.errors import ServerError

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from machine.printing.servers.answers import number, table
+from machine.printing.servers.http import number, table
 from machine.setup.detect.found import (
     ACCELERATION,
     EXTRUDER,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from machine.view.page import EXPORT, IMPORT, TEMPLATE, bundle
-from machine.workbench.web.page import OWN
+from machine.workbench.web.server import OWN
 
 SCRIPTS = sorted([*TEMPLATE.glob("*.js"), *OWN.glob("*.js")])
 NODE = shutil.which("node")

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import pytest
 
 from machine.pipeline.pricing import pricing
-from machine.workbench.bench.effect import Effect, effect_of, effect_of_change
 from mdp.search.search import decompose
-from profiles.frozen import Frozen
+from profiles.effect import effect_of, effect_of_change
+from profiles.frozen import Effect, Frozen
 from profiles.profile import Profile, load
 from tests.shapes import tee
 
