@@ -53,9 +53,6 @@ CONFINED = {
     "tools": (),
 }
 FRONT_ENDS = ("machine/cli/", "machine/workbench/")  # they talk to people: nothing below knows them
-SPEAKING = (  # files below them that still speak to the terminal themselves
-    *(f"machine/printing/{name}.py" for name in ("attendance", "compatibility", "network_print", "resumption", "stream")),
-)
 HEAVY = {
     "numba",
     "rich",
@@ -91,7 +88,7 @@ def offences(path: str, source: str) -> list[str]:
             wrong["relative", top] = f"{path} imports by a relative name"
         if top in LAYERS and LAYERS.index(top) > LAYERS.index(layer):
             wrong["layer", top] = f"{path} imports {module}, which lies to the right of {layer}"
-        if f"{module.replace('.', '/')}/".startswith(FRONT_ENDS) and not path.startswith((*FRONT_ENDS, *SPEAKING)):
+        if f"{module.replace('.', '/')}/".startswith(FRONT_ENDS) and not path.startswith(FRONT_ENDS):
             wrong["front end", top] = f"{path} imports {module}: only the two front ends know each other"
         if top in CONFINED and not path.startswith(CONFINED[top]):
             wrong["confined", top] = f"{path} imports {module}, which is confined to {CONFINED[top] or 'no package'}"

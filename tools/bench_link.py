@@ -22,7 +22,7 @@ from machine.link.protocol import connection as protocol
 from machine.link.protocol.framing import frame
 from machine.link.stream import print_lines
 from machine.printing.serial_log import SerialLog, tap
-from machine.printing.stream import QUEUE, USB_BYTES
+from machine.printing.serial_print import QUEUE, USB_BYTES
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter

@@ -125,18 +125,18 @@ def begin_prints(page: PrintPage, ports: Sequence[str]) -> list[int]:
     """The numbers of prints at these ports that all move already."""
 
     def of(port: str) -> dict[str, Any]:
-        return next((entry for entry in page.state["prints"] if entry["port"] == port), {"phase": "over", "number": 0})
+        return next((entry for entry in page.state["prints"] if entry["port"] == port), {"over": True, "state": "", "number": 0})
 
-    while wanting := [port for port in ports if of(port)["phase"] == "over"]:  # a busy computer asks a printer in vain
+    while wanting := [port for port in ports if of(port)["over"]]:  # a busy computer asks a printer in vain
         before = {port: of(port)["number"] for port in wanting}
         for port in wanting:
             page.do("check", port=port)
         page.until(lambda state: all(of(port)["number"] != number for port, number in before.items()))  # noqa: B023
-        page.until(lambda state: all(of(port)["phase"] in ("ready", "over") for port in ports))
+        page.until(lambda state: all((of(port)["over"] or of(port)["state"] == "ready") for port in ports))
     for port in ports:
         page.do("begin", print=of(port)["number"])
-    page.until(lambda state: all(of(port)["phase"] == "over" or _moves(of(port)) for port in ports))
-    if ended_early := [of(port)["sentence"] for port in ports if of(port)["phase"] == "over"]:
+    page.until(lambda state: all(of(port)["over"] or _moves(of(port)) for port in ports))
+    if ended_early := [of(port)["sentence"] for port in ports if of(port)["over"]]:
         raise SystemExit(f"a print has not begun: {ended_early[0]}")
     return [int(of(port)["number"]) for port in ports]
 
@@ -151,7 +151,7 @@ def ended(page: PrintPage, number: int) -> dict[str, Any]:
     def of(number: int) -> dict[str, Any]:
         return next(entry for entry in page.state["prints"] if entry["number"] == number)
 
-    page.until(lambda state: of(number)["phase"] == "over")
+    page.until(lambda state: of(number)["over"])
     return of(number)
 
 

@@ -16,8 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from machine.pipeline.requests import SIMULATED, PrintRequest
-from machine.workbench.printing.last_printer import keep_printer
+from machine.printing.destination import Simulated
+from machine.workbench.printing.prints import keep_printer
 from tests.machine.browser import Browser
 from tests.machine.prints import prints_line
 from tests.machine.running_workbench import OpenToNetwork, open_workbench, workbench
@@ -157,7 +157,7 @@ def walk_from_the_phone(browser: Browser, model: Path, at: Callable[[str, int, f
 
 def leave_earlier_work(model: Path) -> None:
     """What a person has done before: work on the model, which is kept, and the printer that was printed at."""
-    keep_printer(PrintRequest(SIMULATED))
+    keep_printer(Simulated())
     with workbench(str(model)) as running, running.line() as bench:
         bench.until(lambda state: state["model"])
         bench.do("turn", axis="z", deg=90)
@@ -172,7 +172,7 @@ def begin_print(running: OpenToNetwork) -> None:
         bench.do("slice")
         bench.until(lambda state: state["sliced"])
         prints.do("check", port="sim", sim_speed=20)
-        prints.until(lambda job: job["phase"] == "ready")
+        prints.until(lambda job: job["state"] == "ready")
         prints.command("begin")
         prints.until(lambda job: job["progress"].get("layer"))
 

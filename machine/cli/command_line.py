@@ -127,7 +127,7 @@ def send(
 
     A key or password stands in servers.toml in the settings folder (see docs/network.md) or in the variable TILTPRINT_SERVER_KEY.
     """
-    from machine.cli.commands.send import send
+    from machine.cli.commands.print import send
 
     return send(options.model_request(file, options.SearchOptions(), given, force=force), to, start=start, log=log)
 
@@ -140,14 +140,14 @@ def follow(
 
     Keys at a terminal are those of print; l, or Ctrl-C and no answer, leaves it printing. Ctrl-C twice cancels.
     """
-    from machine.cli.commands.follow import follow
+    from machine.cli.commands.print import follow
 
     return follow(server, log)
 
 
 def resume(asked: requests.ResumeOptions) -> int:
     """Go on with a print after a power cut, a crash or a pulled plug."""
-    from machine.cli.commands.resume import list_resumable, resume
+    from machine.cli.commands.print import list_resumable, resume
     from machine.link.journal import read_journal
     from profiles.errors import JournalError
 

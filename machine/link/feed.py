@@ -15,7 +15,8 @@ from machine.link.pause.park_moves import lift_move
 from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
-from machine.link.progress import PrintJob, ProgramPosition, Progress
+from machine.link.print_state import PrintState, PrintStatus
+from machine.link.progress import ProgramPosition, StreamPlan
 from machine.link.protocol.events import Event, Ok, Position
 from machine.link.protocol.framing import command_of, name_of
 from machine.link.protocol.states import State
@@ -38,11 +39,11 @@ class Feed:
 
     def __init__(
         self,
-        job: PrintJob,
+        job: StreamPlan,
         *,
         control: Control | None,
         journal: Journal | None,
-        on_progress: Callable[[Progress], None] | None,
+        on_progress: Callable[[PrintStatus], None] | None,
         stop: Flag | None,
         start_s: float,
     ) -> None:
@@ -58,7 +59,7 @@ class Feed:
         self.reports = PrinterReports(watchdog, start_s)
         self.exchange: Exchange
         self.resume_point: ResumePoint | None = None
-        self.state, self._trouble, self.started, self.finished = "printing", "", False, False
+        self.state, self._trouble, self.started, self.finished = PrintState.PRINTING, "", False, False
         self.sent = self._skipped = 0
         self._program_pause = ""  # what the program says of the pause before its next command
         self._barriers, self._reconnected = Barriers(self.modal.axes.letters, start_s), False
@@ -93,14 +94,14 @@ class Feed:
 
     def _approach(self, resume_point: ResumePoint) -> None:
         """What stands before the first line of a resumed print, proved by the printer's own position."""
-        self.set_state("resuming")
+        self.set_state(PrintState.RESUMING)
         self.history = self._new_history(resume_point.line - 1)
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self._record()
         for command in resume_point.before:
             self.exchange.send(command)
         self._verify_position("before the print goes on")
-        self.set_state("printing")
+        self.set_state(PrintState.PRINTING)
 
     def _skip(self, command: str) -> None:
         """A command that was done by an earlier run, or that the firmware does not know."""
@@ -214,7 +215,7 @@ class Feed:
 
     def _rest(self, why: str = "") -> None:
         """A pause; why: shown meanwhile. The print goes on where it stopped."""
-        self.set_state("pausing", why)
+        self.set_state(PrintState.PAUSING, why)
         self._record()
         position_known = not self._position_errors()
         self._pause = Pause(self.exchange, self._pending, self.reports, self.modal, self._job.profile)
@@ -225,12 +226,12 @@ class Feed:
         if position_known:
             self._verify_position("after the pause")
         self._pause = None
-        self.set_state("printing")
+        self.set_state(PrintState.PRINTING)
 
     def _finish(self) -> None:
         """The barrier: the print is done when a question asked after M400 is answered."""
         exchange = self.exchange
-        self.set_state("finishing")
+        self.set_state(PrintState.FINISHING)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send("M155 S0")
         for command in self._pending.undo_overrides():
@@ -283,13 +284,13 @@ class Feed:
         """While the print is being ended: only the emergency stop still counts. Raises EmergencyError."""
         self._pending.heed_emergency()
 
-    def set_state(self, state: str, message: str = "") -> None:
+    def set_state(self, state: PrintState, message: str = "") -> None:
         """Show a new state at once."""
         self.state, self._pending.message = state, message
         self.show(self.exchange.medium.now_s())
 
     @contextmanager
-    def in_state(self, state: str, message: str) -> Iterator[None]:
+    def in_state(self, state: PrintState, message: str) -> Iterator[None]:
         """Another state for as long as something takes; the position is proved before the print goes on."""
         before, words = self.state, self._pending.message
         self._reconnected, self._trouble = True, message
@@ -331,15 +332,17 @@ class Feed:
             return
         at, history, feed_percent = self._position, self.history, self._pending.feed_percent
         elapsed_s, done = now_s - self._start_s, self._skipped + history.commands
-        pausing = self.state == "printing" and self._pending.pause_s is not None  # begins at the end of the stroke under way
+        pausing = (
+            self.state is PrintState.PRINTING and self._pending.pause_s is not None
+        )  # begins at the end of the stroke under way
         self._on_progress(
-            Progress(
+            PrintStatus(
                 sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
                 left_s=self._job.left_s(at, history.before, history.acknowledged, elapsed_s, feed_percent),
                 share=at.share(done, self._job.total),
                 temperature=self.reports.temperature, heat_age_s=now_s - self.reports.temperature_s,
                 part=at.part, parts=at.parts, layer=at.layer,
-                state="pausing" if pausing else self.state,
+                state=PrintState.PAUSING if pausing else self.state,
                 file_line=history.acknowledged,
                 feed_percent=feed_percent, flow_percent=self._pending.flow_percent,
                 message=self._pending.message or self._trouble or self.reports.waiting or self._silence(),

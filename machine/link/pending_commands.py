@@ -13,11 +13,11 @@ from threading import Event as Flag
 from machine.gcode.commands import command_in
 from machine.gcode.modes import Axes, ModalState
 from machine.gcode.words import read_words, split_command
+from machine.link.print_state import AWAY, PrintState
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from profiles.errors import LocalProtocolError
 
 MOST_AT_ONCE = 16  # requests taken in a turn: what asks without end must not hold up the print
-AWAY = ("pausing", "paused")
 # Marlin takes 10 to 999 per cent. Beyond 300 the planner starves, beyond 200 the extruder slips.
 FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
 
@@ -84,7 +84,7 @@ class PendingCommands:
     flow_percent: float = 100.0
     message: str = ""
 
-    def poll(self, state: str, now_s: float) -> None:
+    def poll(self, state: PrintState, now_s: float) -> None:
         """Take what was asked since. Raises CancelledError, EmergencyError."""
         if self.stop is not None and self.stop.is_set():
             raise CancelledError
@@ -100,7 +100,7 @@ class PendingCommands:
             if request.command is Command.EMERGENCY_STOP:
                 raise EmergencyError
 
-    def accept(self, request: PendingCommand, state: str, now_s: float) -> None:
+    def accept(self, request: PendingCommand, state: PrintState, now_s: float) -> None:
         """Take one request. Raises CancelledError, EmergencyError."""
         command = request.command
         if command is Command.EMERGENCY_STOP:
@@ -144,8 +144,8 @@ class PendingCommands:
         pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
         return [f"{name} S100" for name, value in pairs if value != 100.0]
 
-    def _queue_line(self, text: str, state: str) -> None:
-        why = line_refusal(text, self.axes, state == "paused", self.limit)
+    def _queue_line(self, text: str, state: PrintState) -> None:
+        why = line_refusal(text, self.axes, state is PrintState.PAUSED, self.limit)
         self.message = "" if why is None else f"not sent: {text.strip()[:40]!r}: {why}"
         if why is None:
             self.lines.append(command_of(text, "the command", self.limit))

@@ -1,4 +1,4 @@
-"""How far a print is: counts, temperatures, and what the program's own comments and M73 say."""
+"""How far a print is by its lines, its dry run, and what the program's own comments and M73 say."""
 
 from __future__ import annotations
 
@@ -7,51 +7,8 @@ from dataclasses import dataclass, field
 
 from machine.gcode.line_text import begins_layer, begun_part, read_line
 from machine.gcode.words import read_words, split_command
-from machine.link.protocol.events import Temperature
 from machine.link.protocol.framing import LINE_LIMIT
 from profiles.profile import Profile
-
-OLD_HEAT_S = 15.0  # a printer reports every few seconds, and is asked when it does not
-UNHEARD = ("cancelling", "reconnecting")  # states of a print in which no report is taken
-
-
-@dataclass(frozen=True)
-class Progress:
-    """A moment of a print. None: not known (yet).
-
-    state: printing, pausing, paused, resuming, cancelling, finishing, reconnecting. file_line: line in the program's file of the
-    newest acknowledged command, from 1. message: the newest word to the person watching, "" when there is none. warning: what
-    that person must know from now on, beside every message, "" when there is nothing. heat_age_s: since the temperatures were
-    reported.
-    """
-
-    elapsed_s: float
-    temperature: Temperature
-    sent: int = 0
-    acknowledged: int = 0
-    total: int | None = None
-    left_s: float | None = None
-    share: float | None = None
-    part: int | None = None
-    parts: int | None = None
-    layer: int | None = None
-    state: str = "printing"
-    file_line: int = 0
-    feed_percent: float = 100.0
-    flow_percent: float = 100.0
-    message: str = ""
-    warning: str = ""
-    heat_age_s: float = 0.0
-
-    @property
-    def heat_is_old(self) -> bool:
-        """Whether the temperatures are only those last known."""
-        return self.heat_age_s >= OLD_HEAT_S or self.state in UNHEARD
-
-
-def last_known(heat: Temperature, age_s: float) -> str:
-    """Temperatures behind the last words of a print, for what hears no more of its heaters; "" where none were told."""
-    return f"; {heat.words} as last known, {age_s:.0f} s before" if heat.words else ""
 
 
 @dataclass(frozen=True)
@@ -119,8 +76,8 @@ class ProgramPosition:
 
 
 @dataclass(frozen=True)
-class PrintJob:
-    """What is fixed for a print before it begins. total: commands; limit: characters of a line that the firmware takes."""
+class StreamPlan:
+    """What is fixed for a stream before it begins. total: commands; limit: characters of a line that the firmware takes."""
 
     total: int | None = None
     schedule: Schedule | None = None

@@ -11,7 +11,8 @@ from machine.link.journal import Journal
 from machine.link.medium import SERIAL, Medium, reopen
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
 from machine.link.port import find_again, find_device, stable_name
-from machine.link.progress import PrintJob, Progress, Schedule, last_known
+from machine.link.print_state import PrintState, PrintStatus, last_known
+from machine.link.progress import Schedule, StreamPlan
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint
@@ -48,7 +49,7 @@ def print_lines(
     port: str,
     baud: int = 115200,
     *,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[PrintStatus], None] | None = None,
     stop: Flag | None = None,
     schedule: Schedule | None = None,
     timing: Timing | None = None,
@@ -77,8 +78,8 @@ def print_lines(
     total = None
     if not isinstance(lines, Iterator):
         total = sum(1 for number, line in enumerate(lines, 1) if command_of(line, number, limit))
-    job = PrintJob(total, schedule, limit, profile)
-    feed = Feed(job, control=control, journal=journal, on_progress=on_progress, stop=stop, start_s=medium.now_s())
+    plan = StreamPlan(total, schedule, limit, profile)
+    feed = Feed(plan, control=control, journal=journal, on_progress=on_progress, stop=stop, start_s=medium.now_s())
     finder = _PortFinder(feed, port, baud, medium)
     wire = medium.open(port, baud)
     rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
@@ -122,7 +123,7 @@ class _PortFinder:
         feed, medium = self._feed, self._medium
         feed.exchange.wire.close()
         end_s = medium.now_s() + medium.lost_s
-        with feed.in_state("reconnecting", f"{error}; waiting {medium.lost_s:.0f} s for it to come back"):
+        with feed.in_state(PrintState.RECONNECTING, f"{error}; waiting {medium.lost_s:.0f} s for it to come back"):
             while (wire := reopen(self._find, self._baud, medium, feed.poll, end_s)) is not None:
                 if feed.exchange.connection.greeting.firmware.line.resends:
                     return Reconnection(wire, None)
@@ -188,14 +189,14 @@ class _Print:
         if not self.feed.started:
             return None
         waits = "the printer is waited for: what it does now (homing, a dwell) must not be stopped" if self.exchange.waits else ""
-        self.feed.set_state("cancelling", waits)
+        self.feed.set_state(PrintState.CANCELLING, waits)
         return self._shut_down(SETTLE_S)
 
     def _stop(self) -> str:
         """The emergency stop, in words."""
         heat = self._last_known()
         words = self._guard.stop()
-        self.feed.set_state("cancelling")
+        self.feed.set_state(PrintState.CANCELLING)
         return f"{words}{heat}"
 
     def _leave(self, error: PrinterError) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from os.path import isfile
 from pathlib import Path
 
-from machine.pipeline.requests import STDOUT, ModelRequest, Outputs, PrintRequest
+from machine.pipeline.requests import STDOUT, ModelRequest, Outputs
 from mdp.model_file import DEMO
 from mdp.ranking import SUFFIX
 from profiles.errors import OutputError
@@ -23,10 +23,10 @@ def check_model_files(request: ModelRequest, written: Iterable[Role], *also_read
         _check_folder(request.outputs.folder, read)
 
 
-def printing_files(printing: PrintRequest) -> tuple[Role, ...]:
+def printing_files(log: Path | None, journal: Path | None) -> tuple[Role, ...]:
     """The files that a print writes."""
-    program = None if printing.journal is None else program_beside(printing.journal)
-    return ("--log", printing.log), ("--journal", printing.journal), ("the program beside --journal", program)
+    program = None if journal is None else program_beside(journal)
+    return ("--log", log), ("--journal", journal), ("the program beside --journal", program)
 
 
 def program_beside(journal: Path) -> Path:

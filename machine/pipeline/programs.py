@@ -79,11 +79,13 @@ def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
     """Raise MoveError for a program whose dry run found errors; force: only say so."""
     if not errors:
         return
-    count = f"{len(errors)} error{'s' * (len(errors) > 1)}"
+    count = count_of_errors(errors)
     if force:
-        say(f"the dry run found {count}", forced=True)
+        say(count, forced=True)
         return
-    raise MoveError(
-        f"the dry run found {count}, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})",
-        forcible=True,
-    )
+    raise MoveError(f"{count}, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})", forcible=True)
+
+
+def count_of_errors(errors: Sequence[Finding]) -> str:
+    """How many errors a dry run found, as a sentence; "" when there are none."""
+    return f"the dry run found {len(errors)} error{'s' * (len(errors) > 1)}" if errors else ""

@@ -15,6 +15,7 @@ STDOUT = Path("-")  # stands for standard output where a file is asked for
 PLACING = ("process.scale", "process.rotate_deg", "process.place_mm")  # how a model lies and stands
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
+BAUD = 115200
 UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
 MOST_COPIES = 1000  # of a model, and models on a plate
 FORCE_GOES_ON = "--force goes on"  # how a sentence says that its error is forcible
@@ -143,7 +144,7 @@ class PrintRequest:
     """
 
     port: str
-    baud: int = 115200
+    baud: int = BAUD
     sim_speed: float = 0.0
     log: Path | None = None
     journal: Path | None = None
@@ -156,7 +157,7 @@ class PortRequest:
     """A printer whose axes are measured; log as for a print."""
 
     port: str
-    baud: int = 115200
+    baud: int = BAUD
     log: Path | None = None
 
 

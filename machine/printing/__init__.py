@@ -1,5 +1,6 @@
-"""Printer: one at a port: whether it fits machine and program, the stream to it, what is recorded of it.
+"""Printing: one print, at a port or on a print server, whoever attends it.
 
-`stream.print_program` prints at a port, `network_print.print_there` on a server, `resumption` goes on with what was cut off;
-before anything moves `compatibility` and `server_checks` hold printer, machine and program together.
+`destination.parse_destination` reads where it goes, a `job.PrintJob` says what is to be done there, `printers.check_print` asks
+what is asked before anything moves, and a `job.Printer` (`serial_print`, `server_print`) prints it for a `job.Person`.
+`resumption` goes on with what was cut off, `rescue` makes a printer safe whose sender has died.
 """

@@ -6,9 +6,8 @@ A print server goes on printing by itself: it is only asked what it does, unless
 from machine.link.medium import SERIAL
 from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
-from machine.printing.servers.address import is_server_address
+from machine.printing.destination import Destination, Server, Simulated
 from machine.printing.servers.follow import UNCONFIRMED
-from machine.printing.servers.server import ACTIVE
 from machine.printing.servers.servers import open_server
 from profiles.errors import PortError, ServerError, UserError
 
@@ -17,15 +16,17 @@ ROUNDED_S = 1.0  # servers tell whole seconds
 STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 
-def rescue(port: str, baud: int, emergency: bool) -> str:
+def rescue(at: Destination, emergency: bool) -> str:
     """Open the port anew and give the orders; what became of them as a sentence. emergency: by M112.
 
     Homing that is under way is cut short, whereupon Marlin halts: its heaters are off then, too.
     """
-    if is_server_address(port):
-        return _stop_server(port) if emergency else _look_at_server(port)
+    if isinstance(at, Server):
+        return _stop_server(at) if emergency else _look_at_server(at)
+    if isinstance(at, Simulated):
+        return "the simulated printer has ended with it"
     try:
-        with open_port(port, baud) as wire:
+        with open_port(at.name, at.baud) as wire:
             if not emergency:
                 heaters = heaters_off(wire, SERIAL)
                 unproved = heaters is Heaters.UNPROVED
@@ -38,45 +39,45 @@ def rescue(port: str, baud: int, emergency: bool) -> str:
     )
 
 
-def _stop_server(address: str) -> str:
+def _stop_server(at: Server) -> str:
     try:
-        with open_server(address) as server:
+        with open_server(at) as server:
             server.emergency_stop()
     except UserError as error:
-        return UNCONFIRMED.format(server=address, error=error)
-    return STOPPED.format(server=address)
+        return UNCONFIRMED.format(server=at.name, error=error)
+    return STOPPED.format(server=at.name)
 
 
-def cancel_on_server(address: str, file: str, away_s: float) -> bool:
+def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
     """Cancel a print that nobody follows any more, if it certainly is the one that was left.
 
     file: its name on the server; away_s: how long ago it was last seen printing. Returns False when nothing is printed there.
     Raises ServerError, and cancels nothing, when the server is unreachable or what it prints may be somebody else's.
     """
-    with open_server(address) as server:
+    with open_server(at) as server:
         server.greet()
         status = server.status()
-        if status.phase not in ACTIVE:
+        if not status.state.is_printing:
             return False
         printed = status.file or server.file_in_print()
         if not printed:
-            raise ServerError(f"{address} does not say which file it prints, it may not be {file}: {CANCEL_THERE}")
+            raise ServerError(f"{at.name} does not say which file it prints, it may not be {file}: {CANCEL_THERE}")
         if printed != file:
-            raise ServerError(f"{address} prints {printed} now, not {file}")
-        if (status.elapsed_s or 0.0) + ROUNDED_S < away_s:  # begun after the one that was left was last seen
-            raise ServerError(f"{address} may have begun to print {file} again since: {CANCEL_THERE}")
+            raise ServerError(f"{at.name} prints {printed} now, not {file}")
+        if status.elapsed_s + ROUNDED_S < away_s:  # begun after the one that was left was last seen
+            raise ServerError(f"{at.name} may have begun to print {file} again since: {CANCEL_THERE}")
         server.cancel()
         return True
 
 
-def _look_at_server(address: str) -> str:
+def _look_at_server(at: Server) -> str:
     try:
-        with open_server(address) as server:
+        with open_server(at) as server:
             server.greet()
             status = server.status()
     except UserError as error:
-        return f"{error}; what {address} prints goes on without this program: look at the printer"
-    if status.phase in ACTIVE:
-        now = f"{address} is {status.phase.value} {status.file or 'a file'}"
+        return f"{error}; what {at.name} prints goes on without this program: look at the printer"
+    if status.state.is_printing:
+        now = f"{at.name} is {status.state} {status.file or 'a file'}"
         return f"{now} and goes on without this program: its own page commands it"
-    return f"{address} prints nothing now ({status.message or status.phase.value})"
+    return f"{at.name} prints nothing now ({status.message or status.state})"

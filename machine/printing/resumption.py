@@ -1,10 +1,9 @@
 """Resumption: a print that was cut off, read from its journal, and its rest: what is told, what is asked, what is refused.
 
-Whoever asks a person, at the terminal or at a page, is given the question as text, and asks it only when the printer itself has
-told where it stands: until the answer is yes, nothing of it moves or heats.
+The person is asked only when the printer itself has told where it stands: until the answer is yes, nothing of it moves or heats.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import hypot
@@ -39,15 +38,13 @@ from machine.link.status import PrinterStatus
 from machine.notices import say
 from machine.pipeline.file_roles import check_roles, printing_files
 from machine.pipeline.programs import LoadedProgram
-from machine.pipeline.requests import SIMULATED, PrintRequest
-from machine.printing.attendance import Attendance, AtTerminal, Observers
-from machine.printing.compatibility import check_dialect
+from machine.printing.checks import check_dialect
+from machine.printing.destination import SerialPort, Simulated, at_printer
+from machine.printing.job import NOT_MOVED, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import continue_journal
 from machine.printing.serial_log import new_log
-from machine.printing.server_checks import check_no_server
-from machine.printing.stream import report_end, stream_program
+from machine.printing.serial_print import report_end, stream_program
 from machine.program import Program
-from machine.view.serving.watch_page import serve_watch_page
 from profiles.errors import JournalError, ProfileError
 from profiles.profile import Profile, profile_of_tables
 
@@ -55,13 +52,13 @@ RESTARTED = (
     "this computer may have restarted since the print began, so the newest records may be missing: see that the print is no "
     "higher than this, and that tip and table stand as told here, before you go on"
 )
-NOTHING, STOPPED = 1, 130  # what a resume ends with besides 0: the answer was no; a person has stopped the rest
 
 
 @dataclass(frozen=True, eq=False)
 class Resumption:
-    """A print that can be gone on with, as its journal and its program tell; journal: its file."""
+    """A print that can be gone on with, as its journal and its program tell; journal: its file, at: where its printer is."""
 
+    at: SerialPort
     journal: Path
     story: JournalContents
     profile: Profile
@@ -91,72 +88,69 @@ class Resumption:
         )
 
 
-def read_resumption(journal: Path, printing: PrintRequest, named: Profile | None = None) -> Resumption:
-    """What a journal tells. named: the profile whose machine the user has named. Raises JournalError and other UserErrors for
-    what cannot be resumed at this port."""
-    if printing.port == SIMULATED:
+def read_resumption(job: PrintJob) -> Resumption:
+    """What the journal of a job tells. The job's profile is the one whose machine the user has named.
+
+    Raises JournalError and other UserErrors for what cannot be resumed at this printer.
+    """
+    journal, at = job.cut_off, at_printer(job.destination)
+    assert journal is not None
+    if isinstance(at, Simulated):
         raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
-    check_no_server(printing.port)
     if is_being_printed(journal):  # asked first: what is read after that does not change any more
         raise JournalError(
             f"journal {journal}: its print runs now, in another terminal or page: it can be resumed when it has ended"
         )
     story = read_journal(journal)
-    profile = _profile(journal, story.heading, named)
+    profile = _profile(journal, story.heading, job.profile)
     check_dialect(profile.machine)
     text = _program(journal, story)
-    check_roles((("the journal", journal), ("its program", text.path)), printing_files(printing))
+    check_roles((("the journal", journal), ("its program", text.path)), printing_files(job.log, job.journal))
     point = read_interrupted_print(text, story.last, profile, dialect_of(profile.machine).longest_line)
-    return Resumption(journal, story, profile, text, point, tuple(text))
+    return Resumption(at, journal, story, profile, text, point, tuple(text))
 
 
-def print_rest(
-    cut_off: Resumption,
-    printing: PrintRequest,
-    agrees: Callable[[str], bool],
-    which: Callable[[str, tuple[float, ...]], float | None],
-    attendance: Attendance | None = None,
-) -> int:
-    """Ask the printer where it stands, then agrees(question) a person, and print the rest; says how it ended.
+def rest_of(cut_off: Resumption) -> LoadedProgram:
+    """The program whose rest is printed, dry-run."""
+    return LoadedProgram(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
 
-    0, NOTHING or STOPPED. which(question, heights): where the tip may have stood at several heights, the one a person sees, None
-    for none; may raise JournalError. The journal of the request is a new one. attendance: of a person who is not at the terminal.
-    Raises PrinterError.
+
+def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: Person) -> End:
+    """Ask the printer where it stands, then the person whether the print is to go on, and print the rest.
+
+    Where the tip may have stood at several heights, the person is asked which it is. The journal of the job is a new one. Raises
+    PrinterError, JournalError where nobody can answer.
     """
-    person = attendance or AtTerminal()
-    job = LoadedProgram(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
-    with _further_journal(cut_off, printing) as further:
+    with _further_journal(cut_off, job) as further:
 
         def begin(status: PrinterStatus) -> ResumePoint:
             way = plan_resume(cut_off.point, status, cut_off.profile)
             point = cut_off.point
             if is_in_doubt(way, point, cut_off.profile):
-                stood_mm = which(_height_question(point), heights_mm(point))
-                if stood_mm is None:
+                heights = heights_mm(point)
+                chosen = person.ask(_height_question(point), tuple(f"Z {z:.2f}" for z in heights))
+                if chosen is None:
                     raise CancelledError
-                point = replace(point, stood_mm=stood_mm)
+                point = replace(point, stood_mm=heights[chosen])
                 way = plan_resume(point, status, cut_off.profile)
-            if not agrees(_question(way, point, cut_off.profile)):
+            if person.ask(_question(way, point, cut_off.profile)) is None:
                 raise CancelledError
             _hand_over(cut_off, further, way.start.line - 1)
             return way.start
 
-        with (
-            new_log("print", f"the rest of {job.name} to {printing.port}", printing.log) as log,
-            serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched,
-        ):
-            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin=begin, attendance=person)
-            watched.end("stopped" if outcome.cancelled else "done")
+        title = f"the rest of {rest.name} to {cut_off.at.name}"
+        with new_log("print", title, job.log) as log:
+            outcome = stream_program(rest, cut_off.at, Scene(title, log, further), person, begin=begin)
         if outcome.cancelled and outcome.heaters_off is None:
-            say("nothing was moved or heated")
-            return NOTHING
+            say(NOT_MOVED.sentence)
+            return NOT_MOVED
         return report_end(outcome, journal=further)
 
 
 @contextmanager
-def _further_journal(cut_off: Resumption, printing: PrintRequest) -> Iterator[Journal]:
+def _further_journal(cut_off: Resumption, job: PrintJob) -> Iterator[Journal]:
     """The journal of the rest; one that tells nothing is not left, for it would let the whole program begin anew."""
-    with continue_journal(cut_off.text, cut_off.profile, cut_off.name, printing.journal) as further:
+    with continue_journal(cut_off.text, cut_off.profile, cut_off.name, job.journal) as further:
         try:
             yield further
         finally:

@@ -1,7 +1,8 @@
-"""Serial log: what went over the line, one file a print, bounded in size, old ones deleted."""
+"""Serial log: what went over the line, one file a print, bounded in size, old ones deleted; and what the printer said last."""
 
 import os
 import time
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime
@@ -10,12 +11,15 @@ from pathlib import Path
 from typing import Self
 
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
+from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event, unknown_command
 from profiles.errors import reason
 from profiles.folders import state_folder
 
 KEPT = 10  # logs of each kind
 LIMIT_BYTES = 64_000_000  # of one log: about 600,000 lines with their answers
 PIECES = 4  # the first one is kept for the beginning, the others are the newest
+WORDS_KEPT = 50  # of a printer
+LONGEST_BYTES = 4096  # of a line that is not ended yet
 UNWRITTEN = 512  # chunks between writes: writing each by itself would cost as much as sending it
 UNWRITTEN_S = 1.0  # at most that much is missing after a crash
 
@@ -195,3 +199,49 @@ def _thin(files: Iterable[Path]) -> None:
     for name in sorted(pieces, reverse=True)[KEPT - 1 :]:
         for file in pieces[name]:
             file.unlink(missing_ok=True)
+
+
+class PrinterMessages:
+    """The last things a printer has said that are no mere answers; hear() takes chunks of bytes in the thread of the port."""
+
+    def __init__(self, most: int = WORDS_KEPT) -> None:
+        self.last: deque[str] = deque(maxlen=most)
+        self._half, self._message = b"", ""
+        self._newest, self._times = "", 0
+
+    def hear(self, direction: str, data: bytes) -> None:
+        """Take what was received ("<")."""
+        if direction != "<":
+            return
+        *lines, self._half = (self._half + data).split(b"\n")
+        self._half = self._half[-LONGEST_BYTES:]
+        for line in lines:
+            if line[:2] != b"ok" and (text := printer_message(line)):
+                self._append(text)
+
+    def _append(self, text: str) -> None:
+        """What is said again takes no line of its own but a count."""
+        again = text == self._newest and bool(self.last)
+        self._newest, self._times = text, self._times + 1 if again else 1
+        if again:
+            self.last[-1] = f"{text} (x {self._times})"
+        else:
+            self.last.append(text)
+
+    def add(self, text: str) -> None:
+        """Take the stream's message of this moment; one that stays is added once."""
+        if text and text != self._message:
+            self._append(text)
+        self._message = text
+
+
+def printer_message(line: bytes) -> str:
+    """What a line tells a person, "" for reports and answers."""
+    event = read_event(line)
+    if isinstance(event, Start):
+        return "the printer has started"
+    if isinstance(event, Action):
+        return f"the printer asks: {event.name} {event.words}".rstrip()
+    if unknown := unknown_command(event):
+        return f"Unknown command: {unknown}"
+    return event.text if isinstance(event, Echo | FirmwareFault | LineError | Unknown) else ""

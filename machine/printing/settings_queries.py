@@ -5,21 +5,17 @@ Only questions are asked: nothing moves, nothing heats. A printer that prints is
 
 import re
 from collections.abc import Iterator
-from contextlib import ExitStack
-from math import inf
 from time import monotonic
 
 from machine.firmware import identify
 from machine.link.identification import GRBL_SAYS, Kind, ask_at_any_rate
-from machine.link.port import Port, open_port
-from machine.pipeline.requests import SIMULATED
-from machine.printing.compatibility import check_answer
-from machine.printing.server_checks import check_idle
-from machine.printing.servers.address import is_server_address
+from machine.link.port import Port
+from machine.printing.checks import check_idle
+from machine.printing.destination import Destination, Server
+from machine.printing.ports import check_answer, open_line, rate_of
 from machine.printing.servers.duet import SETTINGS_ARRAYS, SETTINGS_KEYS
 from machine.printing.servers.servers import open_server
 from machine.setup.detect.found import ConfigText
-from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError, SilenceError
 from profiles.machine import Machine
 
@@ -41,14 +37,12 @@ OTHERWISE = {
 }
 
 
-def text_of_port(port: str, baud: int, simulated: Machine) -> ConfigText:
-    """What answers at a port; simulated: the machine behind the port sim. Raises PrinterError."""
-    if is_server_address(port):
-        return _text_of_server(port)
-    with ExitStack() as stack:
-        path = stack.enter_context(SimulatedPrinter(simulated, inf)).path if port == SIMULATED else port
-        wire = stack.enter_context(open_port(path, baud))
-        return ConfigText(port, _conversation(wire, baud))
+def settings_text(at: Destination, simulated: Machine) -> ConfigText:
+    """What answers there; simulated: the machine of the simulated printer. Raises PrinterError."""
+    if isinstance(at, Server):
+        return _text_of_server(at)
+    with open_line(at, simulated) as wire:
+        return ConfigText(at.name, _conversation(wire, rate_of(at)))
 
 
 def _conversation(wire: Port, baud: int) -> str:
@@ -102,8 +96,8 @@ def _ask(wire: Port, question: str) -> Iterator[str]:
     raise SilenceError(f"the printer at {wire.name} does not answer {question} within {ANSWER_S:g} s: try it again")
 
 
-def _text_of_server(port: str) -> ConfigText:
-    with open_server(port) as server:
+def _text_of_server(at: Server) -> ConfigText:
+    with open_server(at) as server:
         server.greet()
         check_idle(server.name, server.status())
-        return ConfigText(port, server.settings())
+        return ConfigText(at.name, server.settings())

@@ -41,7 +41,7 @@ class PrintPage:
 
     @property
     def print(self) -> dict[str, Any]:
-        newest = self.state["prints"][-1] if self.state["prints"] else {"phase": "", "progress": None}
+        newest = self.state["prints"][-1] if self.state["prints"] else {"state": "", "over": False, "progress": None}
         return {**newest, "progress": newest["progress"] or {}}
 
     def do(self, command: str, **given: Any) -> None:

@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from websockets.sync.client import ClientConnection, connect
 
-from machine.workbench.printing.last_printer import FILE
+from machine.workbench.printing.prints import FILE
 from profiles.folders import state_folder
 
 PATIENCE_S = 180.0  # the first search on a machine compiles its kernels

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from machine.dryrun.dryrun import dry_run
-from machine.link.progress import Progress
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.events import Temperature
 from machine.program import Program
 from machine.view.page import TEMPLATE, bundle, parts_page, print_page
@@ -441,7 +441,7 @@ def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.Monke
     profile, printed = program()
     line = int(printed.run.program.line[40])
     heat = Temperature(nozzle_c=209.6, nozzle_target_c=210.0)
-    now = Progress(
+    now = PrintStatus(
         sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=61.0, share=0.5,
         temperature=heat, part=2, parts=2, layer=7, file_line=line,
     )  # fmt: skip
@@ -453,5 +453,5 @@ def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.Monke
         assert "as last known" not in text(browser, "live")
         assert {address.rsplit("/", 1)[1] for address in browser.requests} == {"", "state"}
         assert browser.complaints == []
-        watched.end("stopped")
+        watched.end(PrintState.CANCELLED)
         browser.wait("document.getElementById('live').textContent.includes('nozzle 210 of 210 °C · as last known')")

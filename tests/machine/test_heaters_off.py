@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import pytest
 
@@ -19,14 +19,15 @@ from machine.cli.commands.measuring.at_port import PrinterMover, ProbingSession,
 from machine.cli.terminal.requests import ConsoleRequest
 from machine.link.medium import Medium, Wire
 from machine.link.stream import print_lines
-from machine.pipeline.requests import PortRequest, PrintRequest
+from machine.pipeline.requests import PortRequest
+from machine.printing import ports
 from machine.printing.command_session import CommandSession, LeftError, StopError
+from machine.printing.destination import SerialPort
+from machine.printing.job import Does, End, PrintJob
 from machine.setup.calibration.program import calibration_pen
 from machine.workbench.printing import at_hand
 from machine.workbench.printing.at_hand import by_hand
-from machine.workbench.printing.at_page import AtPage
-from machine.workbench.printing.checks import Checks
-from machine.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
+from machine.workbench.printing.at_page import AtPage, HandCommand, HandDoes
 from mdp.pose import Pose
 from profiles.errors import FirmwareError, MoveError, PortError, PrinterError
 from profiles.profile import load
@@ -46,7 +47,7 @@ class Steps:
     error: BaseException = field(default_factory=RuntimeError)
     raise_at: tuple[int, ...] = ()
     count: int = 0
-    last: dict[str, object] = field(default_factory=dict)
+    last: dict[str, Any] = field(default_factory=dict)
 
     def take(self, *ignored: object, **told: object) -> None:
         self.count += 1
@@ -86,16 +87,15 @@ class SteppedWire:
 Loop = Callable[[Steps, VirtualPrinter, MonkeyPatch], None]
 
 
-def in_hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch, *commands: HandCommand) -> State:
+def in_hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch, *commands: HandCommand) -> End:
     """What a person does by hand, and how it ended."""
     medium = steps.on_wire(printer.medium)
-    monkeypatch.setattr(at_hand, "open_port", medium.open)
+    monkeypatch.setattr(ports, "open_port", medium.open)
     monkeypatch.setattr(at_hand, "CommandSession", partial(CommandSession, medium=medium))
-    reporter = type("Reporter", (), {"tell": steps.take, "heard": None})()
-    person = AtPage(reporter)
+    person = AtPage(type("Reporter", (), {"tell": steps.take})())
     for command in commands:
         person.by_hand.put(command)
-    return by_hand(HandOrder(PROFILE, PrintRequest(PATH)), person, Checks(reporter))
+    return by_hand(PrintJob(SerialPort(PATH), Does.HAND, profile=PROFILE), person)
 
 
 def hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:
@@ -104,7 +104,7 @@ def hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> Non
 
 def console_of_a_pipe(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:
     medium = steps.on_wire(printer.medium)
-    monkeypatch.setattr(console_module, "open_port", medium.open)
+    monkeypatch.setattr(ports, "open_port", medium.open)
     monkeypatch.setattr(console_module, "CommandSession", partial(CommandSession, medium=medium))
     monkeypatch.setattr(sys, "stdin", io.StringIO("M104 S200\nM140 S60\nG28\nG1 X5 F6000\nM400\n"))
     console(ConsoleRequest(port=PATH), PROFILE.machine)
@@ -112,7 +112,7 @@ def console_of_a_pipe(steps: Steps, printer: VirtualPrinter, monkeypatch: Monkey
 
 def measuring(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -> None:
     medium = steps.on_wire(printer.medium)
-    monkeypatch.setattr(at_port, "open_port", medium.open)
+    monkeypatch.setattr(ports, "open_port", medium.open)
     monkeypatch.setattr(at_port, "ProbingSession", partial(ProbingSession, medium=medium))
     with cold_session(PortRequest(PATH), PROFILE.machine) as session:
         mover = PrinterMover(session, calibration_pen(PROFILE))
@@ -166,7 +166,7 @@ def test_heaters_that_are_to_stay_on_go_off_when_letting_go_fails(monkeypatch: M
     whole, printer, keeping = Steps(), VirtualPrinter(PROFILE.machine), HandCommand(HandDoes.LET_GO, keep_heat=True)
     ended = in_hand(whole, printer, monkeypatch, HEAT, keeping)
     assert targets_c(printer) == (215.0, 60.0)
-    assert ended["sentence"] == "let go of; nozzle set to 215 deg C and bed set to 60 deg C stays on"
+    assert ended.sentence == "let go of; nozzle set to 215 deg C and bed set to 60 deg C stays on"
     for step in range(1, whole.count + 1):
         printer = VirtualPrinter(PROFILE.machine)
         with pytest.raises(RuntimeError):
@@ -192,8 +192,8 @@ def test_a_start_block_that_cannot_be_filled_in_is_told_and_nothing_moves(monkey
     monkeypatch.setattr(f"{__name__}.PROFILE", broken)
     steps, printer = Steps(), VirtualPrinter(PROFILE.machine)
     ended = in_hand(steps, printer, monkeypatch, HEAT, HOME, HandCommand(HandDoes.LET_GO))
-    assert "{warmth}" in steps.last["progress"]["message"]
-    assert (ended["sentence"], targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
+    assert "{warmth}" in steps.last["progress"].message
+    assert (ended.sentence, targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
     assert not printer.record.happened("homed XYZAC")
 
 
@@ -204,7 +204,7 @@ def test_homing_by_hand_heats_nothing_and_does_not_wait(heat: str, monkeypatch: 
     monkeypatch.setattr(f"{__name__}.PROFILE", heated)
     printer = VirtualPrinter(PROFILE.machine)
     ended = in_hand(Steps(), printer, monkeypatch, HOME, HandCommand(HandDoes.LET_GO, keep_heat=True))
-    assert (ended["sentence"], targets_c(printer)) == ("let go of; no heater is on", (0.0, 0.0))
+    assert (ended.sentence, targets_c(printer)) == ("let go of; no heater is on", (0.0, 0.0))
     assert printer.record.happened("homed XYZAC")
     assert printer.record.unknown == 0
 
@@ -213,7 +213,8 @@ def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyP
     class Terminated(Steps):
         def take(self, *ignored: object, **told: object) -> None:
             super().take(**told)
-            if self.last.get("phase") == "hand" and self.last["progress"]["nozzle_target_c"] == 215.0 and not self.raise_at:
+            status = self.last.get("progress")
+            if status is not None and status.temperature.nozzle_target_c == 215.0 and not self.raise_at:
                 self.raise_at = (-1,)
                 signal.raise_signal(signal.SIGTERM)
 
@@ -225,7 +226,7 @@ def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyP
         ended = in_hand(Terminated(), printer, monkeypatch, HEAT)
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert (ended["sentence"], targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
+    assert (ended.sentence, targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
 
 
 def test_an_emergency_stop_counts_while_the_heaters_are_switched_off() -> None:

@@ -159,14 +159,14 @@ def test_a_device_stops_the_print_of_another_page_and_the_print_outlives_its_dev
         phone.do("check", port="/etc/hostname")
         assert phone.refused().startswith("a paired device chooses among the ports that were found here")
         phone.do("check", port="sim", sim_speed=1)
-        phone.until(lambda job: job["phase"] == "ready")
+        phone.until(lambda job: job["state"] == "ready")
         phone.command("begin")
-        phone.until(lambda job: job["phase"] == "printing")
+        phone.until(lambda job: job["state"] == "printing")
     with device.connect("/paired/1/prints?page=other") as line:
         other = PrintPage(line)
-        assert other.until(lambda job: not job.get("held", True))["phase"] == "printing"
+        assert other.until(lambda job: not job.get("held", True))["state"] == "printing"
         other.command("emergency")
-        assert other.until(lambda job: job["phase"] == "over")["phase"] == "over"
+        assert other.until(lambda job: job["over"])["state"] == "over"
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")

@@ -107,11 +107,11 @@ def test_pages_that_read_nothing_leave_the_print_what_the_command_line_sends(sli
         for _ in range(8):
             stack.enter_context(listen_to_nothing(sliced))
         page.do("check", port="sim")
-        page.until(lambda seen: seen["phase"] == "ready")
+        page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
-        done = page.until(lambda seen: seen["phase"] == "over")
+        done = page.until(lambda seen: seen["over"])
         page.command("forget")
-        page.until(lambda seen: not seen["phase"])
+        page.until(lambda seen: not seen["state"])
     assert done["sentence"] == "the print is done"
     assert commands_sent(Path(done["log"])) == commands_sent(folder / "own.log")
 
@@ -128,7 +128,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert "no error" in browser.value("$('run-checks').textContent")
         second_page.do("check", port="sim")
         assert second_page.refused() == "port sim prints already: wait until that is done, or cancel it"
-        second_page.until(lambda seen: seen["phase"] == "ready")
+        second_page.until(lambda seen: seen["state"] == "ready")
         second_page.command("begin")
         assert second_page.refused() == "another page commands this print: take the command over first"
 
@@ -153,9 +153,9 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         second_page.do("check", port="/dev/none")
         browser.wait("$('which').options.length === 2")
         assert browser.value(PRINTING) == "paused"  # the print that is looked at stays, and so does the one that the button stops
-        second_page.until(lambda seen: seen["phase"] == "over")
+        second_page.until(lambda seen: seen["over"])
         second_page.command("forget")
-        second_page.until(lambda seen: seen["phase"] == "printing")
+        second_page.until(lambda seen: seen["state"] == "printing")
         browser.value("{ $('printer-field').open = true; $('port-typed').focus(); }")
         browser.key("e")  # a letter of the port's name
         assert browser.value("$('port-typed').value") == "e"
@@ -181,7 +181,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         heat = browser.value("[...$('run-told').querySelectorAll('dd.old')].map((each) => each.textContent)")
         assert len(heat) == 2
         assert all(re.fullmatch(r"[\d.]+ of \d+ °C, as last known \d+ s ago", text) for text in heat)
-        assert "M112" in commands_sent(Path(second_page.until(lambda seen: seen["phase"] == "over")["log"]))
+        assert "M112" in commands_sent(Path(second_page.until(lambda seen: seen["over"])["log"]))
         second_page.command("forget")
         browser.wait(f"{PRINTING} === ''")
         assert browser.value("$('stop-words').checkVisibility()")  # until it is noted, whatever becomes of the print
@@ -218,7 +218,7 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
         browser.wait("$('feed-told').textContent === '150 %'")  # although this server does not tell it
-        second_page.until(lambda seen: seen.get("port") == address and seen["phase"] == "printing")
+        second_page.until(lambda seen: seen.get("port") == address and seen["state"] == "printing")
         second_page.command("resume")
         assert second_page.refused() == "another page commands this print: take the command over first"
 
@@ -266,9 +266,9 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
     cut = Fault("reset", at=265, unit="line")  # not in a lifted travel: its height would be in doubt
     with SimulatedPrinter(load().machine, faults=[cut]) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
-        page.until(lambda seen: seen["phase"] == "ready")
+        page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
-        ended = page.until(lambda seen: seen["phase"] == "over")
+        ended = page.until(lambda seen: seen["over"])
         assert "the printer restarted in the middle of the print" in ended["sentence"]
         browser.open(sliced.address)
         browser.click("#tab-printing")
@@ -292,11 +292,11 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         assert browser.value("$('run-state').textContent") == "nothing was moved or heated"
         assert homed(printer) == ["homed XYZ"]
 
-        page.until(lambda seen: seen["end"] == "left")
+        page.until(lambda seen: seen["state"] == "declined")
         page.do("go_on", journal=ended["journal"], port=printer.path)
-        page.until(lambda seen: seen["phase"] == "ready")
+        page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
-        rest = page.until(lambda seen: seen["phase"] == "over")
+        rest = page.until(lambda seen: seen["over"])
         assert rest["sentence"] == "the print is done"
         assert homed(printer) == ["homed XYZ", "homed XY"]
     first, second = (read_journal(Path(ended_print["journal"])) for ended_print in (ended, rest))
@@ -312,7 +312,7 @@ def test_a_printer_is_heated_homed_and_moved_by_hand_from_the_page_and_let_go_of
         type_port(browser, printer.path)
         browser.click("#hand")
         browser.wait(
-            f"{PRINTING} === 'hand' && $('hand-live').checkVisibility() && $('run-told').textContent.includes('nozzle20.0 °C')"
+            f"{PRINTING} === 'in hand' && $('hand-live').checkVisibility() && $('run-told').textContent.includes('nozzle20.0 °C')"
         )
         assert browser.value("[...$('hand-jog').children].every((button) => button.disabled) && $('emergency').checkVisibility()")
         browser.click("[data-hand=heat]")
@@ -348,9 +348,9 @@ def test_print_under_the_verdict_checks_at_the_printer_of_last_time_and_moves_an
 ) -> None:
     with SimulatedPrinter(load().machine) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
-        page.until(lambda seen: seen["phase"] == "ready")
+        page.until(lambda seen: seen["state"] == "ready")
         page.command("cancel")
-        page.until(lambda seen: seen["phase"] == "over")
+        page.until(lambda seen: seen["over"])
         browser.open(sliced.address)
         browser.wait("document.documentElement.dataset.line === 'open'")
         browser.click("#tab-slices")
@@ -370,11 +370,11 @@ def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced
     """The last one: it ends the workbench of the others."""
     with SimulatedPrinter(load().machine, speed=20.0) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
-        page.until(lambda seen: seen["phase"] == "ready")
+        page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
         page.until(lambda seen: seen["progress"].get("nozzle_target_c"))
         sliced.process.send_signal(signal.SIGINT)
-        ended = page.until(lambda seen: seen["phase"] == "over")
+        ended = page.until(lambda seen: seen["over"])
         assert sliced.process.wait(60.0) == 0
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
     assert ended["said"][-2].endswith("; heaters off")

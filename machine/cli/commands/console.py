@@ -8,22 +8,18 @@ import threading
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from math import inf
 from typing import TYPE_CHECKING
 
 from machine.cli.terminal.interrupts import calling, interrupting
 from machine.cli.terminal.requests import ConsoleRequest
 from machine.firmware import dialect_of
-from machine.link.port import open_port
 from machine.link.protocol import events
 from machine.notices import say
 from machine.pipeline.output import check_writable
-from machine.pipeline.requests import SIMULATED
 from machine.printing.command_session import CommandSession, LeftError, StopError
-from machine.printing.compatibility import check_speed, describe_answer, identify_printer
+from machine.printing.destination import parse_printer
+from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
 from machine.printing.serial_log import TappedWire, new_log
-from machine.printing.server_checks import check_no_server
-from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import LocalProtocolError, PrinterError
 from profiles.folders import state_folder
 from profiles.machine import Machine
@@ -51,16 +47,13 @@ COLOURS: dict[type[events.Event], str] = {
 
 def console(request: ConsoleRequest, machine: Machine) -> int:
     """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
-    check_speed(request.sim_speed)
-    check_no_server(request.port)
+    at = parse_printer(request.port, request.baud, request.sim_speed)
     if request.log is not None:
         check_writable(request.log)
-    port = request.port
+    rate = rate_of(at)
     with ExitStack() as stack:
-        simulated = port == SIMULATED
-        path = stack.enter_context(SimulatedPrinter(machine, request.sim_speed or inf)).path if simulated else port
-        log = stack.enter_context(new_log("console", f"console at {port}", request.log))
-        wire = stack.enter_context(open_port(path, request.baud))
+        log = stack.enter_context(new_log("console", f"console at {at.name}", request.log))
+        wire = stack.enter_context(open_line(at, machine))
         if log.trouble:
             say(f"the traffic is not logged: {log.file}: {log.trouble}")
         stack.enter_context(interrupting())
@@ -72,7 +65,7 @@ def console(request: ConsoleRequest, machine: Machine) -> int:
                 shown.hear(data)
 
         hint = "; /help tells what can be typed" if sys.stdin.isatty() else ""
-        say(describe_answer(identify_printer(wire, request.baud, halted=True), request.baud) + hint)
+        say(describe_answer(identify_printer(wire, rate, halted=True), rate) + hint)
         session = CommandSession(TappedWire(wire, tell), dialect_of(machine).longest_line)
         return _Console(session, shown, request.leave_heaters).run()
 

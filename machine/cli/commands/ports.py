@@ -5,7 +5,7 @@ from threading import Event
 
 from machine.firmware.firmware import check_baud
 from machine.notices import say, show
-from machine.printing.port_reports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
+from machine.printing.ports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
 
 
 def ports(baud: int, as_json: bool, ask: bool) -> int:

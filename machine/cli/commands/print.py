@@ -1,45 +1,110 @@
-"""The print command: a model or a G-code file on a printer at a port, or on the simulated one."""
+"""The commands print, send, follow and resume: a program on a printer or a server, what prints there, what was cut off."""
 
-from dataclasses import replace
+from datetime import datetime
+from functools import partial
+from pathlib import Path
 
-from machine.cli.commands.send import print_on_server
+from machine.cli.terminal.at_terminal import AtTerminal, exit_code
 from machine.cli.terminal.report import print_table
-from machine.firmware.firmware import check_baud
-from machine.notices import show
+from machine.notices import plain_line, say, show
 from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
 from machine.pipeline.output import check_writable
-from machine.pipeline.programs import load_program
+from machine.pipeline.programs import LoadedProgram, load_program
 from machine.pipeline.requests import ModelRequest, PrintRequest
-from machine.printing.attendance import AtTerminal
-from machine.printing.compatibility import check_machine, check_port, ready_program
-from machine.printing.journal_folder import check_new_journal
-from machine.printing.servers.address import is_server_address
-from machine.printing.stream import print_program
+from machine.printing.destination import Destination, Server, parse_destination, parse_server_address
+from machine.printing.job import Does, PrintJob
+from machine.printing.journal_folder import check_new_journal, resumable_journals
+from machine.printing.printers import check_print, open_printer, open_server_printer
+from machine.printing.resumption import print_rest, read_resumption, rest_of
+from machine.printing.server_print import file_name, running_print
 from machine.view.serving.watch_page import serve_watch_page
+from profiles.errors import GcodeError, JournalError, ServerError
+from profiles.profile import Profile
 
 
 def print_model(request: ModelRequest, printing: PrintRequest) -> int:
-    """Dry-run, then stream a model or a G-code file to a printer, which is asked who it is before any work is done."""
-    if is_server_address(printing.port):
-        return print_on_server(request, printing)
-    for file in (printing.log, printing.journal):
+    """Dry-run, then print a model or a G-code file; the printer is asked who it is before any work is done. 130 when a person has
+    ended the print, or left it to its server."""
+    destination, journal = parse_destination(printing.port, printing.baud, printing.sim_speed), printing.journal
+    if isinstance(destination, Server) and journal is not None:
+        raise ServerError(f"--journal {journal}: {printing.port} prints from a file of its own, which needs no journal here")
+    job, person = _job(request, destination, printing.log, journal), AtTerminal()
+    with open_printer(job, person) as printer:
+        loaded = check_print(job, printer)
+        show(print_table(loaded.program, loaded.profile))
+        with serve_watch_page(loaded, printing.watch_port, person.commands, printing.browser) as watched:
+            person.follow = watched.follow
+            end = printer.print(loaded)
+            watched.end(end.state)
+    return exit_code(end)
+
+
+def send(request: ModelRequest, address: str, *, start: bool, log: Path | None) -> int:
+    """Hand a G-code file to a print server. start: have it printed at once."""
+    if not request.is_gcode:
+        raise GcodeError(f"{request.name} is no G-code file: export makes one of a model, print --port {address} prints it")
+    server, person = parse_server_address(address), AtTerminal()
+    job = _job(request, server, log, starts=start)
+    with open_server_printer(job, server, person) as printer:
+        loaded = check_print(job, printer)
+        show(print_table(loaded.program, loaded.profile))
+        return exit_code(printer.send(loaded))
+
+
+def follow(address: str, log: Path | None = None) -> int:
+    """Show and command what a print server prints; 130 when a person has ended it or left. Raises ServerError."""
+    server, person = parse_server_address(address), AtTerminal()
+    if log is not None:
+        check_writable(log)
+    with open_server_printer(PrintJob(server, Does.FOLLOW, log=log), server, person) as printer:
+        printer.greet()
+        now = running_print(printer.server)
+        say(f"it is {now.state} {file_name(now)}")
+        return exit_code(printer.follow(now))
+
+
+def list_resumable() -> int:
+    """The prints that can be gone on with, the newest first, on stdout; 0 also when there is none."""
+    journals = resumable_journals()
+    if not journals:
+        say("no print of this computer was cut off or cancelled")
+    for journal in journals:
+        what = plain_line(f"{journal.name} on {journal.machine}, up to line {journal.line}")
+        show(f"{plain_line(str(journal.path))}\n    {what}, {datetime.fromtimestamp(journal.written_s):%Y-%m-%d %H:%M}\n")
+    return 0
+
+
+def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, yes: bool = False) -> int:
+    """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
+
+    named: the profile whose machine the user has named. yes: go on without asking, unless the height of the tip is in doubt or
+    the newest records may be missing. The journal of the request is a new one. Raises JournalError and other UserErrors.
+    """
+    destination = parse_destination(printing.port, printing.baud, printing.sim_speed)
+    job = PrintJob(destination, Does.RESUME, profile=named, cut_off=journal, log=printing.log, journal=printing.journal)
+    cut_off, person = read_resumption(job), AtTerminal(yes)
+    for sentence in cut_off.sentences():
+        say(sentence)
+    if yes and not cut_off.story.computer_ran_on:
+        raise JournalError(f"journal {journal}: a person must answer that question: resume at a terminal, without --yes")
+    rest = rest_of(cut_off)
+    with serve_watch_page(rest, printing.watch_port, person.commands, printing.browser) as watched:
+        person.follow = watched.follow
+        end = print_rest(cut_off, rest, job, person)
+        watched.end(end.state)
+    return exit_code(end)
+
+
+def _job(
+    request: ModelRequest, destination: Destination, log: Path | None, journal: Path | None = None, starts: bool = True
+) -> PrintJob:
+    """The job, when its files can be written: neither over what is read nor over another print's journal."""
+    for file in (log, journal):
         if file is not None:
             check_writable(file)
-    check_model_files(request, printing_files(printing))
-    if printing.journal is not None:
-        check_new_journal(printing.journal, None if request.is_gcode else program_beside(printing.journal))
-    check_baud(printing.baud)
-    answer = check_port(printing.port, printing.baud, printing.sim_speed)
-    if not request.is_gcode:
-        check_machine(answer, request.profile.machine, request.force)
-    loaded = load_program(request)
-    if request.is_gcode:
-        check_machine(answer, loaded.profile.machine, request.force)
-    program = ready_program(answer, loaded.program, loaded.profile, name=loaded.name, printing=printing, force=request.force)
-    show(print_table(program, loaded.profile))
-    job = replace(loaded, program=program)
-    person = AtTerminal()
-    with serve_watch_page(job, printing.watch_port, person.control, printing.browser) as watched:
-        code = print_program(job, printing, watched.follow, person)
-        watched.end("stopped" if code else "done")
-    return code
+    check_model_files(request, printing_files(log, journal))
+    if journal is not None:
+        check_new_journal(journal, None if request.is_gcode else program_beside(journal))
+    load: partial[LoadedProgram] = partial(load_program, request)
+    profile = None if request.is_gcode else request.profile  # a file tells its own machine
+    return PrintJob(destination, Does.PRINT, request.name, load, profile, starts, request.force, log=log, journal=journal)

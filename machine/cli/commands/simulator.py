@@ -10,7 +10,7 @@ from machine.cli.terminal.requests import SimulatorRequest
 from machine.firmware import dialect_of, dialects
 from machine.firmware.firmware import check_baud
 from machine.notices import say, show
-from machine.printing.running_simulators import announced
+from machine.printing.ports import announced
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.contact import ProbedTable, TrueBall

@@ -10,14 +10,18 @@ from time import monotonic
 from types import MappingProxyType
 from typing import Any, Self
 
+from machine.cli.terminal.progress import is_terminal
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
-from machine.link.progress import Progress
+from machine.link.print_state import AWAY, PrintState, PrintStatus
+from machine.notices import say
 
 STEP_PERCENT = 10.0
 LOOK_S = 0.05
 HINT_S = 10.0  # a question that was not answered by then is void
-STANDING = ("pausing", "paused")
+ALONE_S = 2.0  # where nobody can press a key, a second interrupt is waited for so long
 SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
+CANCELLING = "cancel this print? c or y: the server ends it; any other key: go on"
+LEAVING = "the print goes on without this program. c or Ctrl-C: cancel it, l: leave it printing; any other key: go on following"
 MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e stops the machine at once (M112)"
 SEQUENCE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O[A-Z])")  # arrow and function keys: the letters in them are no keys
 BEGUN = re.compile(rb"\x1b(\[[0-9;]*|O)?$")  # over a slow line a sequence comes in pieces
@@ -25,14 +29,18 @@ SAME = {"=": "+", "_": "-", "?": "q"}
 
 
 class Keyboard:
-    """press() one key after the other; `hint` is what the screen shows in place of the list of keys, for a while."""
+    """press() one key after the other; `hint` is what the screen shows in place of the list of keys, for a while.
 
-    def __init__(self, control: Control, now_s: Callable[[], float] = monotonic) -> None:
-        self._now_s = now_s
+    server: the name of a print server that goes on when this program ends: the person may leave it printing, Ctrl-C asks first.
+    """
+
+    def __init__(self, control: Control, server: str = "", now_s: Callable[[], float] = monotonic) -> None:
+        self._control, self._server, self._now_s = control, server, now_s
         self._hint, self._hint_until_s = "", 0.0
-        self._control = control
-        self._sure = False
-        self._state, self._feed, self._flow = "printing", 100.0, 100.0
+        self._sure = self._leaving = False  # questions that stand
+        self._left = self._cancelled = False
+        self._deadline_s: float | None = None  # of the question that Ctrl-C has asked
+        self._state, self._feed, self._flow = PrintState.PRINTING, 100.0, 100.0
         self._reported = (100.0, 100.0)
 
     @property
@@ -40,15 +48,16 @@ class Keyboard:
         """A question, an explanation, or what was just asked for; "" when there is none or it is old."""
         return self._hint if self._now_s() < self._hint_until_s else ""
 
-    def follow(self, progress: Progress) -> None:
+    def follow(self, status: PrintStatus) -> None:
         """Know what the print does, so that one key can mean pause and resume."""
-        self._state = progress.state
-        percents = (progress.feed_percent, progress.flow_percent)
+        self._state = status.state
+        percents = (status.feed_percent, status.flow_percent)
         if percents != self._reported:  # the program may set them too
             self._reported, (self._feed, self._flow) = percents, percents
 
     def press(self, key: str) -> None:
-        """Ask for what a key means; unknown keys mean nothing."""
+        """Ask for what a key means; unknown keys mean nothing, but any key answers what Ctrl-C has asked."""
+        self._deadline_s = None
         key = SAME.get(key, key).lower()
         sure, self._sure = self._sure and bool(self.hint), False
         self._tell("")
@@ -60,18 +69,45 @@ class Keyboard:
         elif act := _ACTS.get(key):
             act(self)
 
+    def interrupt(self) -> None:
+        """Take a Ctrl-C or a request to end, in the main thread, while a server prints: the first one asks, the second one
+        cancels. Raises KeyboardInterrupt at the third."""
+        if self._cancelled:
+            raise KeyboardInterrupt
+        if self._deadline_s is not None:
+            self._cancel_now()
+            return
+        asked = is_terminal() and can_type()
+        self._deadline_s = self._now_s() + (HINT_S if asked else ALONE_S)
+        if asked:
+            self._explain()
+        else:
+            say(f"the print goes on at {self._server}: interrupt again within {ALONE_S:g} s to cancel it")
+
+    def left(self) -> bool:
+        """Whether the person has left the server printing: by l, or by a Ctrl-C whose question nobody has answered."""
+        return self._left or (self._deadline_s is not None and self._now_s() > self._deadline_s)
+
     def _answer(self, key: str) -> None:
         """What a key means to the question that stands."""
-        if key in ("c", "y"):
-            self._tell("cancelling")
-            self._control.ask(Command.CANCEL)
+        leaving, self._leaving = self._leaving, False
+        if leaving and key == "l":
+            self._left = True
+        elif key == "c" or (key == "y" and not leaving):
+            self._cancel_now()
 
     def _cancel(self) -> None:
         self._sure = True
-        self._tell(SURE)
+        self._tell(CANCELLING if self._server else SURE)
+
+    def _cancel_now(self) -> None:
+        self._deadline_s, self._cancelled = None, True
+        self._tell("cancelling")
+        self._control.ask(Command.CANCEL)
 
     def _explain(self) -> None:
-        self._tell(MORE)
+        self._sure = self._leaving = bool(self._server)
+        self._tell(LEAVING if self._server else MORE)
 
     def _tell(self, hint: str) -> None:
         self._hint, self._hint_until_s = hint, self._now_s() + HINT_S
@@ -88,7 +124,7 @@ class Keyboard:
 _ACTS: dict[str, Callable[[Keyboard], None]] = {
     "p": lambda board: board._control.ask(Command.PAUSE),
     "r": lambda board: board._control.ask(Command.RESUME),
-    " ": lambda board: board._control.ask(Command.RESUME if board._state in STANDING else Command.PAUSE),
+    " ": lambda board: board._control.ask(Command.RESUME if board._state in AWAY else Command.PAUSE),
     "c": lambda board: board._cancel(),
     "q": lambda board: board._explain(),
     "+": lambda board: board._faster(STEP_PERCENT),

@@ -16,6 +16,7 @@ from machine.link.exchange import Exchange
 from machine.link.pause.park_moves import fill_commands, heat_commands, plan_park
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import PendingCommands
+from machine.link.print_state import PrintState
 from machine.link.watchdog import PrinterReports
 from profiles.profile import Profile
 
@@ -41,7 +42,7 @@ class Pause:
     off: bool = False
     printing_c: float = 0.0  # the nozzle's target where the print stopped
 
-    def run(self, bounds: PrintedBounds | None, why: str) -> Iterator[tuple[str, str]]:
+    def run(self, bounds: PrintedBounds | None, why: str) -> Iterator[tuple[PrintState, str]]:
         """The whole pause: each of its states as it begins, with the words to be shown. bounds: what was printed."""
         modal, bed_c, self.printing_c = self.modal, self.modal.bed_c, self.modal.nozzle_c
         moves = plan_park(modal, self.profile, bounds)
@@ -49,19 +50,19 @@ class Pause:
         self.exchange.drain()
         self.aside = moves.park is not None
         self.stands = (*moves.park.stand_mm, *modal.at[3:]) if moves.park is not None else modal.coordinates()
-        yield "paused", why
+        yield PrintState.PAUSED, why
         for words in self._wait(why):
-            yield "paused", words
+            yield PrintState.PAUSED, words
         # A heater that the person has switched off is off for the pause only: a print cannot go on cold.
         modal.nozzle_c, modal.bed_c = modal.nozzle_c or self.printing_c, modal.bed_c or bed_c
         cooled = modal.nozzle_c > 0 and (self.off or self._has_cooled())
-        yield "resuming", f"the nozzle is {self._heating()}" if cooled else ""
+        yield PrintState.RESUMING, f"the nozzle is {self._heating()}" if cooled else ""
         self._send(heat_commands(modal, self.profile))
         if cooled and self.aside and self.profile is not None:
             self._send(fill_commands(modal, self.profile))
         self.exchange.drain()
         self.stands, self.aside = None, False
-        yield "resuming", ""
+        yield PrintState.RESUMING, ""
         self._send((*moves.down, *moves.push, *modal.lines()))
 
     def _wait(self, why: str) -> Iterator[str]:

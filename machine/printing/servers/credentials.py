@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from machine.printing.servers.address import ServerAddress
+from machine.printing.destination import Server
 from profiles.errors import ServerError
 from profiles.folders import settings_folder
 from profiles.places import parse
@@ -36,26 +36,26 @@ def servers_file() -> Path:
     return settings_folder() / FILE
 
 
-def how_to_give_a_key(address: ServerAddress) -> str:
+def how_to_give_a_key(address: Server) -> str:
     """Where the key of a server belongs, for a person."""
     return f'give it as key = "..." below [servers."{address.host}"] in {servers_file()}, or in the variable {VARIABLE}'
 
 
-def read_credentials(address: ServerAddress) -> Credentials:
+def read_credentials(address: Server) -> Credentials:
     """What is known of a server; the variable's key goes before the file's. Raises ServerError, ProfileError."""
     file = servers_file()
     table = _table(file, address) if file.is_file() else {}
     key = os.environ.get(VARIABLE, "") or table.get("key", "")
     if not (key.isascii() and key.isprintable()):
-        raise ServerError(f"the key for {address.text} has characters that no key has: letters, digits and signs are allowed")
+        raise ServerError(f"the key for {address.name} has characters that no key has: letters, digits and signs are allowed")
     ca_file = table.get("ca_file")
     try:
         return Credentials(key.strip(), None if ca_file is None else file.parent / Path(ca_file).expanduser())
     except RuntimeError:
-        raise ServerError(f"ca_file {ca_file} for {address.text}: no home folder of that user is known") from None
+        raise ServerError(f"ca_file {ca_file} for {address.name}: no home folder of that user is known") from None
 
 
-def _table(file: Path, address: ServerAddress) -> dict[str, str]:
+def _table(file: Path, address: Server) -> dict[str, str]:
     _check_private(file)
     document = parse(file, "file of servers")
     servers = document.get("servers", {})
@@ -66,7 +66,7 @@ def _table(file: Path, address: ServerAddress) -> dict[str, str]:
     for name, table in servers.items():
         _check_table(file, name, table)
     known = {name.lower(): table for name, table in servers.items()}  # as the address has its host
-    return next((known[name] for name in address.names if name in known), {})
+    return next((known[name] for name in address.hosts if name in known), {})
 
 
 def _check_table(file: Path, name: str, table: dict[str, Any]) -> None:

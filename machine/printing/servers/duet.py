@@ -11,10 +11,11 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from machine.link.print_state import ACTIVE, PrintState, PrintStatus
 from machine.printing.servers.credentials import how_to_give_a_key
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
 from machine.printing.servers.http import HttpSession, Reply, entry, number, plain, table, temperature, whole
-from machine.printing.servers.server import ACTIVE, JobStatus, Phase, PrintServer, ServerIdentity
+from machine.printing.servers.server import PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
@@ -24,16 +25,16 @@ START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
 MOST_PAGES = 16
 SETTINGS_ARRAYS = ("move.axes", "move.extruders", "tools", "sensors.probes")
 SETTINGS_KEYS = ("boards[0]", "heat", "move.kinematics", "network")
-STOPPED = frozenset({Phase.PAUSING, Phase.PAUSED, Phase.CANCELLING})
+STOPPED = frozenset({PrintState.PAUSING, PrintState.PAUSED, PrintState.CANCELLING})
 STATES = {
-    "idle": Phase.READY,
-    "processing": Phase.PRINTING,
-    "simulating": Phase.PRINTING,
-    "pausing": Phase.PAUSING,
-    "paused": Phase.PAUSED,
-    "resuming": Phase.RESUMING,
-    "cancelling": Phase.CANCELLING,
-    **dict.fromkeys(("halted", "off", "updating", "starting", "disconnected"), Phase.OFFLINE),
+    "idle": PrintState.READY,
+    "processing": PrintState.PRINTING,
+    "simulating": PrintState.PRINTING,
+    "pausing": PrintState.PAUSING,
+    "paused": PrintState.PAUSED,
+    "resuming": PrintState.RESUMING,
+    "cancelling": PrintState.CANCELLING,
+    **dict.fromkeys(("halted", "off", "updating", "starting", "disconnected"), PrintState.OFFLINE),
 }
 
 
@@ -44,7 +45,7 @@ class Duet(PrintServer):
         super().__init__(http)
         self._nozzle, self._bed = 1, 0  # heaters
         self._connected = False
-        self._last: Phase | None = None  # of the print, for idle says nothing of how it ended
+        self._last: PrintState | None = None  # of the print, for idle says nothing of how it ended
         self._up_s = 0.0  # since the board was reset
 
     def greet(self) -> ServerIdentity:
@@ -77,7 +78,7 @@ class Duet(PrintServer):
         if key:  # firmware from 3.5 on; before that, and from DuetSoftwareFramework, a session is this computer's address
             self._http.set_header("X-Session-Key", str(key))
 
-    def status(self) -> JobStatus:
+    def status(self) -> PrintStatus:
         """From what the object model calls frequently changing, and what the firmware has said since."""
         before = self._last  # an answer that was on its way when the print began is none of its end
         model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
@@ -88,16 +89,18 @@ class Duet(PrintServer):
                 before = self._last = None
             self._up_s = up_s
         elapsed_s = number(job.get("duration"))
-        under_way = Phase.READY if elapsed_s is None else Phase.PRINTING  # busy, changingTool: within a print or without one
+        under_way = (
+            PrintState.READY if elapsed_s is None else PrintState.PRINTING
+        )  # busy, changingTool: within a print or without one
         phase = STATES.get(state, under_way)
         heaters, said = table(model.get("heat")).get("heaters"), self._get("/rr_reply")
         words = plain(said.body.decode("utf-8", "replace")) if said.status == 200 else ""
-        return JobStatus(
+        return PrintStatus(
             self._since_start(phase, before),
             bytes_read=whole(job.get("filePosition")),
-            elapsed_s=elapsed_s,
+            elapsed_s=elapsed_s or 0.0,
             temperature=temperature(entry(heaters, self._nozzle), entry(heaters, self._bed), "current", "active"),
-            message=words or (f"it is {state}" if phase is Phase.OFFLINE else ""),
+            message=words or (f"it is {state}" if phase is PrintState.OFFLINE else ""),
         )
 
     def file_in_print(self) -> str:
@@ -105,14 +108,14 @@ class Duet(PrintServer):
         path = self._model("job.file.fileName")
         return path.removeprefix(FOLDER) if isinstance(path, str) else ""
 
-    def _since_start(self, phase: Phase, before: Phase | None) -> Phase:
+    def _since_start(self, phase: PrintState, before: PrintState | None) -> PrintState:
         """The phase, with idle after a print as its end: a cancelled one was paused before. before: what it was last, as it was
         asked."""
         if phase in ACTIVE:
             self._last = phase
-        if phase is not Phase.READY or before is None or self._last is None:
+        if phase is not PrintState.READY or before is None or self._last is None:
             return phase
-        return Phase.CANCELLED if self._last in STOPPED else Phase.DONE
+        return PrintState.CANCELLED if self._last in STOPPED else PrintState.DONE
 
     def has(self, file: str) -> bool:
         return table(self._value("/rr_fileinfo", {"name": FOLDER + file})).get("err") == 0
@@ -137,7 +140,7 @@ class Duet(PrintServer):
                 return
             if "Error" in status.message:
                 raise ServerError(f"{self.name} cannot start it now: {status.message}")
-            if status.phase in ACTIVE:
+            if status.state in ACTIVE:
                 return
             time.sleep(LOOK_S)
 
@@ -152,11 +155,11 @@ class Duet(PrintServer):
         """Pause, which the firmware insists on, then end: it runs cancel.g, or switches heaters off where there is none."""
         self.command("M25")
         deadline_s = time.monotonic() + PAUSE_S
-        while (phase := self.status().phase) in (Phase.PRINTING, Phase.PAUSING, Phase.RESUMING):
+        while (phase := self.status().state) in (PrintState.PRINTING, PrintState.PAUSING, PrintState.RESUMING):
             if time.monotonic() > deadline_s:
                 raise ServerError(f"{self.name} has not paused within {PAUSE_S:g} s, and cancels only then: look at it")
             time.sleep(LOOK_S)
-        if phase is Phase.PAUSED:
+        if phase is PrintState.PAUSED:
             self.command("M0")
 
     def command(self, line: str) -> None:

@@ -10,13 +10,12 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
-from machine.link.progress import last_known
+from machine.link.print_state import PrintState, PrintStatus, last_known
 from machine.link.protocol.events import Temperature
-from machine.printing.servers.server import ACTIVE, JobStatus, Phase, PrintServer
+from machine.printing.servers.server import PrintServer
 from profiles.errors import NoAnswerError, ServerError
 
 POLL_S, TURN_S = 1.0, 0.05
@@ -27,23 +26,14 @@ QUIET_S = 15.0  # without an answer or an error for so long, it is said
 LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
 UNKNOWN = "whether the print goes on there is not known"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
-OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
-
-
-class End(Enum):
-    """How following a print ended."""
-
-    DONE = "done"
-    CANCELLED = "cancelled"  # by the person here
-    LEFT = "left"  # the print goes on
-    STOPPED = "stopped"  # by the emergency stop
+OnStatus = Callable[[PrintStatus, str], None]  # with a message to the person, "" when there is none
 
 
 @dataclass
 class _Heard:
     """What the polling thread has heard last, and how long it has heard nothing."""
 
-    status: JobStatus | None = None
+    status: PrintStatus | None = None
     error: ServerError | None = None
     answered_s: float = field(default_factory=time.monotonic)
 
@@ -56,13 +46,13 @@ def follow_print(
     on_status: OnStatus,
     control: Control,
     left: Callable[[], bool],
-    running: JobStatus | None = None,
-) -> End:
+    running: PrintStatus | None = None,
+) -> PrintState:
     """Have a file printed that a server holds, and follow that to its end.
 
     size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
     the server is at already, which is not to be started. Raises ServerError when it is refused, fails or is lost, or when the
-    server no longer prints it and nobody here has cancelled it.
+    server no longer prints it and nobody here has cancelled it. Returns DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
     """
     return _Follower(server, file, size, on_status, control, left, running).run()
 
@@ -75,35 +65,35 @@ class _Follower:
     on_status: OnStatus
     control: Control
     left: Callable[[], bool]
-    running: JobStatus | None
+    running: PrintStatus | None
 
     def __post_init__(self) -> None:
         self._heard, self._over = _Heard(), threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
-        self._last_active: Phase | None = self.running.phase if self.running else None
+        self._last_active: PrintState | None = self.running.state if self.running else None
         self._read, self._heat = 0, Temperature()
         self._cancels = False  # the server has the order, or may have it
         self._began_s: float | None = None  # since when the server has been told to start
         self._failed: Exception | None = None  # of the start, or of a thread
-        self._shown: tuple[JobStatus | None, str] = (None, "")
+        self._shown: tuple[PrintStatus | None, str] = (None, "")
         self._shown_s = 0.0
         self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
-    def run(self) -> End:
+    def run(self) -> PrintState:
         """A stop that is asked for before the start leaves nothing to start, and one that comes as the following ends is given
         all the same."""
         if self._take_requests():
-            return End.STOPPED
+            return PrintState.FAILED
         try:
             end = self._followed()
         except ServerError:
             if self._take_requests():
-                return End.STOPPED
+                return PrintState.FAILED
             raise
-        return End.STOPPED if end is not End.STOPPED and self._take_requests() else end
+        return PrintState.FAILED if end is not PrintState.FAILED and self._take_requests() else end
 
-    def _followed(self) -> End:
+    def _followed(self) -> PrintState:
         works = (self._poll, self._carry_out)
         threads = [threading.Thread(target=self._guard, args=(work,), name="print server", daemon=True) for work in works]
         for thread in threads:
@@ -111,9 +101,9 @@ class _Follower:
         try:
             while True:
                 if self._take_requests():
-                    return End.STOPPED
+                    return PrintState.FAILED
                 if self.left():
-                    return End.LEFT
+                    return PrintState.LEFT
                 end = self._look()
                 if end is not None:
                     return end
@@ -130,7 +120,7 @@ class _Follower:
         except Exception as error:  # noqa: BLE001 - raised again by _look()
             self._failed = error
 
-    def _look(self) -> End | None:
+    def _look(self) -> PrintState | None:
         """Tell the newest status; how the print has ended, None while it goes on."""
         if self._failed is not None:
             raise self._failed
@@ -149,44 +139,44 @@ class _Follower:
             self.on_status(heard.status, message)
         return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
 
-    def _end_of(self, status: JobStatus) -> End | None:
+    def _end_of(self, status: PrintStatus) -> PrintState | None:
         if self._began_s is None:
             return None
         heat = status.temperature
         self._heat = heat if heat.words else self._heat
-        if status.phase in ACTIVE:
+        if status.state.is_printing:
             if self._last_active is not None and status.file not in ("", self.file):
                 raise ServerError(f"{self.server.name} prints {status.file} now: what became of {self.file} is not known")
-            self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
+            self._last_active, self._read = status.state, max(self._read, status.bytes_read or 0)
             return None
-        if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):
+        if status.state is PrintState.OFFLINE or (status.state is PrintState.FAILED and self._last_active is not None):
             where = f" at {self._reached}" if self._reached else ""
-            raise ServerError(f"{self.server.name}: the print has failed{where}: {status.message or status.phase.value}")
+            raise ServerError(f"{self.server.name}: the print has failed{where}: {status.message or status.state}")
         if self._last_active is None:
             return self._end_unseen(status, time.monotonic() - self._began_s)
-        if status.phase is not Phase.DONE and not self._cancels:
+        if status.state is not PrintState.DONE and not self._cancels:
             raise ServerError(self._ended_there(status))
-        return End.DONE if status.phase is Phase.DONE else End.CANCELLED
+        return PrintState.DONE if status.state is PrintState.DONE else PrintState.CANCELLED
 
     @property
     def _reached(self) -> str:
         """How far the server has read, in words; "" where it is not known."""
         return f"{100 * self._read / self.size:.0f} %" if self._read and self.size else ""
 
-    def _ended_there(self, status: JobStatus) -> str:
+    def _ended_there(self, status: PrintStatus) -> str:
         """A server that has died and come back, or somebody else who has cancelled: the heaters may still be on."""
         known = ", ".join(filter(None, (f"{self._reached} read" if self._reached else "", self._heat.words)))
         return (
-            f"{self.server.name} no longer prints {self.file or 'its file'} ({status.message or status.phase.value})"
+            f"{self.server.name} no longer prints {self.file or 'its file'} ({status.message or status.state})"
             f"{f'; last known: {known}' if known else ''}: look at the printer"
         )
 
-    def _end_unseen(self, status: JobStatus, waited_s: float) -> End | None:
+    def _end_unseen(self, status: PrintStatus, waited_s: float) -> PrintState | None:
         """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
         if waited_s < BEGIN_S:
             return None
-        if status.phase is Phase.DONE and status.file in ("", self.file):
-            return End.DONE
+        if status.state is PrintState.DONE and status.file in ("", self.file):
+            return PrintState.DONE
         raise ServerError(
             f"{self.server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
         )
@@ -237,13 +227,11 @@ class _Follower:
         self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
         self._percents[command] = value
 
-    def _with_percents(self, status: JobStatus) -> JobStatus:
-        feed, flow = status.feed_percent, status.flow_percent
-        return replace(
-            status,
-            feed_percent=self._percents.get(Command.FEED) if feed is None else feed,
-            flow_percent=self._percents.get(Command.FLOW) if flow is None else flow,
-        )
+    def _with_percents(self, status: PrintStatus) -> PrintStatus:
+        if self.server.tells_percents:
+            return status
+        feed, flow = (self._percents.get(command, 100.0) for command in (Command.FEED, Command.FLOW))
+        return replace(status, feed_percent=feed, flow_percent=flow)
 
     def _carry_out(self) -> None:
         """The start, then orders one after the other; what a server refuses of these is told, and following goes on.

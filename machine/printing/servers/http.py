@@ -1,4 +1,4 @@
-"""HTTP: requests to one print server, and every way in which they fail as one sentence.
+"""HTTP: requests to one print server, every way in which they fail as one sentence, and values out of its JSON.
 
 Redirects are not followed and no proxy of the environment is used: either would carry the key to somebody else. Certificates
 are verified; nothing turns that off.
@@ -15,9 +15,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any, BinaryIO
+from urllib.parse import urlsplit, urlunsplit
 
-from machine.printing.servers.address import NAMES, ServerAddress
+from machine.link.protocol.events import Temperature
+from machine.printing.destination import NAMES, Server
 from machine.printing.servers.credentials import Credentials, how_to_give_a_key, servers_file
 from profiles.errors import NoAnswerError, ServerError, causes
 
@@ -30,6 +33,7 @@ ERRNO = re.compile(r"^\[errno -?\d+\] ")
 MOST_BYTES = 16_000_000  # of an answer
 FILE_TYPE = "application/octet-stream"
 MOST_PICTURE, PICTURES = 8_000_000, ("image/jpeg", "image/png", "image/webp")  # of a camera
+OWN_HOSTS = ("127.0.0.1", "localhost", "::1")  # as a server calls itself
 WORDS = 160  # characters of a server's own words in a message
 Tell = Callable[[str, bytes], None]  # direction and what went over the line, as a log takes it
 
@@ -58,7 +62,7 @@ class HttpSession:
 
     key_refused: tuple[int, ...] = (401, 403)
 
-    def __init__(self, address: ServerAddress, credentials: Credentials, tell: Tell | None = None) -> None:
+    def __init__(self, address: Server, credentials: Credentials, tell: Tell | None = None) -> None:
         import httpx
 
         for name in ("httpx", "httpcore"):  # they would log addresses, and a Duet's password is part of one
@@ -77,12 +81,12 @@ class HttpSession:
                 timeout=httpx.Timeout(ANSWER_S, connect=CONNECT_S),
             )
         except (httpx.InvalidURL, UnicodeError) as error:
-            raise ServerError(f"server address {address.text!r} names no host: {plain(str(error)).lower()}") from None
+            raise ServerError(f"server address {address.name!r} names no host: {plain(str(error)).lower()}") from None
 
     @property
     def name(self) -> str:
         """The server as the user names it."""
-        return self.address.text
+        return self.address.name
 
     def close(self) -> None:
         """End all connections."""
@@ -194,6 +198,29 @@ class HttpSession:
         return plain(self._without_key(str(error or "")))
 
 
+def picture_address(told: object, server: Server) -> str:
+    """The URL of a picture at the server's own host; "" where there is none, or it lies with somebody else: what a server tells
+    must not have this computer ask others.
+
+    >>> from machine.printing.destination import parse_server_address
+    >>> picture_address("/webcam/?action=snapshot", parse_server_address("moonraker:printer.local"))
+    'http://printer.local/webcam/?action=snapshot'
+    """
+    try:
+        parts = urlsplit(told if isinstance(told, str) else "")
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        return ""
+    if not parts.path or "@" in parts.netloc or parts.scheme not in ("", "http", "https"):
+        return ""
+    if host not in (None, server.host, *OWN_HOSTS):
+        return ""
+    name = f"[{server.host}]" if ":" in server.host else server.host
+    place = name if port is None else f"{name}:{port}"
+    path = parts.path if parts.path.startswith("/") else f"/{parts.path}"
+    return urlunsplit((parts.scheme or server.scheme, place, path, parts.query, ""))
+
+
 def fetch_picture(url: str) -> tuple[bytes, str]:
     """A picture and its type. Raises ServerError where nothing, or no picture, is there."""
     import httpx
@@ -222,42 +249,74 @@ def _shown(path: str, params: Mapping[str, str] | None) -> str:
     return path + ("?" + "&".join(f"{key}={value}" for key, value in params.items()) if params else "")
 
 
-def _certificates(address: ServerAddress, credentials: Credentials) -> ssl.SSLContext:
+def _certificates(address: Server, credentials: Credentials) -> ssl.SSLContext:
     if address.scheme == "http":
         return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trusts nobody, and need not: there is no TLS on this way
     try:
         return ssl.create_default_context(cafile=credentials.ca_file)
     except OSError as error:  # ssl.SSLError is one
         raise ServerError(
-            f"ca_file {credentials.ca_file} for {address.text} holds no certificates: {error.strerror or error}"
+            f"ca_file {credentials.ca_file} for {address.name} holds no certificates: {error.strerror or error}"
         ) from None
 
 
-def _transport_sentence(error: httpx.TransportError, address: ServerAddress, httpx_: Any) -> str:
+def _transport_sentence(error: httpx.TransportError, address: Server, httpx_: Any) -> str:
     """What went wrong below HTTP, and what to look at."""
     where, chain = f"{address.host} at port {address.port}", causes(error)
     if any(isinstance(cause, socket.gaierror) for cause in chain):
-        return f"{address.text}: no computer of the name {address.host} is known here: an IP address will do, too"
+        return f"{address.name}: no computer of the name {address.host} is known here: an IP address will do, too"
     if trust := next((cause for cause in chain if isinstance(cause, ssl.SSLCertVerificationError)), None):
         return (
-            f"{address.text}: its certificate cannot be trusted ({plain(trust.verify_message)}): for one of your own name "
+            f"{address.name}: its certificate cannot be trusted ({plain(trust.verify_message)}): for one of your own name "
             f'its authority as ca_file below [servers."{address.host}"] in {servers_file()}'
         )
     if any(isinstance(cause, ssl.SSLError) for cause in chain):
-        return f"{address.text}: {where} speaks no TLS: is it http:// instead of https://?"
+        return f"{address.name}: {where} speaks no TLS: is it http:// instead of https://?"
     if any(isinstance(cause, ConnectionRefusedError) for cause in chain):
-        return f"{address.text}: nothing listens on {where}: is {NAMES[address.kind]} switched on and the port right?"
+        return f"{address.name}: nothing listens on {where}: is {NAMES[address.kind]} switched on and the port right?"
     if isinstance(error, httpx_.ConnectTimeout):
         doubt = ", and does it speak TLS" if address.scheme == "https" else ""
-        return f"{address.text}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{doubt}?"
+        return f"{address.name}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{doubt}?"
     if isinstance(error, httpx_.ConnectError):
-        return f"{address.text}: {where} cannot be reached: {_reason(error)}"
+        return f"{address.name}: {where} cannot be reached: {_reason(error)}"
     if isinstance(error, httpx_.TimeoutException):
-        return f"{address.text}: {where} has stopped answering"
+        return f"{address.name}: {where} has stopped answering"
     if isinstance(error, httpx_.RemoteProtocolError):
-        return f"{address.text}: what answers on {where} breaks off or speaks no HTTP ({_reason(error)})"
-    return f"{address.text}: the connection to {where} broke off ({_reason(error)})"
+        return f"{address.name}: what answers on {where} breaks off or speaks no HTTP ({_reason(error)})"
+    return f"{address.name}: the connection to {where} broke off ({_reason(error)})"
 
 
 def _reason(error: Exception) -> str:
     return ERRNO.sub("", plain(str(error)).lower()) or type(error).__name__
+
+
+def temperature(nozzle: Any, bed: Any, now: str, target: str) -> Temperature:
+    """What two JSON objects tell of nozzle and bed under these keys."""
+    return Temperature(*(number(table(heater).get(key)) for heater in (nozzle, bed) for key in (now, target)))
+
+
+def table(value: Any) -> Mapping[str, Any]:
+    """A JSON object; an empty one where it is none."""
+    return value if isinstance(value, dict) else {}
+
+
+def entry(value: Any, index: Any) -> Any:
+    """An entry of a JSON array; None where there is none."""
+    return value[index] if isinstance(value, list) and isinstance(index, int) and 0 <= index < len(value) else None
+
+
+def number(value: Any) -> float | None:
+    """A JSON number; None where it is none."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    try:
+        read = float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return None
+    return read if isfinite(read) else None
+
+
+def whole(value: Any) -> int | None:
+    """The same, without its fraction."""
+    read = number(value)
+    return None if read is None else int(read)

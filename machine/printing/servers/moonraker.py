@@ -9,22 +9,22 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
-from machine.printing.servers.http import HttpSession, entry, number, table, temperature, whole
-from machine.printing.servers.server import JobStatus, Phase, PrintServer, ServerIdentity
-from machine.printing.servers.webcam import picture_address
+from machine.printing.servers.http import HttpSession, entry, number, picture_address, table, temperature, whole
+from machine.printing.servers.server import PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
 ORDERED_S = 120.0
 STEPPER = "manual_stepper "
 STATES = {
-    "standby": Phase.READY,
-    "printing": Phase.PRINTING,
-    "paused": Phase.PAUSED,
-    "complete": Phase.DONE,
-    "cancelled": Phase.CANCELLED,
-    "error": Phase.FAILED,
+    "standby": PrintState.READY,
+    "printing": PrintState.PRINTING,
+    "paused": PrintState.PAUSED,
+    "complete": PrintState.DONE,
+    "cancelled": PrintState.CANCELLED,
+    "error": PrintState.FAILED,
 }
 REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed", "gcode_move")
 
@@ -33,6 +33,7 @@ class Moonraker(PrintServer):
     """PrintServer of a Moonraker."""
 
     key_header = "X-Api-Key"
+    tells_percents = True
 
     def __init__(self, http: HttpSession) -> None:
         super().__init__(http)
@@ -75,24 +76,24 @@ class Moonraker(PrintServer):
         )
         return next(filter(None, pictures), "")
 
-    def status(self) -> JobStatus:
+    def status(self) -> PrintStatus:
         """From the objects that Klipper reports; where it does not run, from what Moonraker says of it."""
         server = table(self._get("/server/info"))
         if server.get("klippy_state") != "ready":
-            return JobStatus(Phase.OFFLINE, message=self._trouble(server))
+            return PrintStatus(PrintState.OFFLINE, message=self._trouble(server))
         objects = self._query(REPORTED)
         job, card, moves = (table(objects.get(name)) for name in ("print_stats", "virtual_sdcard", "gcode_move"))
         feed, flow = number(moves.get("speed_factor")), number(moves.get("extrude_factor"))
-        return JobStatus(
-            STATES.get(str(job.get("state")), Phase.READY),
-            str(job.get("filename") or ""),
-            whole(card.get("file_position")),
-            number(job.get("total_duration")),
+        return PrintStatus(
+            STATES.get(str(job.get("state")), PrintState.READY),
+            number(job.get("total_duration")) or 0.0,
             temperature(objects.get("extruder"), objects.get("heater_bed"), "temperature", "target"),
-            None if feed is None else 100.0 * feed,
-            None if flow is None else 100.0 * flow,
-            str(job.get("message") or ""),
-            number(card.get("progress")),
+            file=str(job.get("filename") or ""),
+            bytes_read=whole(card.get("file_position")),
+            feed_percent=100.0 * (feed or 1.0),
+            flow_percent=100.0 * (flow or 1.0),
+            message=str(job.get("message") or ""),
+            share=number(card.get("progress")),
         )
 
     def _trouble(self, server: Mapping[str, Any]) -> str:

@@ -7,20 +7,20 @@ Any refusal for want of a key is 403. The file is kept under temporary names unt
 from collections.abc import Mapping
 from typing import Any
 
+from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
-from machine.printing.servers.http import number, table, temperature, whole
-from machine.printing.servers.server import JobStatus, Phase, PrintServer, ServerIdentity
-from machine.printing.servers.webcam import picture_address
+from machine.printing.servers.http import number, picture_address, table, temperature, whole
+from machine.printing.servers.server import PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers
 FLAGS = (
-    ("cancelling", Phase.CANCELLING),
-    ("pausing", Phase.PAUSING),
-    ("resuming", Phase.RESUMING),
-    ("finishing", Phase.FINISHING),
-    ("paused", Phase.PAUSED),
-    ("printing", Phase.PRINTING),
+    ("cancelling", PrintState.CANCELLING),
+    ("pausing", PrintState.PAUSING),
+    ("resuming", PrintState.RESUMING),
+    ("finishing", PrintState.FINISHING),
+    ("paused", PrintState.PAUSED),
+    ("printing", PrintState.PRINTING),
 )
 
 
@@ -44,19 +44,19 @@ class OctoPrint(PrintServer):
         settings = table(reply.json()) if reply.status == 200 else {}
         return picture_address(table(settings.get("webcam")).get("snapshotUrl"), self._http.address)
 
-    def status(self) -> JobStatus:
+    def status(self) -> PrintStatus:
         """From /api/job, and from /api/printer where its printer is connected."""
         job = table(self._get("/api/job", "to tell of its print"))
         progress, file = table(job.get("progress")), table(table(job.get("job")).get("file"))
         reply = self._http.get("/api/printer", {"exclude": "sd"})
         printer = {} if reply.status == 409 else table(self._http.check(reply, "to tell of its printer"))
         heaters, done = table(printer.get("temperature")), number(progress.get("completion"))
-        return JobStatus(
+        return PrintStatus(
             _phase(table(table(printer.get("state")).get("flags")), progress),
-            str(file.get("path") or ""),
-            whole(progress.get("filepos")),
-            number(progress.get("printTime")),
-            temperature(heaters.get("tool0"), heaters.get("bed"), "actual", "target"),
+            number(progress.get("printTime")) or 0.0,
+            file=str(file.get("path") or ""),
+            bytes_read=whole(progress.get("filepos")),
+            temperature=temperature(heaters.get("tool0"), heaters.get("bed"), "actual", "target"),
             message=str(job.get("error") or ("" if printer else f"its printer is not connected ({job.get('state')})")),
             share=None if done is None else done / 100.0,
         )
@@ -104,11 +104,11 @@ class OctoPrint(PrintServer):
         self._http.check(self._http.post(path, value), purpose, sentences)
 
 
-def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> Phase:
+def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> PrintState:
     if not flags.get("operational"):
-        return Phase.OFFLINE
+        return PrintState.OFFLINE
     for flag, phase in FLAGS:
         if flags.get(flag):
             return phase
     done = number(progress.get("completion"))
-    return Phase.DONE if done is not None and done >= 100.0 else Phase.READY
+    return PrintState.DONE if done is not None and done >= 100.0 else PrintState.READY

@@ -2,49 +2,11 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from enum import Enum
 
-from machine.link.protocol.events import Temperature
+from machine.link.print_state import PrintStatus
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
 from machine.printing.servers.http import HttpSession
 from profiles.errors import ServerError
-
-
-class Phase(Enum):
-    """Where a server and its print stand; the words are those of a print over a serial port where it knows the phase, too."""
-
-    READY = "ready"
-    PRINTING = "printing"
-    PAUSING = "pausing"
-    PAUSED = "paused"
-    RESUMING = "resuming"
-    CANCELLING = "cancelling"
-    FINISHING = "finishing"
-    DONE = "done"
-    CANCELLED = "cancelled"
-    FAILED = "failed"
-    OFFLINE = "offline"  # the server is there, its printer is not
-
-
-ACTIVE = frozenset({Phase.PRINTING, Phase.PAUSING, Phase.PAUSED, Phase.RESUMING, Phase.CANCELLING, Phase.FINISHING})
-
-
-@dataclass(frozen=True)
-class JobStatus:
-    """A moment of a server. file: what it prints or has printed last; bytes_read: how far into the file; message: its own words.
-
-    None: not told. feed_percent and flow_percent: its overrides; share: of the file that it has read, 0 to 1.
-    """
-
-    phase: Phase
-    file: str = ""
-    bytes_read: int | None = None
-    elapsed_s: float | None = None
-    temperature: Temperature = field(default_factory=Temperature)
-    feed_percent: float | None = None
-    flow_percent: float | None = None
-    message: str = ""
-    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +31,7 @@ class PrintServer(ABC):
     """
 
     key_header = ""
+    tells_percents = False  # whether status() tells feed and flow
 
     def __init__(self, http: HttpSession) -> None:
         self._http, self.name = http, http.name
@@ -84,7 +47,7 @@ class PrintServer(ABC):
         """Make sure that it is such a server, that the key is good, and learn what it drives."""
 
     @abstractmethod
-    def status(self) -> JobStatus:
+    def status(self) -> PrintStatus:
         """Where it stands."""
 
     def webcam(self) -> str:

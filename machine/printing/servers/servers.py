@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from machine.firmware import dialects
-from machine.printing.servers.address import NAMES, ServerAddress, parse_server_address
+from machine.printing.destination import NAMES, Server
 from machine.printing.servers.credentials import read_credentials
 from machine.printing.servers.duet import Duet
 from machine.printing.servers.http import HttpSession, Tell
@@ -23,7 +23,7 @@ def printable_dialects(kind: str) -> tuple[str, ...]:
     return DIALECTS.get(kind) or tuple(name for name, dialect in dialects().items() if dialect.serial)
 
 
-def dialect_mismatch(address: ServerAddress, machine: str, dialect: str) -> str:
+def dialect_mismatch(address: Server, machine: str, dialect: str) -> str:
     """Why a server cannot print what is written in a dialect, as a sentence; "" when it can."""
     allowed = printable_dialects(address.kind)
     if dialect in allowed:
@@ -40,9 +40,8 @@ def _dialect(machine: str) -> str:
 
 
 @contextmanager
-def open_server(text: str, tell: Tell | None = None) -> Iterator[PrintServer]:
-    """A session with the server of an address. tell: what goes over the line, for a log, without keys. Raises ServerError."""
-    address = parse_server_address(text)
+def open_server(address: Server, tell: Tell | None = None) -> Iterator[PrintServer]:
+    """A session with a server. tell: what goes over the line, for a log, without keys. Raises ServerError."""
     server = KINDS[address.kind](HttpSession(address, read_credentials(address), tell))
     try:
         yield server

@@ -8,12 +8,12 @@ import secrets
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict
+from dataclasses import replace
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from machine.link.pending_commands import Command, Control
-from machine.link.progress import Progress
+from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import say
 from machine.pipeline.programs import LoadedProgram
 from machine.view.page import print_page
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 LAST_WORD_S = 2.0  # a page that is open asks twice in this time, so it sees how the print ended
 GRACE_S = 1  # for answers under way when the print ends
-TOLD = ("acknowledged", "total", "share", "elapsed_s", "left_s", "part", "layer", "message", "warning")
 FRAMED = {"Content-Security-Policy": "frame-ancestors 'none'"}
 ORDERS = {
     "pause": Command.PAUSE,
@@ -36,19 +35,6 @@ ORDERS = {
 }
 
 
-def state_of(progress: Progress | None, state: str = "") -> dict[str, Any]:
-    """What the page asks for; progress: None before the first. state: how it ended, else what the progress says."""
-    if progress is None:
-        return {"state": state or "waiting"}
-    return {
-        "state": state or progress.state,
-        "line": progress.file_line,
-        **{key: getattr(progress, key) for key in TOLD},
-        **asdict(progress.temperature),
-        "heat_is_old": bool(state) or progress.heat_is_old,
-    }
-
-
 class Watched:
     """A running print as it is told to those who watch. follow() from the thread that prints, state() from any."""
 
@@ -56,22 +42,25 @@ class Watched:
         self.page = page
         self.address = ""
         self.token = secrets.token_urlsafe(16)
-        self._progress: Progress | None = None
-        self._ended = ""
+        self._status: PrintStatus | None = None
+        self._ended: PrintState | None = None
         self._asked, self._end_reported = Event(), Event()
 
-    def follow(self, progress: Progress) -> None:
+    def follow(self, status: PrintStatus) -> None:
         """Take note of where the print stands."""
-        self._progress = progress
+        self._status = status
 
     def state(self) -> bytes:
         """The state as JSON."""
         self._asked.set()
         if self._ended:
             self._end_reported.set()
-        return json.dumps(state_of(self._progress, self._ended)).encode()
+        status, ended = self._status, self._ended
+        if status is None:
+            return json.dumps({"state": ended or "waiting"}).encode()
+        return json.dumps((replace(status, state=ended) if ended else status).json()).encode()
 
-    def end(self, state: str) -> None:
+    def end(self, state: PrintState) -> None:
         """Say once how the print ended, and wait a moment for those who have asked before to hear it."""
         self._ended = self._ended or state
         if self._asked.is_set():
@@ -79,13 +68,13 @@ class Watched:
 
 
 @contextmanager
-def serve_watch_page(job: LoadedProgram, port: int | None, control: Control, browser: bool = True) -> Iterator[Watched]:
+def serve_watch_page(loaded: LoadedProgram, port: int | None, control: Control, browser: bool = True) -> Iterator[Watched]:
     """Serve the page of a print on a port of this computer, 0: on any free one; None: nobody watches. control: of the print,
     asked by the page's buttons; browser: open it there. Raises OutputError."""
     if port is None:
         yield Watched()
         return
-    page = print_page(job.name, job.program, job.profile, live=True)
+    page = print_page(loaded.name, loaded.program, loaded.profile, live=True)
     with serve(page, port, control) as watched, ExitStack() as until_end:
         say(f"watch the print at {watched.address}")
         if browser:
@@ -114,10 +103,10 @@ def serve(page: bytes, port: int = 0, control: Control | None = None) -> Iterato
     try:
         yield watched
     except BaseException:
-        watched.end("stopped")
+        watched.end(PrintState.FAILED)
         raise
     else:
-        watched.end("done")
+        watched.end(PrintState.DONE)
     finally:
         server.should_exit = True
         thread.join()

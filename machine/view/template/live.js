@@ -3,7 +3,7 @@
 import { $, duration } from "./page.js";
 
 const ASK_EVERY_MS = 1000;
-const OVER = ["done", "stopped"], AWAY = ["pausing", "paused"]; // the tip, from the print
+const OVER = ["done", "cancelled", "left", "declined", "failed"], AWAY = ["pausing", "paused"]; // the tip, from the print
 const NOT_ARRIVED = "that has not arrived: use the terminal, or the printer's own switch";
 
 export function follow(scene, player) {
@@ -23,9 +23,9 @@ export function follow(scene, player) {
     $("orders").hidden = OVER.includes(state.state);
     document.querySelector("[data-order=pause]").hidden = AWAY.includes(state.state);
     document.querySelector("[data-order=resume]").hidden = !AWAY.includes(state.state);
-    if (state.line && state.line !== shown && !player.playing) {
-      shown = state.line;
-      scene.goToLine(state.line);
+    if (state.file_line && state.file_line !== shown && !player.playing) {
+      shown = state.file_line;
+      scene.goToLine(state.file_line);
     }
     return OVER.includes(state.state) ? null : setTimeout(ask, ASK_EVERY_MS);
   };
@@ -48,7 +48,7 @@ function liveTold(told) {
   const heat = (name, value, target) => value != null && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
   return [
     told.share ? `${told.state} ${Math.floor(100 * told.share)} %` : told.state,
-    told.line && `line ${told.line}`,
+    told.file_line && `line ${told.file_line}`,
     heat("nozzle", told.nozzle_c, told.nozzle_target_c),
     heat("bed", told.bed_c, told.bed_target_c),
     told.heat_is_old && told.nozzle_c != null && "as last known",

@@ -19,18 +19,17 @@ from machine.gcode.commands import homes
 from machine.gcode.words import read_letters, split_command
 from machine.kinematics.table import machine_points
 from machine.link.pending_commands import Command
-from machine.link.port import open_port
-from machine.pipeline.requests import SIMULATED
+from machine.link.print_state import PrintState, PrintStatus
+from machine.printing.checks import check_machine
 from machine.printing.command_session import CommandSession, LeftError, StopError
-from machine.printing.compatibility import check_machine, check_speed, describe_answer, identify_printer
-from machine.printing.server_checks import check_no_server
-from machine.simulator.simulator import SimulatedPrinter
-from machine.workbench.printing.at_page import AtPage
-from machine.workbench.printing.checks import Checks
-from machine.workbench.printing.order import HandCommand, HandDoes, HandOrder, State
+from machine.printing.destination import Simulated, at_printer
+from machine.printing.job import End, PrintJob
+from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
+from machine.workbench.printing.at_page import AtPage, HandCommand, HandDoes
 from mdp.pose import level
 from profiles.errors import MoveError, PrinterError, UserError
 from profiles.machine import Machine
+from profiles.profile import Profile
 
 LOOK_S = 1.0  # between questions after temperatures and place
 IDLE_S = 1800.0
@@ -40,36 +39,32 @@ JOG_MM_S = {"X": 50.0, "Y": 50.0, "Z": 10.0}
 LET_GO = "let go of; the heaters are off"
 
 
-def by_hand(order: HandOrder, person: AtPage, checks: Checks) -> State:
-    """Do what the person asks for until he lets go; how it ended."""
-    printing, machine = order.printing, order.profile.machine
-    check_speed(printing.sim_speed)
-    check_no_server(printing.port)
+def by_hand(job: PrintJob, person: AtPage) -> End:
+    """Do what the person asks for until it is let go of; how it ended."""
+    assert job.profile is not None
+    at, machine = at_printer(job.destination), job.profile.machine
     with ExitStack() as stack:
         stack.enter_context(calling(person.leave))  # a termination request lets go of the printer, its heaters off
-        simulated = printing.port == SIMULATED
-        path = stack.enter_context(SimulatedPrinter(machine, printing.sim_speed or inf)).path if simulated else printing.port
-        wire = stack.enter_context(open_port(path, printing.baud))
-        answer = identify_printer(wire, printing.baud)
-        with checks.that(describe_answer(answer, printing.baud)):
-            check_machine(None if simulated else answer, machine, force=False)
+        wire = stack.enter_context(open_line(at, machine))
+        answer = identify_printer(wire, rate_of(at))
+        check_machine(None if isinstance(at, Simulated) else answer, machine)
+        person.passed(describe_answer(answer, rate_of(at)))
         session = CommandSession(wire, dialect_of(machine).longest_line)
         person.interrupt = lambda word: session.order(StopError if word == Command.EMERGENCY_STOP else LeftError)
-        return Hand(order, session, checks).serve(person)
+        return Hand(job.profile, session, person).serve()
 
 
 class Hand:
     """A session at a printer that a person heats and moves."""
 
-    def __init__(self, order: HandOrder, session: CommandSession, checks: Checks) -> None:
-        self._profile, self._session, self._tell = order.profile, session, checks.reporter.tell
+    def __init__(self, profile: Profile, session: CommandSession, person: AtPage) -> None:
+        self._profile, self._session, self._person = profile, session, person
         self._homed = False
         self._problem = ""
         self._began_s = self._asked_s = monotonic()
         self._looked_s = -inf
-        self._moments = 0
 
-    def serve(self, person: AtPage) -> State:
+    def serve(self) -> End:
         """Greet the printer and do what the person asks for until he lets go or has asked for nothing for IDLE_S; how it ended.
 
         However it ends, the heaters go off unless he let go and wants them on. Raises UserError.
@@ -77,17 +72,17 @@ class Hand:
         with self._session as session:
             try:
                 session.greet()
-                sentence = self._until_let_go(person)
+                sentence = self._until_let_go()
             except LeftError:
                 sentence = LET_GO if session.exchange.greeted else "let go of; nothing was heated or moved"
-            self._tell(phase="leaving")
-        return {"end": "done", "sentence": sentence}
+            self._person.tell(state=PrintState.CANCELLING)
+        return End(PrintState.DONE, sentence)
 
-    def _until_let_go(self, person: AtPage) -> str:
+    def _until_let_go(self) -> str:
         """Command after command; the sentence of the end."""
-        while not person.lets_go():
+        while not self._person.lets_go():
             try:
-                command = person.by_hand.get_nowait()
+                command = self._person.by_hand.get_nowait()
             except Empty:
                 if monotonic() - self._asked_s > IDLE_S:
                     return "nothing was asked for half an hour; the heaters are off"
@@ -113,29 +108,15 @@ class Hand:
         for command in ("M105", "M114"):
             self._session.command(command)
         self._looked_s = monotonic()
-        self._moments += 1
-        heat = self._session.heat
-        self._tell(
-            phase="hand",
-            progress={
-                "state": "in hand",
-                "share": None,
-                "left_s": None,
-                "message": self._problem,
-                "moment": self._moments,
-                "nozzle_c": heat.nozzle_c,
-                "nozzle_target_c": heat.nozzle_target_c,
-                "heat_s": time(),
-                "heat_is_old": False,
-                "bed_c": heat.bed_c,
-                "bed_target_c": heat.bed_target_c,
-                "at": {letter: place for letter, place in self._at().items() if letter != "E"},
-                "elapsed_s": monotonic() - self._began_s,
-                "homed": self._homed,
-                "feed_percent": 100,
-                "flow_percent": 100,
-            },
+        status = PrintStatus(
+            PrintState.IN_HAND,
+            monotonic() - self._began_s,
+            self._session.heat,
+            at={letter: place for letter, place in self._at().items() if letter != "E"},
+            message=self._problem,
+            homed=self._homed,
         )
+        self._person.tell(state=status.state, progress=status, told_s=time())
 
     def _at(self) -> dict[str, float]:
         return {} if self._session.position is None else dict(self._session.position.axes)

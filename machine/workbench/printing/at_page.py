@@ -1,35 +1,102 @@
-"""At page: a person who attends a print at a page of the workbench, as a terminal's screen and keys would have it."""
+"""At page: the person who attends a print at a page of the workbench: told by its state, heard through the pages' server."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
 from queue import SimpleQueue
 from threading import Event as Flag
+from threading import Lock, Thread
 from time import time
-from typing import Any
+from typing import Any, BinaryIO
 
-from machine.cli.terminal.printer_messages import PrinterMessages
-from machine.dryrun.timeline import Timeline
+from machine.cli.terminal.interrupts import stopping
 from machine.link.pending_commands import Command, Control
-from machine.link.progress import Progress
-from machine.notices import Report, plain_line
-from machine.printing.attendance import Observers
+from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import Notice, plain_line
+from machine.printing.job import Scene, Show
 from machine.printing.serial_log import SerialLog
-from machine.view.serving.watch_page import state_of
-from machine.workbench.printing.order import HandCommand
-from machine.workbench.printing.reporter import StateReporter
+from machine.workbench.printing.job_state import Check, JobState
+from mdp.kernels.workers import frame
+from profiles.errors import JournalError
 
-WORDS_KEPT = 50
+LAST_WORD_S = 5.0  # a server that stands still is not waited for any longer
+LINES_KEPT = 100  # of what the program says
 BEGIN, LEAVE = "begin", "leave"  # LEAVE: a print on a server goes on without this program
 ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the question whether to begin
 
 
-class AtPage:
-    """hear() and leave() from the thread that listens to the server, all else from the one that prints."""
+class HandDoes(StrEnum):
+    """What a person may do by hand."""
 
-    def __init__(self, reporter: StateReporter) -> None:
-        self.control, self.stop, self.words = Control(), Flag(), PrinterMessages(WORDS_KEPT)
-        self.agreed = False  # to what was found: from then on something may move
-        self._reporter = reporter
+    HEAT = "heat"
+    COOL = "cool"
+    HOME = "home"
+    JOG = "jog"
+    LET_GO = "let_go"
+
+
+@dataclass(frozen=True)
+class HandCommand:
+    """axis, by_mm: of a jog; keep_heat: of letting go, the heaters stay as they are."""
+
+    does: HandDoes
+    axis: str = ""
+    by_mm: float = 0.0
+    keep_heat: bool = False
+
+
+class StateReporter:
+    """Tells the server the newest state, from a thread of its own: who prints never waits for who listens.
+
+    tell() from any thread; what comes while the server does not read is put together, so nothing is ever held back.
+    """
+
+    def __init__(self, out: BinaryIO, state: JobState) -> None:
+        self._out, self._state = out, state
+        self._lock, self._changed, self._over = Lock(), Flag(), False
+        self._thread = Thread(target=self._serve, name="reporter", daemon=True)
+        self._thread.start()
+
+    def tell(self, **values: Any) -> None:
+        """Change parts of the state."""
+        with self._lock:
+            self._state = replace(self._state, **values)
+        self._changed.set()
+
+    def close(self) -> None:
+        """Say the last word."""
+        self._over = True
+        self._changed.set()
+        self._thread.join(LAST_WORD_S)
+
+    def _serve(self) -> None:
+        over = False
+        while not over:
+            self._changed.wait()
+            self._changed.clear()
+            over = self._over
+            try:
+                self._out.write(frame(self._state))
+                self._out.flush()
+            except (OSError, ValueError):  # the server is gone: the print ends by what it hears, not by what it says
+                return
+
+
+class AtPage:
+    """The `Person` at a page. hear() and leave() come from the thread that listens to the server, all else from the other.
+
+    cut_off: the journal of the print whose rest it is. agreed: to what was found: from then on something may move.
+    """
+
+    def __init__(self, reporter: StateReporter, cut_off: Path | None = None) -> None:
+        self.commands, self.stop = Control(), Flag()
+        self.agreed = False
+        self.tell, self._cut_off = reporter.tell, cut_off
+        self._checks: tuple[Check, ...] = ()
+        self._lines: deque[str] = deque(maxlen=LINES_KEPT)
         self._answers: SimpleQueue[bool] = SimpleQueue()
         self._gives_up, self._halts = Flag(), Flag()
         self.by_hand: SimpleQueue[HandCommand] = SimpleQueue()  # what is to be done at a printer that is in hand
@@ -41,7 +108,7 @@ class AtPage:
             self.by_hand.put(word)
             return
         if isinstance(word, Command):
-            self.control.ask(word, value)
+            self.commands.ask(word, value)
         if word in (Command.CANCEL, LEAVE):
             self._gives_up.set()
         if word == LEAVE:
@@ -60,19 +127,60 @@ class AtPage:
         self._answers.put(False)
         self.interrupt(LEAVE)
 
+    def passed(self, sentence: str) -> None:
+        """What a check has found."""
+        self._add(Check(plain_line(sentence)))
+
+    def hear_notice(self, notice: Notice) -> None:
+        """What the program says; what --force goes past is a check."""
+        if notice.forced:
+            self._add(Check(notice.text.rstrip(), forced=True))
+        self._lines.extend(line for line in notice.text.split("\n") if line.strip())
+        self.tell(said=tuple(self._lines))
+
+    def _add(self, check: Check) -> None:
+        self._checks = (*self._checks, check)
+        self.tell(checks=self._checks)
+
+    def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
+        """Wait for the person's word to begin. Raises JournalError where one must look at the printer."""
+        if choices:
+            raise JournalError(f"{question}; which one is asked at a terminal only: tiltprint resume {self._cut_off}")
+        self.tell(state=PrintState.READY, question=question)
+        self.agreed = self._answers.get()
+        return 0 if self.agreed else None
+
+    @contextmanager
+    def show(self, scene: Scene) -> Iterator[Show]:
+        """The print as its state. A print of which nothing changes, as a paused one on a server, is heard of all the same."""
+        journal = "" if scene.journal is None else str(scene.journal.path)
+        self.tell(log=log_path(scene.log), journal=journal)
+        if scene.uploads:
+            self.tell(state=PrintState.UPLOADING)
+        with nullcontext() if scene.server else stopping(self.stop):
+            yield lambda status: self._show(status, scene)
+
+    def _show(self, status: PrintStatus | None, scene: Scene) -> None:
+        if status is None:
+            self.tell(state=PrintState.PRINTING, progress=None)
+            return
+        values: dict[str, Any] = {"progress": replace(status, message=plain_line(status.message)), "told_s": time()}
+        if status.state.is_printing:  # what a server tells besides is not the end of the job yet
+            values["state"] = status.state
+        if not scene.uploads:
+            scene.messages.add(status.message)
+            values["words"] = tuple(plain_line(word) for word in scene.messages.last)
+        if status.warning:
+            values["journal"] = ""
+        self.tell(**values)
+
+    def left(self) -> bool:
+        """Whether a print on a server is left."""
+        return self.stop.is_set()
+
     def lets_go(self) -> bool:
         """Whether a printer in hand is let go of, its heaters off."""
         return self.stop.is_set() or self._gives_up.is_set()
-
-    def agrees(self) -> bool:
-        """Wait for the person's word to begin."""
-        self.agreed = self._answers.get()
-        return self.agreed
-
-    @contextmanager
-    def uploading(self) -> Iterator[Report]:
-        """How far the file has been handed over, as its state."""
-        yield lambda text, share=None: self._reporter.tell(phase="uploading", upload=(text, share))
 
     def gives_up(self) -> bool:
         """Whether there is to be no print on a server, as long as none has begun; an emergency stop is given to the printer."""
@@ -80,60 +188,10 @@ class AtPage:
 
     def has_stopped(self) -> bool:
         """Whether the print has been stopped at once, at its end: the order was heard and is not waiting any more."""
-        waiting = iter(self.control.take, None)
+        waiting = iter(self.commands.take, None)
         return self._halts.is_set() and all(request.command != Command.EMERGENCY_STOP for request in waiting)
-
-    def gone(self) -> bool:
-        """Whether a print on a server is left."""
-        return self.stop.is_set()
-
-    @contextmanager
-    def show(self, observers: Observers, timeline: Timeline) -> Iterator["_Shown"]:
-        """The print as its state."""
-        journal = "" if observers.journal is None else str(observers.journal.path)
-        self._reporter.tell(log=log_path(observers.log), journal=journal)
-        yield _Shown(self._reporter, timeline, self.words)
 
 
 def log_path(log: SerialLog) -> str:
     """The file of a log for the pages; "" for one that is not written."""
     return "" if log.trouble else str(log.file)
-
-
-class _Shown:
-    """A display whose screen is the state that the pages are told. Moments are counted: a print of which nothing changes, as a
-    paused one on a print server, is heard of all the same."""
-
-    def __init__(self, reporter: StateReporter, timeline: Timeline, words: PrinterMessages) -> None:
-        self._reporter, self._timeline, self._words = reporter, timeline, words
-        self._opened = False  # before, a person is asked
-        self._moments = 0
-
-    def open(self) -> None:
-        """The pages show it from now on."""
-        self._opened = True
-        self._reporter.tell(phase="printing", upload=None)
-
-    def __call__(self, progress: Progress) -> None:
-        if not self._opened:
-            return
-        self._words.add(progress.message)
-        phase = "leaving" if progress.state == "cancelling" else "printing"
-        words = tuple(plain_line(word) for word in self._words.last)
-        self._moments += 1
-        moment = moment_of(progress, self._timeline) | {"moment": self._moments}
-        self._reporter.tell(phase=phase, progress=moment, words=words, **({"journal": ""} if progress.warning else {}))
-
-
-def moment_of(progress: Progress, timeline: Timeline) -> dict[str, Any]:
-    """A moment of a print for the page: what every page that watches is told, and what a terminal's screen adds. heat_s: since
-    when the temperatures are known, seconds since 1970, for the page goes on counting when nothing more comes."""
-    return {
-        **state_of(progress),
-        "parts": progress.parts,
-        "layers": timeline.layers(progress.part),
-        "at": timeline.at(progress.file_line),
-        "feed_percent": progress.feed_percent,
-        "flow_percent": progress.flow_percent,
-        "heat_s": time() - progress.heat_age_s,
-    }

@@ -5,25 +5,30 @@ The emergency stop alone is every page's: who sees that something goes wrong mus
 """
 
 import asyncio
+import json
 from collections import Counter
 from collections.abc import Coroutine, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from os.path import realpath
+from pathlib import Path
 from threading import Event as Flag
 from typing import Any
 
 from machine.firmware.firmware import check_baud
 from machine.link.port import stable_name
+from machine.pipeline.output import write_bytes
+from machine.pipeline.requests import BAUD
+from machine.printing.destination import Destination, SerialPort, Server, Simulated, parse_destination
+from machine.printing.job import PrintJob
 from machine.printing.journal_folder import ResumableJournal, resumable_journals
-from machine.printing.port_reports import answer_words, ask_ports, known_ports, port_json
-from machine.printing.servers.address import is_server_address, parse_server_address
-from machine.workbench.printing.last_printer import keep_printer, last_printer
-from machine.workbench.printing.order import Order, PrintOrder, ResumeOrder
+from machine.printing.ports import answer_words, ask_ports, known_ports, port_json
 from machine.workbench.printing.running_print import RunningPrint
 from machine.workbench.work.observable import Observable
-from profiles.errors import PrinterError
+from profiles.errors import OutputError, PrinterError, ServerError
+from profiles.folders import state_folder
 
+FILE = "last-printer.json"  # of the state folder
 MOST_OVER = 5  # prints that are over stay to be looked at, the newest ones
 
 
@@ -50,8 +55,8 @@ class Prints(Observable):
     @property
     def ports_known(self) -> set[str]:
         """Ports that were found here, those of the prints that are listed, and the one that was printed at last."""
-        last = {self._last_printer.port} if self._last_printer else set()
-        return {report["port"] for report in self._ports or ()} | {job.state["port"] for job in self.prints} | last
+        last = {self._last_printer.name} if self._last_printer else set()
+        return {report["port"] for report in self._ports or ()} | {job.state.port for job in self.prints} | last
 
     @property
     def journals_known(self) -> set[str]:
@@ -70,10 +75,10 @@ class Prints(Observable):
             "version": self.version,
             "ports": self._ports,
             "asking": self._over is not None,
-            "last_printer": asdict(self._last_printer) if self._last_printer else None,
+            "last_printer": printer_json(self._last_printer) if self._last_printer else None,
             "journals": self._journals_state(),
             "prints": [
-                {**job.state, "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
+                {**job.state.json(), "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
                 for job in self.prints
             ],
         }
@@ -101,28 +106,27 @@ class Prints(Observable):
             job.end()
         while any(not job.over for job in running):
             await self.changed(self.version)
-        return [line for job in running for line in (*job.state["said"][-2:], f"{job.state['port']}: {job.state['sentence']}")]
+        return [line for job in running for line in (*job.state.said[-2:], f"{job.state.port}: {job.state.sentence}")]
 
-    def begin(self, page: str, order: Order) -> None:
+    def begin(self, page: str, job: PrintJob) -> None:
         """Have something printed, commanded by a page. Raises PrinterError where the port, or the journal, is in use."""
-        port = order.printing.port
-        starts = not isinstance(order, PrintOrder) or order.starts
-        if starts and any(job.state["starts"] and _same(job.state["port"], port) for job in self.running):
-            raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
-        if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
-            raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
-        self._forget_old(port)
-        self._last_printer = order.printing
-        keep_printer(order.printing)
+        at = job.destination
+        if job.starts and any(other.job.starts and _same(other.job.destination, at) for other in self.running):
+            raise PrinterError(f"port {at.name} prints already: wait until that is done, or cancel it")
+        if job.cut_off is not None and realpath(job.cut_off) in map(realpath, self._journals_in_use()):
+            raise PrinterError(f"journal {job.cut_off}: its print goes on already, or has not ended")
+        self._forget_old(at)
+        self._last_printer = at
+        keep_printer(at)
         self._last += 1
-        begun = RunningPrint(self._last, order, page, self.notify)
+        begun = RunningPrint(self._last, job, page, self.notify)
         self.prints.append(begun)
         self._start(self._print(begun))
 
-    def _forget_old(self, port: str) -> None:
+    def _forget_old(self, at: Destination) -> None:
         """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:
         only what is listed can be stopped."""
-        over = [job for job in self.prints if job.over and not _same(job.state["port"], port)][-MOST_OVER:]
+        over = [job for job in self.prints if job.over and not _same(job.job.destination, at)][-MOST_OVER:]
         self.prints = [job for job in self.prints if not job.over or job in over]
 
     async def _print(self, begun: RunningPrint) -> None:
@@ -155,7 +159,7 @@ class Prints(Observable):
 
     def _journals_in_use(self) -> set[str]:
         """The journals of prints that run, and of those whose rest is printed."""
-        return {path for job in self.running for path in (job.state["journal"], job.state["resumes"]) if path}
+        return {path for job in self.running for path in (job.state.journal, job.state.resumes) if path}
 
     def look_for_journals(self) -> None:
         """Read which prints can be gone on with."""
@@ -179,7 +183,7 @@ class Prints(Observable):
 
     async def _ask_ports(self, baud: int, over: Flag) -> None:
         try:
-            used = [job.state["port"] for job in self.running]
+            used = [job.state.port for job in self.running]
             devices = await asyncio.to_thread(known_ports)
             reports = await asyncio.to_thread(ask_ports, devices, baud, over, [*used, *map(stable_name, used)])
             self._ports = [{**port_json(report), "words": answer_words(report)} for report in reports]
@@ -193,8 +197,34 @@ class Prints(Observable):
         task.add_done_callback(self._tasks.discard)
 
 
-def _same(a: str, b: str) -> bool:
-    """Whether two names are those of one port, or of one print server."""
-    if is_server_address(a) and is_server_address(b):
-        return parse_server_address(a).url == parse_server_address(b).url
-    return stable_name(a) == stable_name(b)
+def _same(a: Destination, b: Destination) -> bool:
+    """Whether two destinations are one port, or one print server."""
+    if isinstance(a, Server) and isinstance(b, Server):
+        return a.url == b.url
+    return stable_name(a.name) == stable_name(b.name)
+
+
+def last_printer() -> Destination | None:
+    """The destination that was printed at last, so that nobody chooses it again at the next start; None where none was kept, or
+    what is there says nothing."""
+    try:
+        port, baud, speed = (json.loads(_path().read_bytes())[key] for key in ("port", "baud", "sim_speed"))
+        return parse_destination(str(port), int(baud), float(speed))
+    except (OSError, ValueError, KeyError, TypeError, OutputError, PrinterError, ServerError):
+        return None
+
+
+def keep_printer(at: Destination) -> None:
+    """Keep it for the next start. Where it cannot be written it is forgotten: a print does not fail for that."""
+    with suppress(OSError, OutputError):
+        write_bytes(_path(), json.dumps(printer_json(at)).encode(), private=True)
+
+
+def printer_json(at: Destination) -> dict[str, Any]:
+    """The fields of a page in which it is chosen."""
+    baud, speed = at.baud if isinstance(at, SerialPort) else BAUD, at.speed if isinstance(at, Simulated) else 0.0
+    return {"port": at.name, "baud": baud, "sim_speed": speed}
+
+
+def _path() -> Path:
+    return state_folder() / FILE

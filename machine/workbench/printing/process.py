@@ -9,52 +9,117 @@ alone, which ends it in that same way.
 
 import sys
 from threading import Thread
+from typing import Any
 
 from machine.crash import bug_in_words
+from machine.dryrun.dryrun import summary
+from machine.link.print_state import PrintState
 from machine.notices import FrontEnd, notices_to
-from machine.printing.servers.address import is_server_address
+from machine.pipeline import compilers
+from machine.pipeline.programs import LoadedProgram
+from machine.printing.destination import Server
+from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
+from machine.printing.printers import check_print, open_printer, open_server_printer
+from machine.printing.resumption import print_rest, read_resumption, rest_of
+from machine.printing.server_print import ServerPrinter, file_name, running_print
+from machine.quantities import filament_g, price_in_words
 from machine.workbench.printing.at_hand import by_hand
-from machine.workbench.printing.at_page import AtPage
-from machine.workbench.printing.at_port import go_on, print_at_port
-from machine.workbench.printing.at_server import follow_on_server, print_on_server
-from machine.workbench.printing.checks import Checks
-from machine.workbench.printing.order import FollowOrder, HandOrder, Order, ResumeOrder, State, first_state
-from machine.workbench.printing.reporter import StateReporter
+from machine.workbench.printing.at_page import AtPage, StateReporter
+from machine.workbench.printing.job_state import first_state
 from mdp.kernels.workers import listen, read_frames, take_pipes
-from profiles.errors import UserError
+from profiles.errors import ServerError, UserError
+
+MOST_FINDINGS = 50  # in the list; the page of the print has all
 
 
 def main() -> None:
     """Print what the server orders, once."""
     asked, answers = take_pipes()
-    order: Order | None = next(read_frames(asked), None)
-    if order is None:  # the server has died before it had said what to print
+    job: PrintJob | None = next(read_frames(asked), None)
+    if job is None:  # the server has died before it had said what to print
         return
-    reporter = StateReporter(answers, first_state(order))
-    person, checks = AtPage(reporter), Checks(reporter)
+    reporter = StateReporter(answers, first_state(job))
+    person = AtPage(reporter, job.cut_off)
     Thread(target=listen, args=(asked, lambda words: person.hear(*words), person.leave), daemon=True).start()
-    with notices_to(FrontEnd(checks.hear)):
-        end = carry_out(order, person, checks)
-    reporter.tell(phase="over", stop_given=person.has_stopped(), **end)
+    with notices_to(FrontEnd(person.hear_notice)):
+        end, forcible = carry_out(job, person)
+    reporter.tell(state=end.state, sentence=end.sentence, forcible=forcible, stop_given=person.has_stopped())
     reporter.close()
 
 
-def carry_out(order: Order, person: AtPage, checks: Checks) -> State:
-    """Check, ask, print; how it ended."""
+def carry_out(job: PrintJob, person: AtPage) -> tuple[End, bool]:
+    """Check, ask, print; how it ended, and whether force goes past why it was refused."""
     try:
-        if isinstance(order, ResumeOrder):
-            return go_on(order, person, checks)
-        if isinstance(order, FollowOrder):
-            return follow_on_server(order, person, checks)
-        if isinstance(order, HandOrder):
-            return by_hand(order, person, checks)
-        if is_server_address(order.printing.port):
-            return print_on_server(order, person, checks)
-        return print_at_port(order, person, checks)
+        return _carried_out(job, person), False
     except UserError as error:
-        end = "failed" if person.agreed else "refused"
-        return {"end": end, "sentence": str(error), "forcible": error.forcible}
+        return End(PrintState.FAILED if person.agreed else PrintState.REFUSED, str(error)), error.forcible
     except KeyboardInterrupt:
-        return {"end": "failed", "sentence": "ended at once: whether the heaters are off is not known, look at the printer"}
+        sentence = "ended at once: whether the heaters are off is not known, look at the printer"
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file; the stream has left the printer safe
-        return {"end": "failed", "sentence": bug_in_words(error, sys.argv)}
+        sentence = bug_in_words(error, sys.argv)
+    return End(PrintState.FAILED, sentence), False
+
+
+def _carried_out(job: PrintJob, person: AtPage) -> End:
+    if job.does is Does.RESUME:
+        return _print_rest(job, person)
+    if job.does is Does.HAND:
+        return by_hand(job, person)
+    if job.does is Does.FOLLOW:
+        return _follow(job, person)
+    with open_printer(job, person) as printer:
+        loaded = check_print(job, printer, lambda loaded: person.tell(figures=figures(loaded)))
+        if isinstance(printer, ServerPrinter):
+            person.tell(webcam=_webcam(printer))
+        if person.ask("") is None:
+            return NOT_BEGUN
+        if isinstance(printer, ServerPrinter) and not job.starts:
+            return printer.send(loaded)
+        return printer.print(loaded)
+
+
+def _print_rest(job: PrintJob, person: AtPage) -> End:
+    """Tell what was cut off, ask the printer, ask the person, print the rest."""
+    cut_off = read_resumption(job)
+    person.tell(name=cut_off.name, machine=cut_off.profile.machine.name)
+    for sentence in cut_off.sentences():
+        person.passed(sentence)
+    compilers.wait_for(compilers.DRY_RUN)
+    end = print_rest(cut_off, rest_of(cut_off), job, person)
+    if end.state is PrintState.DECLINED:
+        person.tell(journal="")
+    return end
+
+
+def _follow(job: PrintJob, person: AtPage) -> End:
+    """Follow what a server prints already."""
+    assert isinstance(job.destination, Server)
+    with open_server_printer(job, job.destination, person) as printer:
+        printer.greet()
+        now = running_print(printer.server)
+        person.agreed = True  # from now on it may be stopped
+        person.tell(name=file_name(now), webcam=_webcam(printer))
+        return printer.follow(now)
+
+
+def _webcam(printer: ServerPrinter) -> str:
+    """Where its camera gives a picture; a print does not fail for want of it."""
+    try:
+        return printer.server.webcam()
+    except ServerError:
+        return ""
+
+
+def figures(loaded: LoadedProgram) -> dict[str, Any]:
+    """What a person is told of a program."""
+    program, material = loaded.program, loaded.profile.material
+    values, findings = summary(program.run), program.run.findings
+    return {
+        "time_s": values["time_s"],
+        "filament_mm": values["filament_mm"],
+        "filament_g": filament_g(values["filament_mm"], material),
+        "costs": price_in_words(values["filament_mm"], material),
+        "lines": len(program.lines),
+        "findings": [f"{finding.severity}: {finding.message}" for finding in findings[:MOST_FINDINGS]],
+        "errors": len(program.run.errors),
+    }

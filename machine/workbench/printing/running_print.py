@@ -3,15 +3,18 @@
 import asyncio
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from time import time
 
 from machine.crash import bug_in_words
 from machine.link.pending_commands import Command
-from machine.pipeline.requests import SIMULATED
+from machine.link.print_state import PrintState, follows
+from machine.printing.destination import Server, Simulated
+from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.rescue import cancel_on_server, rescue
 from machine.printing.servers.gcode_upload import server_name
 from machine.workbench.printing.at_page import BEGIN, LEAVE
-from machine.workbench.printing.order import FollowOrder, HandOrder, Order, PrintOrder, ResumeOrder, State, first_state
+from machine.workbench.printing.job_state import JobState, first_state
 from machine.workbench.work.heard import heard
 from mdp.kernels.workers import Interpreter
 from profiles.errors import PrinterError, UserError
@@ -26,45 +29,45 @@ class RunningPrint:
     """run() once, all else from the event loop too. number: its name among the prints of a workbench; holder: the page that
     commands it, "" for none."""
 
-    def __init__(self, number: int, order: Order, holder: str, changed: Callable[[], None]) -> None:
-        self.number, self.holder, self.state = number, holder, first_state(order)
-        self._order, self._changed = order, changed
+    def __init__(self, number: int, job: PrintJob, holder: str, changed: Callable[[], None]) -> None:
+        self.number, self.holder, self.state, self.job = number, holder, first_state(job), job
+        self._changed = changed
         self._process: Interpreter | None = None
         self._late: asyncio.Task[None] | None = None
-        self._begun = isinstance(order, FollowOrder)  # by somebody else
+        self._begun = job.does is Does.FOLLOW  # by somebody else
         self._emergency = self._given_up = self._cancelled = False
         self._ended = False  # by this program, on purpose
 
     @property
     def names(self) -> tuple[str, ...]:
         """What people have named themselves: the model, the machine, the port, and their files."""
-        told = tuple(str(self.state[key]) for key in ("name", "machine", "port", "resumes", "journal", "log"))
-        profile = self._order.profile if isinstance(self._order, PrintOrder | HandOrder) else None
+        state, profile = self.state, self.job.profile
+        told = (state.name, state.machine, state.port, state.resumes, state.journal, state.log)
         further = (profile.machine.name, profile.material.name, profile.process.name) if profile else ()
-        return (*told, *further, server_name(told[0]))
+        return (*told, *further, server_name(state.name))
 
     @property
     def over(self) -> bool:
         """Whether nothing of it goes on."""
-        return bool(self.state["phase"] == "over")
+        return self.state.state.is_over
 
     @property
     def asking(self) -> bool:
         """Whether nothing has moved yet, and nothing will: once it is told to begin, its process alone knows how far it is."""
-        return not self._begun and self.state["phase"] in ("checking", "ready")
+        return not self._begun and self.state.state in (PrintState.CHECKING, PrintState.READY)
 
     async def run(self) -> None:
         """Have it printed by a process of its own, to the end."""
         process = Interpreter(MAIN)
-        await asyncio.to_thread(process.say, self._order)  # a long one is read when the process has loaded what it needs
+        await asyncio.to_thread(process.say, self.job)  # a long one is read when the process has loaded what it needs
         self._process = process  # and follows what it does from now on
         if self._given_up or self._emergency:
             self._kill()
         ended = lost = False
         async for state in heard(process.hear()):
-            ended = state["phase"] == "over"
+            ended = state.state.is_over
             lost = ended and self._has_lost_an_order(state)
-            self._become(**state | ({"phase": "leaving"} if lost else {}))
+            self._take(replace(state, state=PrintState.CANCELLING) if lost else state)
         if lost:
             await self._order_anew()
         elif not ended:
@@ -80,7 +83,7 @@ class RunningPrint:
         that is not known."""
         if self._begun and not self.over:
             return
-        if self.state["phase"] != "ready" or not self.asking or self._given_up:
+        if self.state.state is not PrintState.READY or not self.asking or self._given_up:
             raise PrinterError("this print cannot begin now: it is not ready, or over")
         self._begun = True
         self.say((BEGIN,))
@@ -89,7 +92,7 @@ class RunningPrint:
         """A fault of this program: nobody hears the print's process any more, so it ends, and the printer is made safe."""
         self._kill()
         await self._end_without_process()
-        self._become(sentence=f"{bug_in_words(error, sys.argv)}; {self.state['sentence']}")
+        self._take(replace(self.state, sentence=f"{bug_in_words(error, sys.argv)}; {self.state.sentence}"))
 
     def cancel(self) -> None:
         """End it, heaters off; before it has begun at once. What has opened a journal to go on with takes it away itself."""
@@ -99,7 +102,7 @@ class RunningPrint:
             return
         asking = self.asking
         self._given_up = self._given_up or asking
-        if asking and not isinstance(self._order, ResumeOrder):
+        if asking and self.job.does is not Does.RESUME:
             self._kill()
             return
         self.say((Command.CANCEL,))
@@ -113,7 +116,7 @@ class RunningPrint:
 
     def end(self) -> None:
         """End it because the workbench ends: as a cancel does, but what a print server prints goes on there."""
-        if self.state["server"] and not self.asking:
+        if self.state.server and not self.asking:
             self.leave()
         else:
             self.cancel()
@@ -125,7 +128,7 @@ class RunningPrint:
             self._order_late()
             return
         self._emergency = True
-        if self.asking or self.state["phase"] == "uploading":
+        if self.asking or self.state.state is PrintState.UPLOADING:
             self._ended = True
             self._kill()
         else:
@@ -136,57 +139,61 @@ class RunningPrint:
         if self._process is not None:
             self._process.end()
 
-    def _has_lost_an_order(self, ended: State) -> bool:
+    def _has_lost_an_order(self, ended: JobState) -> bool:
         """Whether the following of a print on a server has ended before it took what it was told last."""
-        stop_lost = self._emergency and not ended["stop_given"]
-        return bool(ended["server"] and self._begun and (stop_lost or (self._cancelled and _goes_on(ended))))
+        stop_lost = self._emergency and not ended.stop_given
+        return ended.server and self._begun and (stop_lost or (self._cancelled and _goes_on(ended)))
 
     def _order_late(self) -> None:
         """The same for what comes when the print has just been left."""
         if _goes_on(self.state):
-            self._become(phase="leaving")
+            self._take(replace(self.state, state=PrintState.CANCELLING))
             self._late = asyncio.get_running_loop().create_task(self._order_anew())
 
     async def _order_anew(self) -> None:
         """Give the stop or the cancel on a connection of its own."""
-        port = self._order.printing.port
+        at = self.job.destination
+        assert isinstance(at, Server)
         if self._emergency:
-            outcome = await asyncio.to_thread(rescue, port, 0, True)
-            self._become(phase="over", end="failed", sentence=outcome)
+            self._end(End(PrintState.FAILED, await asyncio.to_thread(rescue, at, True)))
             return
-        name, away_s = self.state["name"], time() - self.state["progress"]["heat_s"]
-        file = name if isinstance(self._order, FollowOrder) else server_name(name)
+        name, status = self.state.name, self.state.progress
+        away_s = time() - self.state.told_s + (0.0 if status is None else status.heat_age_s)
+        file = name if self.job.does is Does.FOLLOW else server_name(name)
         try:
-            cancelled = await asyncio.to_thread(cancel_on_server, port, file, away_s)
+            cancelled = await asyncio.to_thread(cancel_on_server, at, file, away_s)
         except UserError as error:
-            self._become(phase="over", end="left", sentence=f"{name} was not cancelled: {error}")
+            self._end(End(PrintState.LEFT, f"{name} was not cancelled: {error}"))
             return
-        sentence = "the print was stopped" if cancelled else f"there was nothing to cancel: {port} prints nothing any more"
-        self._become(phase="over", end="stopped", sentence=sentence)
+        sentence = "the print was stopped" if cancelled else f"there was nothing to cancel: {at.name} prints nothing any more"
+        self._end(End(PrintState.CANCELLED, sentence))
 
     async def _end_without_process(self) -> None:
         """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked; a print
         server goes on by itself."""
-        printing, moved = self._order.printing, not self.asking
+        at, moved = self.job.destination, not self.asking
         if not moved:
-            self._become(journal="")
+            self._take(replace(self.state, journal=""))
         if self._given_up and not self._emergency:
-            self._become(phase="over", end="left", sentence="nothing was printed")
-        elif printing.port == SIMULATED:
-            self._become(phase="over", end="failed", sentence=f"{DIED}; the simulated printer has ended with it")
+            self._end(NOT_BEGUN)
+        elif isinstance(at, Simulated):
+            self._end(End(PrintState.FAILED, f"{DIED}; the simulated printer has ended with it"))
         elif moved or self._emergency:
-            self._become(phase="leaving")
-            sentence = await asyncio.to_thread(rescue, printing.port, printing.baud, self._emergency)
-            outcome = f"{DIED}; {sentence}" if moved and not self._ended else sentence
-            self._become(phase="over", end="failed", sentence=outcome)
+            self._take(replace(self.state, state=PrintState.CANCELLING))
+            sentence = await asyncio.to_thread(rescue, at, self._emergency)
+            self._end(End(PrintState.FAILED, f"{DIED}; {sentence}" if moved and not self._ended else sentence))
         else:
-            self._become(phase="over", end="failed", sentence=f"{DIED}; nothing had moved yet")
+            self._end(End(PrintState.FAILED, f"{DIED}; nothing had moved yet"))
 
-    def _become(self, **values: object) -> None:
-        self.state = {**self.state, **values}
+    def _end(self, end: End) -> None:
+        self._take(replace(self.state, state=end.state, sentence=end.sentence))
+
+    def _take(self, state: JobState) -> None:
+        """The newest state. What is over stays as it has ended."""
+        self.state = state if follows(self.state.state, state.state) else replace(state, state=self.state.state)
         self._changed()
 
 
-def _goes_on(ended: State) -> bool:
+def _goes_on(ended: JobState) -> bool:
     """Whether a print was left that its server goes on with."""
-    return bool(ended["server"] and ended["end"] == "left" and ended["progress"])
+    return ended.server and ended.state is PrintState.LEFT

@@ -26,7 +26,7 @@ from machine.workbench.web.sessions_thread import SessionsThread
 from profiles.errors import PrinterError, ServerError, UserError
 
 MOST_COMMAND = 10_000  # characters
-SENTENCES = ("sentence", "question", "checks", "figures", "said", "upload")  # of a print's state
+SENTENCES = ("sentence", "question", "checks", "figures", "said")  # of a print's state
 
 
 def prints_line(prints: Prints, workbench: Workbench, sessions: SessionsThread) -> Callable[[WebSocket], Awaitable[None]]:
@@ -59,7 +59,7 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 
     async def answer(request: Request) -> Response:
         for job in prints.prints:
-            log = job.state["log"]
+            log = job.state.log
             if job.number == request.path_params["print"] and log and Path(log).is_file():
                 return FileResponse(log, media_type="text/plain")
         return Response("there is no log of this print\n", 404)
@@ -80,9 +80,9 @@ def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 
     async def answer(request: Request) -> Response:
         for job in prints.prints:
-            if job.number == request.path_params["print"] and job.state["webcam"]:
+            if job.number == request.path_params["print"] and job.state.webcam:
                 try:
-                    picture, kind = await asyncio.to_thread(fetch_picture, job.state["webcam"])
+                    picture, kind = await asyncio.to_thread(fetch_picture, job.state.webcam)
                 except ServerError as error:
                     return Response(f"{error}\n", 502)
                 return Response(picture, media_type=kind, headers={"cache-control": "no-store"})

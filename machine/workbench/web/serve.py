@@ -154,7 +154,7 @@ def keep_stops_quick() -> None:
 
 
 async def _end_prints(prints: Prints, then: Callable[[], None]) -> None:
-    there, here = ([job.state["port"] for job in prints.running if job.state["server"] is server] for server in (True, False))
+    there, here = ([job.state.port for job in prints.running if job.state.server is server] for server in (True, False))
     if there:
         say(f"the print on {' and '.join(there)} goes on there, an upload is broken off")
     if here:

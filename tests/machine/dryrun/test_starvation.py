@@ -8,7 +8,7 @@ from machine.cli.cli import main
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.starvation import feeding, find_starvation
 from machine.link.stream import print_lines
-from machine.printing.compatibility import is_rate_limited
+from machine.printing.destination import SerialPort, parse_destination
 from machine.simulator.board import BuildOptions
 from machine.simulator.record import Record
 from profiles.profile import load
@@ -80,7 +80,8 @@ def test_a_program_without_moves_starves_nothing(lines: tuple[str, ...]) -> None
     ("/dev/ttyUSB0", True), ("/dev/ttyS3", True), ("COM4", True), ("/dev/ttyACM0", False), ("/dev/pts/7", False), ("sim", False),
     ("socket://printer:5000", False)])  # fmt: skip
 def test_print_looks_at_the_line_s_speed_where_the_baud_rate_means_something(port: str, slow: bool) -> None:
-    assert is_rate_limited(port) == slow
+    at = parse_destination(port)
+    assert (isinstance(at, SerialPort) and at.is_rate_limited) == slow
 
 
 def test_simulate_takes_a_baud_rate(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:  # type: ignore[no-untyped-def]

@@ -10,7 +10,7 @@ import pytest
 
 from machine.link.medium import Medium, Wire
 from machine.link.pending_commands import Command, Control
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.link.stream import Outcome, print_lines
 from machine.printing.serial_log import tap
 from machine.simulator.faults import Fault, FaultScript
@@ -38,11 +38,11 @@ class Watcher:
 
     def __init__(self, printer: VirtualPrinter, profile: Profile = PROFILE, when: Mapping[str | int, Act] | None = None) -> None:
         self.printer, self.control, self.profile = printer, Control(), profile
-        self.shown: list[Progress] = []
+        self.shown: list[PrintStatus] = []
         self.sent = b""
         self.when = dict(when or {})
 
-    def see(self, progress: Progress) -> None:
+    def see(self, progress: PrintStatus) -> None:
         self.shown.append(progress)
         line = next((at for at in self.when if isinstance(at, int) and progress.file_line >= at), None)
         for key in (line, progress.state):

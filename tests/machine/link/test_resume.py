@@ -18,7 +18,7 @@ from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.port import open_port
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.link.protocol.events import Position, Temperature
 from machine.link.protocol.framing import frame
 from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, heights_mm, plan_resume, read_interrupted_print
@@ -363,7 +363,7 @@ def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> Non
 def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text: GcodeFile) -> None:
     printer, stop = VirtualPrinter(PROFILE.machine), Flag()
 
-    def see(progress: Progress) -> None:
+    def see(progress: PrintStatus) -> None:
         if progress.file_line > LINE:
             stop.set()
 

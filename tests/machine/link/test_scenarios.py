@@ -22,7 +22,7 @@ from machine.link.journal import Journal, JournalHeading, read_journal
 from machine.link.medium import Wire
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.link.protocol.answers import ASKED_LIMIT
 from machine.link.protocol.connection import Connection
 from machine.link.protocol.events import Position, Temperature, read_event
@@ -559,7 +559,7 @@ def test_scenario_38_odd_line_ends_blanks_and_rubbish_are_survived(size: int) ->
 def test_scenario_39_a_pause_comes_back_to_tilt_turn_filament_and_feed() -> None:
     control, states = Control(), list[str]()
 
-    def progress(moment: Progress) -> None:
+    def progress(moment: PrintStatus) -> None:
         if moment.state == "printing" and moment.acknowledged > 60 and "paused" not in states:
             control.ask(Command.PAUSE)
         if moment.state == "paused" and "paused" not in states:

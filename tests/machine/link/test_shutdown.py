@@ -9,7 +9,7 @@ from machine.link.identification import Kind, ask
 from machine.link.medium import Medium
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from machine.link.status import query_status
 from machine.link.stream import Outcome, print_lines
@@ -84,7 +84,7 @@ def test_a_printer_that_falls_silent_in_homing_is_not_waited_for_twice() -> None
     printer = VirtualPrinter(SLOW.machine, faults=FaultScript((Fault("stall", at=8, unit="line"),)))
     silent_s: list[float] = []
 
-    def note(progress: Progress) -> None:
+    def note(progress: PrintStatus) -> None:
         silent_s.append(progress.elapsed_s)
 
     with pytest.raises(SilenceError, match="its heaters may still be on, look at the printer"):

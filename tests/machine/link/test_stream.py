@@ -13,7 +13,8 @@ import pytest
 
 from machine.gcode.reader.parse import parse_gcode
 from machine.link.port import open_port, refusal
-from machine.link.progress import Progress, Schedule
+from machine.link.print_state import PrintStatus
+from machine.link.progress import Schedule
 from machine.link.protocol.timeout import Timing
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
@@ -85,7 +86,7 @@ def test_the_end_of_a_print_is_the_end_of_its_moves() -> None:
 
 
 def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
-    shown: list[Progress] = []
+    shown: list[PrintStatus] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
         print_lines(HEAT + body, printer.path, 250000, on_progress=shown.append, timing=PATIENT)
@@ -106,7 +107,7 @@ COMMENTED = {
 
 @pytest.mark.parametrize("slicer", COMMENTED)
 def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) -> None:
-    shown: list[Progress] = []
+    shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
         print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=shown.append, timing=PATIENT)
     parsed = parse_gcode(COMMENTED[slicer], MACHINE)
@@ -114,14 +115,14 @@ def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) ->
 
 
 def test_m73_and_m220_count_in_lower_case_too() -> None:
-    shown: list[Progress] = []
+    shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
         print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, on_progress=shown.append, timing=PATIENT)
     assert (shown[-1].share, shown[-1].feed_percent) == (0.5, 80.0)
 
 
 def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
-    shown: list[Progress] = []
+    shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
         schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
         print_lines(
@@ -169,11 +170,11 @@ def test_a_stream_is_consumed_only_as_fast_as_it_is_printed() -> None:
     assert outcome.sent < 520
 
 
-def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], None]:
+def _once_sent(count: int, act: Callable[[], object]) -> Callable[[PrintStatus], None]:
     """A listener to a print that acts once, as soon as this number of commands is sent."""
     waiting = [act]
 
-    def watch(progress: Progress) -> None:
+    def watch(progress: PrintStatus) -> None:
         if progress.sent >= count and waiting:
             waiting.pop()()
 
@@ -214,7 +215,7 @@ def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
 
 
 def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
-    def burst(progress: Progress) -> None:
+    def burst(progress: PrintStatus) -> None:
         if progress.sent > 1:
             raise ZeroDivisionError
 

@@ -16,10 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from machine.cli.cli import main
-from machine.cli.commands.resume import list_resumable
+from machine.cli.commands.print import list_resumable
 from machine.gcode.lines import GcodeFile
 from machine.link.journal import BLOCK_BYTES, FORMAT, SLOTS
-from machine.pipeline.requests import PrintRequest
+from machine.printing.destination import SerialPort
+from machine.printing.job import Does, PrintJob
 from machine.printing.journal_folder import new_journal, resumable_journals
 from machine.printing.resumption import read_resumption
 from profiles.errors import UserError
@@ -51,7 +52,7 @@ def is_no_bug(content: bytes) -> None:
         assert list_resumable() == 0
     json.dumps([entry.name for entry in resumable_journals()])
     with suppress(UserError):
-        read_resumption(journal, PrintRequest("/dev/none"))
+        read_resumption(PrintJob(SerialPort("/dev/none"), Does.RESUME, cut_off=journal))
     journal.unlink()
 
 

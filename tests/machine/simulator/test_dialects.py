@@ -10,7 +10,7 @@ from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
 from machine.link.protocol.framing import command_of
-from machine.printing.compatibility import check_dialect
+from machine.printing.checks import check_dialect
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from profiles.errors import PrinterError

@@ -9,7 +9,7 @@ HEARD = """
     printPanel();
     const heats = { nozzle_c: 209.6, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, heat_s: 0, heat_is_old: false };
     const moment = { state: "printing", ...heats, at: {}, elapsed_s: 5 };
-    const known = { number: 1, name: "box", port: "sim", phase: "printing", checks: [], words: [], said: [] };
+    const known = { number: 1, name: "box", port: "sim", state: "printing", told_s: 0, checks: [], words: [], said: [] };
     const tell = (more, told = {}) => {
       const print = { ...known, ...more, progress: { ...moment, ...told } };
       fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [print] });
@@ -32,7 +32,7 @@ def test_what_has_just_been_told_is_not_marked() -> None:
 
 @needs_node
 @pytest.mark.parametrize("tell", [
-    "tell({ phase: 'over', end: 'failed', sentence: 'emergency stop: the printer has halted' });",
+    "tell({ state: 'failed', over: true, sentence: 'emergency stop: the printer has halted' });",
     "tell({}, { state: 'reconnecting', heat_is_old: true });",
     "",  # the line to the workbench is lost, or the print hangs
 ])  # fmt: skip
@@ -43,4 +43,4 @@ def test_what_nobody_tells_any_more_is_marked_with_its_age(tell: str, after_ms: 
 
 @needs_node
 def test_at_the_end_of_a_print_it_is_marked_at_once() -> None:
-    assert on_fake_page(f"{HEARD} fake.wait(2000); tell({{ phase: 'over', end: 'done' }}); return heat();") == marked("2 s")
+    assert on_fake_page(f"{HEARD} fake.wait(2000); tell({{ state: 'done', over: true }}); return heat();") == marked("2 s")

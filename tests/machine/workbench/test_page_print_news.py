@@ -9,8 +9,8 @@ PAGE = """
     printPanel();
     const known = { name: "box", port: "sim", checks: [], words: [], said: [], holder: modules["page/prints-line"].OWN_PAGE };
     const heats = { nozzle_c: 200, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, at: {}, elapsed_s: 5 };
-    const tell = (phase, share, more = {}) => {
-      const print = { ...known, number: 1, phase, progress: { state: "printing", share, heat_s: 0, ...heats }, ...more };
+    const tell = (state, share, more = {}) => {
+      const print = { ...known, number: 1, state, progress: { state: "printing", share, heat_s: 0, ...heats }, ...more };
       fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [print] });
     };
     fake.sockets[0].open();
@@ -21,14 +21,14 @@ PAGE = """
 def test_the_title_of_the_tab_tells_how_much_is_printed_and_nothing_when_it_is_over() -> None:
     told = on_fake_page(
         f"{PAGE} const titles = []; tell('printing', 0.429); titles.push(document.title);"
-        " tell('over', 1, { end: 'done', sentence: 'the print is done' }); titles.push(document.title); return titles;"
+        " tell('done', 1, { over: true, sentence: 'the print is done' }); titles.push(document.title); return titles;"
     )
     assert told == ["42 % – tiltprint", "tiltprint"]
 
 
 @needs_node
 def test_the_browser_says_once_that_a_print_of_this_page_is_over() -> None:
-    over = "tell('over', 1, { end: 'done', sentence: 'the print is done' });"
+    over = "tell('done', 1, { over: true, sentence: 'the print is done' });"
     assert on_fake_page(f"{PAGE} tell('printing', 0.5); {over} {over} return said;") == ["box: the print is done"]
     assert on_fake_page(f"{PAGE} known.holder = 'another page'; tell('printing', 0.5); {over} return said;") == []
     assert on_fake_page(f"{PAGE} {over} return said;") == []  # it was over before this page was there

@@ -11,9 +11,11 @@ import pytest
 from starlette.types import Receive, Scope, Send
 
 from machine.dryrun.findings import known_findings
-from machine.pipeline.requests import Given, PrintRequest
+from machine.pipeline.requests import Given
+from machine.printing.destination import Simulated
+from machine.printing.job import PrintJob
 from machine.workbench.printing.commands import PageOfPrints, obey
-from machine.workbench.printing.order import Order, PrintOrder
+from machine.workbench.printing.job_state import Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.running_print import RunningPrint
 from machine.workbench.session.session import Session, Workbench
@@ -38,8 +40,7 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
     given, hangs = Event(), Event()
     monkeypatch.setattr(RunningPrint, "stop_at_once", lambda job: given.set())
     workbench, prints = Workbench(lambda pools: Session(PROFILE, Given(), pools)), Prints()
-    order = PrintOrder("a", Path("a.gcode"), PROFILE, PrintRequest("sim"))
-    prints.prints.append(RunningPrint(1, order, "", prints.notify))
+    prints.prints.append(RunningPrint(1, PrintJob(Simulated()), "", prints.notify))
 
     async def hang() -> bool:
         hangs.set()
@@ -89,8 +90,8 @@ class TakenAway(Slicing):
 
 
 def test_an_order_is_of_one_moment_of_its_bench(sessions: SessionsThread, monkeypatch: pytest.MonkeyPatch) -> None:
-    begun: list[Order] = []
-    monkeypatch.setattr(Prints, "begin", lambda prints, page, order: begun.append(order))
+    begun: list[PrintJob] = []
+    monkeypatch.setattr(Prints, "begin", lambda prints, page, job: begun.append(job))
     bench = SimpleNamespace(model=SimpleNamespace(name="box.stl"))
     sliced = SimpleNamespace(known=known_findings([], PROFILE, []), errors=(), gcode=Path("a.gcode"), key="key")
     slicing = TakenAway(sessions._loop, SimpleNamespace(bench=bench, sliced=sliced))
@@ -102,7 +103,7 @@ def test_an_order_is_of_one_moment_of_its_bench(sessions: SessionsThread, monkey
         await work
 
     asyncio.run(run())
-    assert [order.gcode for order in begun if isinstance(order, PrintOrder)] == [Path("a.gcode")]
+    assert [job.load.gcode for job in begun if isinstance(job.load, Slices)] == [Path("a.gcode")]
 
 
 def scope(path: str) -> dict[str, Any]:

@@ -3,25 +3,24 @@
 import re
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from math import inf
 
 from machine.cli.terminal.interrupts import interrupting
 from machine.firmware import dialect_of
 from machine.firmware.firmware import ProbingRules
 from machine.gcode.pen import Pen
 from machine.link.medium import SERIAL, Medium, Wire
-from machine.link.port import open_port
 from machine.link.protocol.events import Echo, Event, Unknown
 from machine.link.protocol.framing import LINE_LIMIT
 from machine.link.shutdown import lift_tip
 from machine.notices import say
-from machine.pipeline.requests import SIMULATED, PortRequest
+from machine.pipeline.requests import PortRequest
+from machine.printing.checks import check_machine
 from machine.printing.command_session import CommandSession
-from machine.printing.compatibility import check_machine, describe_answer, identify_printer
+from machine.printing.destination import parse_printer
+from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
 from machine.printing.serial_log import TappedWire, new_log
 from machine.setup.calibration.program import cold_start, turn_lines
 from machine.simulator.contact import ProbedTable
-from machine.simulator.simulator import SimulatedPrinter
 from mdp.pose import Pose
 from profiles.errors import FirmwareError, PrinterError, add_words
 from profiles.machine import Machine
@@ -153,18 +152,16 @@ class PrinterProber(PrinterMover):
 def cold_session(port: PortRequest, machine: Machine, table: ProbedTable | None = None) -> Iterator[ProbingSession]:
     """A conversation with the machine at the port, or with the simulated one, whose table may be sensed; its heaters off at the
     end."""
+    at = parse_printer(port.port, port.baud)
     with ExitStack() as stack:
-        path = port.port
-        if path == SIMULATED:
-            path = stack.enter_context(SimulatedPrinter(machine, inf, table=table)).path
         log = stack.enter_context(new_log("calibrate", f"calibrate at {port.port}", port.log))
-        wire = stack.enter_context(open_port(path, port.baud))
+        wire = stack.enter_context(open_line(at, machine, table))
         if log.trouble:
             say(f"the traffic is not logged: {log.file}: {log.trouble}")
         stack.enter_context(interrupting())
-        answer = identify_printer(wire, port.baud)
-        say(describe_answer(answer, port.baud))
-        check_machine(answer, machine, False)
+        answer = identify_printer(wire, rate_of(at))
+        say(describe_answer(answer, rate_of(at)))
+        check_machine(answer, machine)
         session = stack.enter_context(ProbingSession(TappedWire(wire, log.note), dialect_of(machine).longest_line))
         session.greet()
         yield session

@@ -12,7 +12,7 @@ from machine.cli.terminal.requests import CalibrationRequest
 from machine.notices import say
 from machine.pipeline.requests import PortRequest
 from machine.printing.command_session import CommandSession
-from machine.printing.server_checks import check_no_server
+from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, Touch
 from machine.setup.calibration.jog import begin_jog, pressed
 from machine.setup.calibration.program import TouchPlan, calibration_pen, hover_z_mm, plan_touches
@@ -32,7 +32,7 @@ PLACE = "fix a pointed mark, {height:g} mm high and {radius:g} mm from the middl
 def touch_by_keys(request: CalibrationRequest, port: PortRequest, profile: Profile) -> int:
     """Go from touch to touch, tell what follows, save it. Raises UserError, the tip raised and nothing saved."""
     machine = tilting_machine(request)
-    check_no_server(port.port)
+    parse_printer(port.port, port.baud)
     refuse_if_saved(request)
     if not can_type():
         raise PrinterError("--port without --probe takes keys from a terminal, and there is none: --probe measures by itself")

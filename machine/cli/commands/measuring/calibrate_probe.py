@@ -11,7 +11,7 @@ from machine.firmware.firmware import ProbingRules
 from machine.notices import say, show
 from machine.pipeline.output import check_writable
 from machine.pipeline.requests import ProbeRequest
-from machine.printing.server_checks import check_no_server
+from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.probing.ball import Ball
 from machine.setup.calibration.probing.measure import Measuring, Probe
@@ -31,7 +31,7 @@ PLACE = (
 def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Profile) -> int:
     """Measure, tell what follows, save it as calibrate saves. Raises UserError, the tip raised and nothing saved."""
     machine = tilting_machine(request)
-    check_no_server(probing.at.port)
+    parse_printer(probing.at.port, probing.at.baud)
     refuse_if_saved(request)
     if probing.png is not None:
         check_writable(probing.png)

@@ -12,7 +12,8 @@ from machine.firmware.firmware import check_baud
 from machine.notices import plain_lines, say
 from machine.pipeline.output import check_writable, plain_name, refuse_to_overwrite, write_own
 from machine.pipeline.profile_file import profile_text
-from machine.printing.settings_queries import text_of_port
+from machine.printing.destination import parse_destination
+from machine.printing.settings_queries import settings_text
 from machine.setup.detect.found import ConfigText, Found
 from machine.setup.detect.proposal import CALIBRATED, Proposal, propose, settings_of
 from machine.setup.detect.read import read
@@ -61,7 +62,7 @@ def _config(request: DetectRequest) -> ConfigText:
     simulated = load_one(request.base or DEFAULTS["machine"], kind="machine")["machine"]
     assert request.port is not None
     assert isinstance(simulated, Machine)
-    return text_of_port(request.port, request.baud, simulated)
+    return settings_text(parse_destination(request.port, request.baud), simulated)
 
 
 def read_file(file: Path) -> ConfigText:

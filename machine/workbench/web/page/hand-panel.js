@@ -2,6 +2,7 @@
 
 import { $ } from "../../../view/template/page.js";
 import { listen } from "./elements.js";
+import { IN_HAND } from "./print-shown.js";
 
 /** ask({does, ...}): what is to be done at the printer that is looked at. */
 export function handPanel(ask) {
@@ -17,6 +18,6 @@ export function handPanel(ask) {
 }
 
 export function showHand(print, commands) {
-  $("hand-live").hidden = print?.phase !== "hand" || !commands;
+  $("hand-live").hidden = print?.state !== IN_HAND || !commands;
   for (const button of $("hand-jog").children) button.disabled = !print?.progress?.homed;
 }

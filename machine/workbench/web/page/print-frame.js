@@ -62,7 +62,7 @@ export function followIn(print) {
   let follows = false, shown = 0;
   const same = () => print()?.key && print().key === store.state?.sliced?.key;
   const tell = () => {
-    const line = print()?.progress?.line;
+    const line = print()?.progress?.file_line;
     if (!follows || !same() || !line || line === shown) return;
     shown = line;
     post("line", { line });
@@ -83,7 +83,7 @@ export function followIn(print) {
     tell();
   };
   return () => {
-    const runs = same() && print().progress && print().phase !== "over";
+    const runs = same() && print().progress && !print().over;
     $("follow").hidden = !runs;
     tell();
     if (follows && (!store.looking || !runs)) set(false);

@@ -1,7 +1,9 @@
 // Print news: what is told of prints outside the page itself: in the title of its tab, and by the browser when one is over.
 
+import { LIVE } from "./print-shown.js";
+
 let model = "", percent = null;
-const heard = new Map(); // phase by the number of a print that this page commands
+const heard = new Map(); // state by the number of a print that this page commands
 
 const tell = () => { document.title = [percent === null ? "" : `${percent} %`, model, "tiltprint"].filter(Boolean).join(" – "); };
 
@@ -25,11 +27,11 @@ export function askToNotify() {
 
 /** Says of prints that this page commands that they are over, where the page itself is not seen. */
 export function notifyOver(prints, page) {
-  for (const { number, holder, phase, name, sentence } of prints) {
-    const ended = phase === "over" && ["printing", "leaving"].includes(heard.get(number));
+  for (const { number, holder, state, over, name, sentence } of prints) {
+    const ended = over && LIVE.includes(heard.get(number));
     if (ended && globalThis.Notification?.permission === "granted" && document.hidden !== false) {
       new Notification(`${name}: ${sentence}`, { tag: `${location.pathname} ${number}` });
     }
-    if (holder === page || heard.has(number)) heard.set(number, phase);
+    if (holder === page || heard.has(number)) heard.set(number, state);
   }
 }

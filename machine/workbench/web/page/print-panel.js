@@ -22,7 +22,7 @@ export function printPanel() {
   const send = (command) => { problem(""); socket.send(command); };
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
   const print = () => state.prints.find((job) => job.number === chosen) || null;
-  const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => job.phase !== "over");
+  const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => !job.over);
   const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
 
   function show(before) {
@@ -47,7 +47,7 @@ export function printPanel() {
     notifyOver(state.prints, OWN_PAGE);
     showBar(running(), print());
     stops.told();
-    document.documentElement.dataset.printing = print() ? print().progress?.state && print().phase === "printing" ? print().progress.state : print().phase : "";
+    document.documentElement.dataset.printing = print() ? (print().over ? "over" : print().state) : "";
   }
 
   setInterval(() => {
@@ -65,7 +65,7 @@ export function printPanel() {
   const toPrint = () => {
     update({ looking: false });
     $("tab-printing").click();
-    if (printerIsChosen() && !state.prints.some((job) => job.phase !== "over" && job.port === port())) check();
+    if (printerIsChosen() && !state.prints.some((job) => !job.over && job.port === port())) check();
   };
   for (const event of ["change", "input"]) listen(event, { ports: () => { printerChosen(); showPort(); unforce(); } });
   listen("focus", {

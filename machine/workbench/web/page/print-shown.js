@@ -6,51 +6,55 @@ import { clock, hide, listIn, tell, tellIn } from "./elements.js";
 const SILENT_MS = 5000; // a print that goes on is told five times a second
 const FEW = 8;
 const HEARD = new Map(); // by the number of a print: what was heard of it last, and when
-let shownPhase = "";
+let shownState = "";
+
+export const IN_HAND = "in hand";
+/** States in which a print is under way, and in which the tip is away from it. */
+export const LIVE = ["printing", "pausing", "paused", "resuming", "reconnecting", "finishing", "cancelling"];
+const AWAY = ["pausing", "paused"], COMMANDED = LIVE.filter((state) => state !== "cancelling");
 
 export function hear(prints) {
-  for (const { number, phase, progress } of prints) {
-    const word = `${phase} ${progress?.moment}`;
+  for (const { number, state, told_s: told } of prints) {
+    const word = `${state} ${told}`;
     if (HEARD.get(number)?.word !== word) HEARD.set(number, { word, at: performance.now() });
   }
 }
 
 /** That a print which goes on has not been heard of for a while: it may hang, or what lies between; "" where it has. */
-export function silence({ number, phase, progress }) {
+export function silence({ number, state, over, progress }) {
   const past = performance.now() - (HEARD.get(number)?.at ?? Infinity);
-  return phase !== "over" && progress && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
+  return !over && progress && state !== "uploading" && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
 }
 
 export const sure = (whether) => hide({ sure: !whether });
 
 export function showWhich(prints, chosen) {
   hide({ "which-line": prints.length < 2 });
-  const told = prints.map((job) => `${job.name} at ${job.port}: ${job.phase === "over" ? job.end : job.phase}`);
+  const told = prints.map((job) => `${job.name} at ${job.port}: ${job.state}`);
   if ([...$("which").options].map((option) => option.text).join("\n") !== told.join("\n")) {
     $("which").replaceChildren(...prints.map((job, k) => made("option", { value: job.number, text: told[k] })));
   }
   $("which").value = chosen;
 }
 
-const PHASES = { checking: "checking …", uploading: "handing the file over", printing: "starting", leaving: "ending" };
+const BEFORE = { checking: "checking …", uploading: "handing the file over", printing: "starting", cancelling: "ending" }; // any moment is known
 
 /** What stands above a print: how it is, or how it has ended. */
 function stateOf(print) {
-  const { phase, progress, upload, starts } = print;
-  if (phase === "over") return print.sentence;
-  if (progress && ["printing", "hand", "leaving"].includes(phase)) return stateTold(print);
-  if (phase === "uploading" && upload) return upload[0];
-  return phase === "ready" ? (starts ? "ready to print" : "ready to be handed over") : PHASES[phase] || "";
+  const { state, over, progress, starts } = print;
+  if (over) return print.sentence;
+  if (progress) return state === "uploading" ? progress.message : stateTold(print);
+  return state === "ready" ? (starts ? "ready to print" : "ready to be handed over") : BEFORE[state] || "";
 }
 
 export function showPrint(print, commands) {
   hide({ run: !print });
   if (!print) return void ($("printer-field").open = true);
-  const { phase, progress, figures, end, upload, server, starts, resumes } = print, uploads = phase === "uploading", over = phase === "over";
-  const runs = ["printing", "hand", "leaving"].includes(phase), asking = !runs && !uploads && (!over || end === "refused"), paused = ["paused", "pausing"].includes(progress?.state);
+  const { state, over, progress, figures, server, starts, resumes } = print, uploads = state === "uploading";
+  const runs = [...LIVE, IN_HAND].includes(state), asking = !runs && !uploads && (!over || state === "refused"), paused = AWAY.includes(state);
   tell({
     "run-title": `${resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`, "run-state": stateOf(print),
-    "run-news": `${print.name}: ${over ? print.sentence : progress ? [progress.state, progress.warning].filter(Boolean).join(": ") : phase}`, // a reader need not hear every per cent
+    "run-news": `${print.name}: ${over ? print.sentence : [state, progress?.warning].filter(Boolean).join(": ")}`, // a reader need not hear every per cent
     "ask-told": print.question || (starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
       : "The server keeps the file; nothing prints before somebody starts it there."),
     "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Leave it", "pause": paused ? "Resume" : "Pause",
@@ -58,11 +62,11 @@ export function showPrint(print, commands) {
     "held-told": print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.",
   });
   hide({
-    "run-ask": phase !== "ready" || !commands, "run-live": !progress && !uploads, "run-upload": !uploads || !commands, "leave-printing": !server,
-    "run-commands": phase !== "printing" || !commands, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
+    "run-ask": state !== "ready" || !commands, "run-live": !progress || (over && progress.state === "uploading"), "run-upload": !uploads || !commands, "leave-printing": !server,
+    "run-commands": !COMMANDED.includes(state) || !commands, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
   });
-  if (phase !== "printing" || !commands) sure(false);
-  $("run-state").className = over ? end : "";
+  if (!COMMANDED.includes(state) || !commands) sure(false);
+  $("run-state").className = over ? state : "";
   $("pause").dataset.print = paused ? "resume" : "pause";
   $("run-log").href = `prints/${print.number}/log`;
   listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on all the same` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
@@ -71,20 +75,15 @@ export function showPrint(print, commands) {
   listIn("run-said", runs || uploads || over ? print.said.filter((line) => !print.log || !line.includes(print.log)).slice(-FEW) : []);
   tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
   if (progress) showProgress(print);
-  else if (uploads) showUpload(upload);
-  if (shownPhase !== `${print.number} ${phase}`) { $("printer-field").open = over; $("rest-field").open = false; }
-  shownPhase = `${print.number} ${phase}`;
+  const kind = `${print.number} ${over ? "over" : runs ? "runs" : state}`;
+  if (shownState !== kind) { $("printer-field").open = over; $("rest-field").open = false; }
+  shownState = kind;
   if (over && print.forcible && commands) hide({ "force-line": false });
 }
 
 function stateTold(print) {
   const { state, share, left_s: left, message, warning } = print.progress;
   return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message, warning].filter(Boolean).join(" · ");
-}
-
-function showUpload(upload) {
-  $("run-progress").value = upload?.[1] || 0;
-  tellIn("run-told", []);
 }
 
 const figuresTold = ({ lines, time_s: time, filament_mm: filament, filament_g: grams, costs, errors }) =>
@@ -97,11 +96,12 @@ function ago(moment_s) {
 }
 
 export function showProgress(print) {
-  const { progress, phase } = print, over = phase === "over", old = over || progress.heat_is_old || silence(print);
+  const { progress, state, over } = print, old = over || progress.heat_is_old || silence(print);
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
   const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target ? ` of ${target.toFixed(0)}` : ""} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
   $("run-progress").value = progress.share || 0;
-  hide({ "run-progress": phase === "hand" });
+  if (progress.state === "uploading") return tellIn("run-told", []);
+  hide({ "run-progress": state === IN_HAND });
   tellIn("run-told", [
     progress.part != null && ["part", of(progress.part, progress.parts)],
     progress.layer != null && ["layer", of(progress.layer, progress.layers)],
@@ -124,6 +124,6 @@ export function showBar(running, looked) {
   const shown = running.includes(looked) ? looked : running.at(-1);
   hide({ "bar-told": !shown, "emergency": !shown, "print-bar": !shown && $("stop-told").hidden });
   if (!shown) return;
-  tell({ "bar-told": `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown) : shown.phase}` });
+  tell({ "bar-told": `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown) : shown.state}` });
   $("emergency").dataset.print = shown.number;
 }

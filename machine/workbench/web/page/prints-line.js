@@ -46,7 +46,7 @@ const SAME_PRESS_MS = 1000; // who presses twice in a fright means the print of 
 /** Emergency stops, and in the bar at the foot, which nothing covers, what has become of them, until a person has noted it. */
 export function stopsAsked(prints, send, isOpen) {
   let asked = new Set(), late = 0, pressed = { number: 0, at: -Infinity };
-  const going = ({ phase }) => phase !== "over";
+  const going = ({ over }) => !over;
   const stopped = () => prints().filter(({ number }) => asked.has(number));
   const say = (text) => {
     sayIn("stop-words", text);

@@ -15,7 +15,7 @@ export function webcamPanel(print) {
   };
   setInterval(async () => {
     const job = print();
-    if (!job?.webcam || job.phase === "over") return forget();
+    if (!job?.webcam || job.over) return forget();
     if (asking || document.hidden || $("printing").hidden) return;
     asking = true;
     const answer = await fetch(`prints/${job.number}/webcam`).catch(() => null), picture = answer?.ok ? await answer.blob().catch(() => null) : null;

@@ -21,7 +21,7 @@ from machine.cli.cli import main
 from machine.cli.commands import console
 from machine.cli.commands.console import Shown, _Console
 from machine.cli.terminal.interrupts import interrupting
-from machine.printing import compatibility
+from machine.printing import ports
 from machine.printing.command_session import CommandSession
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
@@ -141,7 +141,7 @@ def test_the_error_of_a_printer_is_told_in_its_own_words(piped: Piped, capsys: C
 def test_a_port_where_no_printer_is_gets_the_sentence_of_print(
     piped: Piped, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
-    hear_out(monkeypatch, compatibility)
+    hear_out(monkeypatch, ports)
     with on_terminal(lambda data, baud: data) as path:
         assert piped("G28\n", path) == 1
     assert f"what answers at {path} is no printer: it sends back what it is told" in capsys.readouterr().err

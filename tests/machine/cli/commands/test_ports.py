@@ -9,9 +9,8 @@ import pytest
 from machine.cli.cli import main
 from machine.link.identification import Answer, Kind
 from machine.link.port import SerialDevice, open_port
-from machine.printing import port_reports
-from machine.printing.port_reports import PortReport, ask_port, describe, port_json
-from machine.printing.running_simulators import announced
+from machine.printing import ports as ports_module
+from machine.printing.ports import PortReport, announced, ask_port, describe, port_json
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.folders import state_folder
 from profiles.profile import load
@@ -29,8 +28,8 @@ def device(path: str) -> SerialDevice:
 def here(monkeypatch: pytest.MonkeyPatch) -> list[SerialDevice]:
     """The ports of this computer, as the test fills them in."""
     devices: list[SerialDevice] = []
-    monkeypatch.setattr(port_reports, "serial_devices", lambda: tuple(devices))
-    hear_out(monkeypatch, port_reports)
+    monkeypatch.setattr(ports_module, "serial_devices", lambda: tuple(devices))
+    hear_out(monkeypatch, ports_module)
     return devices
 
 
@@ -58,7 +57,7 @@ def test_several_ports_are_asked_at_a_time_and_told_in_order(
         on_terminal(scripted({}, "hello?")) as stranger,
         on_terminal(lambda *_: b"") as mute,
     ):
-        hear_out(monkeypatch, port_reports, mute)
+        hear_out(monkeypatch, ports_module, mute)
         here += [device(printer.path), device(stranger), device(mute), device("/dev/no-such-port")]
         assert main(["ports", "--json"]) == 0
     reports = json.loads(capsys.readouterr().out)

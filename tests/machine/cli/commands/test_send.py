@@ -9,17 +9,18 @@ from typing import Any
 import pytest
 
 from machine.cli.cli import main
-from machine.cli.terminal.server_keys import LEAVING
+from machine.cli.terminal.at_terminal import AtTerminal
+from machine.cli.terminal.keys import LEAVING
 from machine.link.pending_commands import CancelledError
-from machine.printing.attendance import AtServerTerminal
-from machine.printing.network_print import hand_over
+from machine.printing.job import Scene
+from machine.printing.serial_log import SerialLog
+from machine.printing.server_print import hand_over
 from machine.printing.servers import follow
 from machine.printing.servers.credentials import VARIABLE
 from machine.printing.servers.gcode_upload import GcodeUpload, Sent
 from machine.printing.servers.octoprint import OctoPrint
-from machine.printing.servers.servers import open_server
 from tests.machine.person import HASTY, ROOT, Person
-from tests.machine.printing.servers.stand_ins import KEY, stand_in
+from tests.machine.printing.servers.stand_ins import KEY, session_with, stand_in
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
 MARLIN, KLIPPER = PROGRAMS / "post_and_arm_generic_ac.gcode", PROGRAMS / "post_and_arm_fractal5pro.gcode"
@@ -213,8 +214,14 @@ def test_a_server_is_no_port_for_what_talks_to_the_printer_itself(command: list[
     assert "--port moonraker:host is a print server, which takes whole files by print and send" in capsys.readouterr().err
 
 
+def scene(folder: Path) -> Scene:
+    return Scene("a.gcode to octoprint:host", SerialLog(folder / "log", "a.gcode"), server="octoprint:host")
+
+
 @pytest.mark.parametrize(("gone", "rest"), [(0, "keeps nothing of"), (7, "may hold all of")])
-def test_an_upload_that_is_broken_off_tells_what_the_server_has(gone: int, rest: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_upload_that_is_broken_off_tells_what_the_server_has(
+    gone: int, rest: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     class Interrupted:
         name = "octoprint:host"
 
@@ -227,17 +234,17 @@ def test_an_upload_that_is_broken_off_tells_what_the_server_has(gone: int, rest:
 
     server: object = Interrupted()
     with pytest.raises(KeyboardInterrupt):
-        hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode")  # type: ignore[arg-type]
+        hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode", scene(tmp_path), AtTerminal())  # type: ignore[arg-type]
     assert f"upload broken off: octoprint:host {rest} a.gcode" in capsys.readouterr().err
 
 
-def test_a_person_who_gives_up_breaks_the_upload_off(capsys: pytest.CaptureFixture[str]) -> None:
-    class GivingUp(AtServerTerminal):
+def test_a_person_who_gives_up_breaks_the_upload_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    class GivingUp(AtTerminal):
         def gives_up(self) -> bool:
             return True
 
-    with stand_in("octoprint") as (job, address), open_server(address) as server:
+    with stand_in("octoprint") as (job, address), session_with(address) as server:
         with pytest.raises(CancelledError):
-            hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode", GivingUp(server.name))
+            hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode", scene(tmp_path), GivingUp())
         assert job.files == {}
     assert f"upload broken off: {address} keeps nothing of a.gcode" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Keys of a running print: what each asks for, and a terminal that is as before afterwards."""
+"""Keys of a running print, here or on a server: what each asks for, and a terminal that is as before afterwards."""
 
 import os
 import pty
@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import pytest
 
-from machine.cli.terminal.keys import HINT_S, MORE, SURE, Keyboard, Typing, can_type, typing
+from machine.cli.terminal import keys as keys_module
+from machine.cli.terminal.keys import ALONE_S, CANCELLING, HINT_S, LEAVING, MORE, SURE, Keyboard, Typing, can_type, typing
 from machine.link.pending_commands import Command, Control, PendingCommand
-from machine.link.progress import Progress
-from machine.link.protocol.events import Temperature
+from machine.link.print_state import PrintStatus
 from tests.machine.peers import PATIENCE_S
 
-MOMENT = Progress(0.0, Temperature())
+MOMENT = PrintStatus(elapsed_s=0.0)
 
 
 def asked(*keys: str, state: str = "printing") -> list[PendingCommand]:
@@ -63,7 +63,7 @@ def test_cancelling_is_asked_once_more(keys: str) -> None:
 
 def test_a_question_that_nobody_answers_is_void_after_a_while() -> None:
     control, clock = Control(), [0.0]
-    board = Keyboard(control, lambda: clock[0])
+    board = Keyboard(control, now_s=lambda: clock[0])
     board.press("c")
     clock[0] = HINT_S
     assert board.hint == ""
@@ -220,3 +220,88 @@ def test_where_keys_cannot_be_read_none_are_offered(monkeypatch: pytest.MonkeyPa
 
 def test_keys_are_read_from_a_terminal_in_the_foreground_only(keyboard: int) -> None:
     assert not can_type()  # a terminal, but not the one that controls this process
+
+
+class Clock:
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def board_and_control(monkeypatch: pytest.MonkeyPatch, terminal: bool = True) -> tuple[Keyboard, Control, Clock]:
+    monkeypatch.setattr(keys_module, "can_type", lambda: terminal)
+    monkeypatch.setattr(keys_module, "is_terminal", lambda: terminal)
+    control, clock = Control(), Clock()
+    return Keyboard(control, "octoprint:octopi", clock), control, clock
+
+
+def commands_of(control: Control) -> list[Command]:
+    requests = iter(control.take, None)
+    return [request.command for request in requests]
+
+
+@pytest.mark.parametrize(
+    ("keys", "commands", "left"),
+    [
+        ("pr", [Command.PAUSE, Command.RESUME], False),
+        ("e", [Command.EMERGENCY_STOP], False),
+        ("cy", [Command.CANCEL], False),
+        ("cc", [Command.CANCEL], False),
+        ("cn", [], False),
+        ("ql", [], True),
+        ("qc", [Command.CANCEL], False),
+        ("qx", [], False),
+        ("l", [], False),
+    ],
+)
+def test_keys_mean_what_they_mean_at_a_port_and_l_leaves_when_asked(
+    keys: str, commands: list[Command], left: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    board, control, _ = board_and_control(monkeypatch)
+    for key in keys:
+        board.press(key)
+    assert (commands_of(control), board.left()) == (commands, left)
+
+
+def test_the_first_ctrl_c_asks_the_second_cancels_the_third_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    board, control, _ = board_and_control(monkeypatch)
+    board.interrupt()
+    assert (board.hint, commands_of(control)) == (LEAVING, [])
+    board.interrupt()
+    assert commands_of(control) == [Command.CANCEL]
+    assert not board.left()
+    with pytest.raises(KeyboardInterrupt):
+        board.interrupt()
+
+
+def test_any_key_after_ctrl_c_goes_on_following(monkeypatch: pytest.MonkeyPatch) -> None:
+    board, control, clock = board_and_control(monkeypatch)
+    board.interrupt()
+    board.press("x")
+    clock.now_s = 100.0
+    assert not board.left()
+    board.press("c")
+    assert board.hint == CANCELLING
+    assert commands_of(control) == []
+
+
+def test_a_question_that_nobody_answers_leaves_the_print_going_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    board, control, clock = board_and_control(monkeypatch)
+    board.interrupt()
+    clock.now_s = 9.9
+    assert not board.left()
+    clock.now_s = 10.1
+    assert board.left()
+    assert commands_of(control) == []
+
+
+def test_without_a_terminal_the_way_to_cancel_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    board, control, clock = board_and_control(monkeypatch, terminal=False)
+    board.interrupt()
+    assert capsys.readouterr().err == "the print goes on at octoprint:octopi: interrupt again within 2 s to cancel it\n"
+    clock.now_s = ALONE_S - 0.1
+    board.interrupt()
+    assert commands_of(control) == [Command.CANCEL]

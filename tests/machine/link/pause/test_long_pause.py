@@ -8,7 +8,7 @@ import pytest
 
 from machine.link.journal import Journal, JournalHeading, read_journal
 from machine.link.pending_commands import Command
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
@@ -37,9 +37,9 @@ class Patience(Watcher):
         self.when[150] = self.ask(Command.PAUSE)
         self.paused_s: float | None = None
         self.due: list[tuple[float, Callable[[], None]]] = []
-        self.heard: dict[float, Progress] = {}  # seconds into the pause: what was shown
+        self.heard: dict[float, PrintStatus] = {}  # seconds into the pause: what was shown
 
-    def see(self, progress: Progress) -> None:
+    def see(self, progress: PrintStatus) -> None:
         super().see(progress)
         if progress.state == "paused" and self.paused_s is None:
             self.paused_s = progress.elapsed_s
@@ -52,7 +52,7 @@ class Patience(Watcher):
         self.due.append((seconds, self.ask(wish, text=text)))
         return self
 
-    def shown_at(self, seconds: float) -> Progress:
+    def shown_at(self, seconds: float) -> PrintStatus:
         """What stood on the screen so long after the tip had come to rest."""
         return self.heard[max(at for at in self.heard if at <= seconds)]
 
@@ -215,7 +215,7 @@ def test_a_cancel_on_the_way_back_lifts_the_tip_again() -> None:
     profile, printer = watcher.profile, watcher.printer
     low = {"seen": False}
 
-    def see(progress: Progress) -> None:
+    def see(progress: PrintStatus) -> None:
         Patience.see(watcher, progress)
         if progress.state == "resuming" and printer.firmware.board.motion.at(printer.now_s)[2] < 65.0 and not low["seen"]:
             low["seen"] = True

@@ -10,11 +10,16 @@ import sys
 import threading
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
+
+from machine.printing.destination import parse_server_address
+from machine.printing.servers.http import Tell
+from machine.printing.servers.server import PrintServer
+from machine.printing.servers.servers import open_server
 
 KEY = "workshop-key-0815"
 
@@ -358,3 +363,8 @@ def stand_in(
     finally:
         server.shutdown()
         server.server_close()
+
+
+def session_with(address: str, tell: Tell | None = None) -> AbstractContextManager[PrintServer]:
+    """A session with the server of an address. tell: what goes over the line."""
+    return open_server(parse_server_address(address), tell)

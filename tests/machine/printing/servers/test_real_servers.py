@@ -16,13 +16,13 @@ from pathlib import Path
 import pytest
 
 from machine.link.pending_commands import Command, Control
+from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.servers.credentials import VARIABLE
-from machine.printing.servers.follow import End, follow_print
+from machine.printing.servers.follow import follow_print
 from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import JobStatus, Phase
-from machine.printing.servers.servers import open_server
 from profiles.errors import ServerError
 from tests.machine.printing.servers.klippy_stub import KlippyStub
+from tests.machine.printing.servers.stand_ins import session_with
 
 OCTOPRINT, MOONRAKER = os.environ.get("TILTPRINT_OCTOPRINT", ""), os.environ.get("TILTPRINT_MOONRAKER", "")
 KEY = "0123456789ABCDEF0123456789ABCDEF"
@@ -72,9 +72,9 @@ def wait_ready(address: str) -> None:
     deadline = time.monotonic() + 90
     while True:
         try:
-            with open_server(address) as server:
+            with session_with(address) as server:
                 server.greet()
-                if server.status().phase is Phase.READY:
+                if server.status().state is PrintState.READY:
                     return
         except ServerError:
             if time.monotonic() > deadline:
@@ -127,40 +127,40 @@ def wait_for_key(database: Path) -> str:
     raise AssertionError("Moonraker has made no key")
 
 
-Steps = Callable[[JobStatus, Control], None]
+Steps = Callable[[PrintStatus, Control], None]
 
 
-def print_on(address: str, steps: Steps) -> tuple[End, list[Phase]]:
+def print_on(address: str, steps: Steps) -> tuple[PrintState, list[PrintState]]:
     """How a print ends that is given orders on the way, and the phases it was seen in."""
-    phases: list[Phase] = []
+    phases: list[PrintState] = []
     control = Control()
 
-    def on_status(status: JobStatus, message: str) -> None:
-        if phases[-1:] != [status.phase]:
-            phases.append(status.phase)
+    def on_status(status: PrintStatus, message: str) -> None:
+        if phases[-1:] != [status.state]:
+            phases.append(status.state)
             steps(status, control)
 
-    with open_server(address) as server:
+    with session_with(address) as server:
         file = server.upload(UPLOAD, lambda count: None)
         return follow_print(server, file, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False), phases
 
 
 def pause_resume_cancel() -> Steps:
-    orders = {Phase.PRINTING: [Command.PAUSE, Command.CANCEL], Phase.PAUSED: [Command.RESUME]}
+    orders = {PrintState.PRINTING: [Command.PAUSE, Command.CANCEL], PrintState.PAUSED: [Command.RESUME]}
 
-    def steps(status: JobStatus, control: Control) -> None:
-        if orders.get(status.phase):
-            control.ask(orders[status.phase].pop(0))
+    def steps(status: PrintStatus, control: Control) -> None:
+        if orders.get(status.state):
+            control.ask(orders[status.state].pop(0))
 
     return steps
 
 
-def only_watch(status: JobStatus, control: Control) -> None:
+def only_watch(status: PrintStatus, control: Control) -> None:
     """Ask for nothing."""
 
 
-def stop_at_once(status: JobStatus, control: Control) -> None:
-    if status.phase is Phase.PRINTING:
+def stop_at_once(status: PrintStatus, control: Control) -> None:
+    if status.state is PrintState.PRINTING:
         control.ask(Command.EMERGENCY_STOP)
 
 
@@ -172,7 +172,7 @@ def check_broken_off(address: str) -> None:
         if count > 1_000_000:
             raise KeyboardInterrupt
 
-    with open_server(address) as server:
+    with session_with(address) as server:
         with pytest.raises(KeyboardInterrupt):
             server.upload(large, interrupt)
         time.sleep(1.0)
@@ -181,61 +181,61 @@ def check_broken_off(address: str) -> None:
 
 def check_refusals(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "another-key")
-    with open_server(address) as server, pytest.raises(ServerError, match="refuses the key"):
+    with session_with(address) as server, pytest.raises(ServerError, match="refuses the key"):
         server.greet()
     monkeypatch.setenv(VARIABLE, "")
-    with open_server(address) as server, pytest.raises(ServerError, match="wants a key"):
+    with session_with(address) as server, pytest.raises(ServerError, match="wants a key"):
         server.greet()
 
 
 @needs_octoprint
 def test_octoprint_prints_pauses_cancels_and_halts(octoprint: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    with open_server(octoprint) as server:
+    with session_with(octoprint) as server:
         assert server.greet().text.startswith("OctoPrint 1.")
         assert not server.has("passes.gcode")
     end, phases = print_on(octoprint, only_watch)
-    assert (end, phases[-1]) == (End.DONE, Phase.DONE)
-    with open_server(octoprint) as server:
+    assert (end, phases[-1]) == (PrintState.DONE, PrintState.DONE)
+    with session_with(octoprint) as server:
         assert server.has("passes.gcode")
     check_pause_and_cancel(octoprint)
     check_broken_off(octoprint)
-    assert print_on(octoprint, stop_at_once)[0] is End.STOPPED
+    assert print_on(octoprint, stop_at_once)[0] is PrintState.FAILED
     check_refusals(octoprint, monkeypatch)
 
 
 @needs_moonraker
 def test_moonraker_prints_pauses_cancels_and_halts(moonraker: tuple[str, KlippyStub], monkeypatch: pytest.MonkeyPatch) -> None:
     address, klippy = moonraker
-    with open_server(address) as server:
+    with session_with(address) as server:
         greeting = server.greet()
         assert greeting.text.startswith("Moonraker")
         assert greeting.limits["Z"] == (-5.0, 400.0)
         assert greeting.steppers == {"stepper_a", "stepper_c"}
         assert not server.has("passes.gcode")
     end, phases = print_on(address, only_watch)
-    assert (end, phases[-1]) == (End.DONE, Phase.DONE)
-    with open_server(address) as server:
+    assert (end, phases[-1]) == (PrintState.DONE, PrintState.DONE)
+    with session_with(address) as server:
         assert server.has("passes.gcode")
         server.command("M220 S120")
     assert klippy.scripts[-1] == "M220 S120"
     check_pause_and_cancel(address)
     check_while_printing(address)
     check_broken_off(address)
-    assert print_on(address, stop_at_once)[0] is End.STOPPED
-    with open_server(address) as server:
-        assert server.status().phase is Phase.OFFLINE
+    assert print_on(address, stop_at_once)[0] is PrintState.FAILED
+    with session_with(address) as server:
+        assert server.status().state is PrintState.OFFLINE
     check_refusals(address, monkeypatch)
 
 
 def check_pause_and_cancel(address: str) -> None:
     end, phases = print_on(address, pause_resume_cancel())
-    assert end is End.CANCELLED
-    begin = [phase for phase in phases if phase in (Phase.PRINTING, Phase.PAUSED)][:3]
-    assert begin == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
+    assert end is PrintState.CANCELLED
+    begin = [phase for phase in phases if phase in (PrintState.PRINTING, PrintState.PAUSED)][:3]
+    assert begin == [PrintState.PRINTING, PrintState.PAUSED, PrintState.PRINTING]
 
 
 def check_while_printing(address: str) -> None:
-    with open_server(address) as server:
+    with session_with(address) as server:
         server.start("passes.gcode")
         with pytest.raises(ServerError, match="printing a file of this name now"):
             server.upload(UPLOAD, lambda count: None)

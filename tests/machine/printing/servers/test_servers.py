@@ -14,15 +14,17 @@ from typing import Any
 import pytest
 
 from machine.link.pending_commands import Command, Control
+from machine.link.print_state import PrintState, PrintStatus
+from machine.printing.destination import parse_server_address
 from machine.printing.rescue import cancel_on_server, rescue
 from machine.printing.servers import duet, follow, http
 from machine.printing.servers.credentials import VARIABLE, servers_file
-from machine.printing.servers.follow import End, follow_print
+from machine.printing.servers.follow import follow_print
 from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import JobStatus, Phase, PrintServer
-from machine.printing.servers.servers import KINDS, open_server
+from machine.printing.servers.server import PrintServer
+from machine.printing.servers.servers import KINDS
 from profiles.errors import NoAnswerError, ServerError
-from tests.machine.printing.servers.stand_ins import KEY, STAND_INS, Job, stand_in
+from tests.machine.printing.servers.stand_ins import KEY, STAND_INS, Job, session_with, stand_in
 
 LINES = tuple(f"G1 X{k}" for k in range(20_000))
 UPLOAD = GcodeUpload("box.gcode", LINES)
@@ -43,7 +45,7 @@ def unheard(count: int) -> None:
     del count
 
 
-def ignore(status: JobStatus, message: str) -> None:
+def ignore(status: PrintStatus, message: str) -> None:
     del status, message
 
 
@@ -55,19 +57,19 @@ def hand_over(server: PrintServer) -> str:
 @contextlib.contextmanager
 def printing(kind: str, **more: Any) -> Iterator[tuple[Job, PrintServer]]:
     """A server that has the file, and takes long to print it."""
-    with stand_in(kind, **more) as (job, address), open_server(address) as server:
+    with stand_in(kind, **more) as (job, address), session_with(address) as server:
         hand_over(server)
         job.steps = 10_000
         yield job, server
 
 
-def run(server: PrintServer, control: Control, on_status: Callable[[JobStatus, str], None] = ignore) -> End:
+def run(server: PrintServer, control: Control, on_status: Callable[[PrintStatus, str], None] = ignore) -> PrintState:
     return follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False)
 
 
 @every_kind
 def test_a_file_is_handed_over_whole_with_its_progress(kind: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
+    with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
         assert not server.has("box.gcode")
         counts: list[int] = []
@@ -78,7 +80,7 @@ def test_a_file_is_handed_over_whole_with_its_progress(kind: str) -> None:
 
 
 def test_a_file_that_a_moonraker_has_not_scanned_yet_is_there_all_the_same() -> None:
-    with stand_in("moonraker", scans=False) as (job, address), open_server(address) as server:
+    with stand_in("moonraker", scans=False) as (job, address), session_with(address) as server:
         job.files["copied.gcode"] = b""
         assert (server.has("copied.gcode"), server.has("other.gcode")) == (True, False)
 
@@ -92,7 +94,7 @@ def test_a_file_that_a_moonraker_has_not_scanned_yet_is_there_all_the_same() -> 
     ("octoprint", "/api/settings", {"webcam": []}, ""), ("moonraker", "/server/webcams/list", [], ""), ("duet", "/none", {}, ""),
 ])  # fmt: skip
 def test_a_server_tells_of_its_camera_or_of_none(kind: str, path: str, value: object, picture: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
+    with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
         assert server.webcam() == ""
         job.refuse[path] = (200, value)
@@ -101,11 +103,11 @@ def test_a_server_tells_of_its_camera_or_of_none(kind: str, path: str, value: ob
 
 @every_kind
 def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
-    seen: list[JobStatus] = []
-    with stand_in(kind) as (_, address), open_server(address) as server:
+    seen: list[PrintStatus] = []
+    with stand_in(kind) as (_, address), session_with(address) as server:
         hand_over(server)
-        assert run(server, Control(), lambda status, message: seen.append(status)) is End.DONE
-    printing = [status for status in seen if status.phase is Phase.PRINTING]
+        assert run(server, Control(), lambda status, message: seen.append(status)) is PrintState.DONE
+    printing = [status for status in seen if status.state is PrintState.PRINTING]
     assert any(0 < (status.bytes_read or 0) < len(UPLOAD.content) for status in printing)
     heat = printing[0].temperature
     assert (heat.nozzle_c, heat.nozzle_target_c, heat.bed_c, heat.bed_target_c) == (209.6, 210.0, 59.9, 60.0)
@@ -113,22 +115,22 @@ def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
 
 @every_kind
 def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> None:
-    control, phases = Control(), list[Phase]()
-    asks = {Phase.PRINTING: Command.PAUSE, Phase.PAUSED: Command.RESUME}
+    control, phases = Control(), list[PrintState]()
+    asks = {PrintState.PRINTING: Command.PAUSE, PrintState.PAUSED: Command.RESUME}
 
-    def ask(status: JobStatus, message: str) -> None:
-        if status.phase is Phase.READY or phases[-1:] == [status.phase]:
+    def ask(status: PrintStatus, message: str) -> None:
+        if status.state is PrintState.READY or phases[-1:] == [status.state]:
             return
-        phases.append(status.phase)
+        phases.append(status.state)
         done = len(phases) > 2  # printing, paused, printing
-        if status.phase in asks:
-            control.ask(Command.CANCEL if done else asks[status.phase])
+        if status.state in asks:
+            control.ask(Command.CANCEL if done else asks[status.state])
 
     with printing(kind) as (job, server):
         end = run(server, control, ask)
-    assert end is End.CANCELLED
+    assert end is PrintState.CANCELLED
     assert job.state == "cancelled"
-    assert phases[:3] == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
+    assert phases[:3] == [PrintState.PRINTING, PrintState.PAUSED, PrintState.PRINTING]
 
 
 def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
@@ -140,7 +142,10 @@ def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
                 control.ask(Command.EMERGENCY_STOP)
             return job.state == "printing"
 
-        assert follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status=ignore, control=control, left=left) is End.STOPPED
+        assert (
+            follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status=ignore, control=control, left=left)
+            is PrintState.FAILED
+        )
         assert job.commands == ["M112"]
 
 
@@ -148,7 +153,7 @@ def test_a_stop_for_which_the_key_cannot_be_read_is_told_as_not_confirmed() -> N
     servers_file().parent.mkdir(parents=True)
     servers_file().write_text("key")
     servers_file().chmod(0o600)
-    sentence = rescue("octoprint:printer", 115200, emergency=True)
+    sentence = rescue(parse_server_address("octoprint:printer"), emergency=True)
     assert sentence.startswith("emergency stop: octoprint:printer did not confirm it: cut the power (file of servers ")
 
 
@@ -169,14 +174,14 @@ def test_only_the_print_that_was_left_is_cancelled(kind: str, printed: str, file
         job.steps = 10_000
         job.start(printed)
         with pytest.raises(ServerError, match=reason) if reason else contextlib.nullcontext():
-            assert cancel_on_server(address, file, away_s)
+            assert cancel_on_server(parse_server_address(address), file, away_s)
         assert job.state == ("printing" if reason else "cancelled")
 
 
 @every_kind
 def test_where_nothing_is_printed_any_more_nothing_is_cancelled(kind: str) -> None:
     with stand_in(kind) as (job, address):
-        assert not cancel_on_server(address, "box.gcode", 10.0)
+        assert not cancel_on_server(parse_server_address(address), "box.gcode", 10.0)
         assert job.state == "idle"
 
 
@@ -187,12 +192,12 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
         control.ask(Command.FEED, 120.0)
         control.ask(Command.FLOW, 900.0)  # not possible: told, not sent
 
-        def stop(status: JobStatus, message: str) -> None:
+        def stop(status: PrintStatus, message: str) -> None:
             if job.commands:
                 control.ask(Command.EMERGENCY_STOP)
 
-        assert run(server, control, stop) is End.STOPPED
-        assert server.status().phase is Phase.OFFLINE
+        assert run(server, control, stop) is PrintState.FAILED
+        assert server.status().state is PrintState.OFFLINE
     assert job.commands[0] == "M220 S120"
     assert job.halted
 
@@ -201,7 +206,7 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
 def test_a_person_leaves_a_print_that_goes_on(kind: str) -> None:
     with printing(kind) as (job, server):
         left = lambda: job.state == "printing"  # noqa: E731
-        assert follow_print(server, UPLOAD.name, 1, on_status=ignore, control=Control(), left=left) is End.LEFT
+        assert follow_print(server, UPLOAD.name, 1, on_status=ignore, control=Control(), left=left) is PrintState.LEFT
         assert job.state == "printing"
 
 
@@ -214,7 +219,7 @@ def test_a_wrong_or_missing_key_is_one_sentence_without_it(
     logged: list[bytes] = []
     with (
         stand_in(kind) as (_, address),
-        open_server(address, lambda direction, data: logged.append(data)) as server,
+        session_with(address, lambda direction, data: logged.append(data)) as server,
         pytest.raises(ServerError, match=sentence) as refused,
     ):
         server.greet()
@@ -225,9 +230,9 @@ def test_a_wrong_or_missing_key_is_one_sentence_without_it(
 @every_kind
 def test_no_key_stands_in_the_log(kind: str) -> None:
     logged: list[bytes] = []
-    with stand_in(kind) as (_, address), open_server(address, lambda direction, data: logged.append(data)) as server:
+    with stand_in(kind) as (_, address), session_with(address, lambda direction, data: logged.append(data)) as server:
         hand_over(server)
-        assert run(server, Control()) is End.DONE
+        assert run(server, Control()) is PrintState.DONE
     assert b"GET" in b"".join(logged)
     assert KEY.encode() not in b"".join(logged)
 
@@ -246,7 +251,7 @@ UPLOADS = {"octoprint": "/api/files/local", "moonraker": "/server/files/upload",
     ],
 )
 def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: str, sentence: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
+    with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
         job.refuse[UPLOADS[kind]] = (status, words.encode() if status == 500 else words)
         with pytest.raises(ServerError, match=sentence) as refused:
@@ -258,7 +263,7 @@ def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: st
 
 @every_kind
 def test_half_an_upload_is_no_file(kind: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
+    with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
         job.break_off = UPLOADS[kind]
         with pytest.raises(ServerError, match=r"broke off|breaks off"):
@@ -270,7 +275,7 @@ def test_half_an_upload_is_no_file(kind: str) -> None:
     ("kind", "sentence"), [("octoprint", "printing a file of this name now"), ("moonraker", "printing a file of this name now")]
 )
 def test_a_file_that_is_being_printed_is_not_replaced(kind: str, sentence: str) -> None:
-    with stand_in(kind) as (job, address), open_server(address) as server:
+    with stand_in(kind) as (job, address), session_with(address) as server:
         server.start(hand_over(server))
         with pytest.raises(ServerError, match=sentence):
             server.upload(UPLOAD, unheard)
@@ -280,7 +285,7 @@ def test_a_file_that_is_being_printed_is_not_replaced(kind: str, sentence: str) 
 
 
 def test_a_moonraker_that_speaks_as_octoprint_is_told_apart() -> None:
-    with stand_in("octoprint") as (job, address), open_server(address) as server:
+    with stand_in("octoprint") as (job, address), session_with(address) as server:
         job.refuse["/api/version"] = (200, b'{"text": "OctoPrint (Moonraker v0.3.1)"}')
         with pytest.raises(ServerError, match="use moonraker:HOST"):
             server.greet()
@@ -290,7 +295,7 @@ def test_a_moonraker_that_speaks_as_octoprint_is_told_apart() -> None:
 def test_another_kind_of_server_is_none(kind: str, real: str) -> None:
     with (
         stand_in(real) as (_, address),
-        open_server(address.replace(real, kind, 1)) as server,
+        session_with(address.replace(real, kind, 1)) as server,
         pytest.raises(ServerError),
     ):
         server.greet()
@@ -298,10 +303,10 @@ def test_another_kind_of_server_is_none(kind: str, real: str) -> None:
 
 def test_a_session_of_a_duet_that_has_ended_is_begun_again() -> None:
     sessions: set[str] = set()
-    with stand_in("duet", sessions=sessions) as (_, address), open_server(address) as server:
+    with stand_in("duet", sessions=sessions) as (_, address), session_with(address) as server:
         server.greet()
         sessions.clear()
-        assert server.status().phase is Phase.READY
+        assert server.status().state is PrintState.READY
 
 
 @every_kind
@@ -309,11 +314,11 @@ def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch:
     messages: list[str] = []
     with printing(kind) as (job, server):
 
-        def away(status: JobStatus, message: str) -> None:
+        def away(status: PrintStatus, message: str) -> None:
             messages.append(message)
             if message:
                 monkeypatch.setattr(follow, "LOST_S", 0.0)  # two minutes later
-            if status.phase is Phase.PRINTING:
+            if status.state is PrintState.PRINTING:
                 job.refuse = dict.fromkeys(STATUS, (502, "Bad Gateway"))
 
         with pytest.raises(ServerError, match="the print may go on, look at the printer"):
@@ -354,7 +359,7 @@ def test_what_became_of_a_print_is_told_as_far_as_it_is_known(
         run(
             server,
             Control(),
-            lambda status, message: happens(job, message) if status.phase is Phase.PRINTING or message else None,
+            lambda status, message: happens(job, message) if status.state is PrintState.PRINTING or message else None,
         )
 
 
@@ -367,10 +372,10 @@ def test_a_cancel_that_was_refused_has_cancelled_nothing() -> None:
     control = Control()
     with printing("octoprint", handler=Busy) as (job, server):
 
-        def cancel(status: JobStatus, message: str) -> None:
+        def cancel(status: PrintStatus, message: str) -> None:
             if "refuses to cancel" in message:
                 job.restart()
-            elif status.phase is Phase.PRINTING:
+            elif status.state is PrintState.PRINTING:
                 control.ask(Command.CANCEL)
 
         with pytest.raises(ServerError, match=r"no longer prints box\.gcode"):
@@ -378,7 +383,7 @@ def test_a_cancel_that_was_refused_has_cancelled_nothing() -> None:
 
 
 def greet(address: str) -> None:
-    with open_server(address) as server:
+    with session_with(address) as server:
         server.greet()
 
 
@@ -465,7 +470,7 @@ def test_whatever_a_server_answers_there_is_a_sentence_or_a_value(kind: str) -> 
 
     with stand_in(kind, handler=AnyAnswer) as (_, address):
         for _ in range(60):
-            with open_server(address) as server:
+            with session_with(address) as server:
                 calls: list[Callable[[], object]] = [server.greet, server.status, lambda: server.has("box.gcode"), server.pause]
                 for call in [*calls, lambda: server.upload(UPLOAD, unheard), lambda: server.command("M220 S90")]:
                     with contextlib.suppress(ServerError):
@@ -474,7 +479,7 @@ def test_whatever_a_server_answers_there_is_a_sentence_or_a_value(kind: str) -> 
 
 def test_an_answer_without_end_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http, "MOST_BYTES", 1_000_000)
-    with stand_in("octoprint") as (job, address), open_server(address) as server:
+    with stand_in("octoprint") as (job, address), session_with(address) as server:
         job.refuse["/api/version"] = (200, b"x" * 2_000_000)
         with pytest.raises(ServerError, match="answers with more than 1 MB: it is no print server"):
             server.greet()
@@ -483,36 +488,36 @@ def test_an_answer_without_end_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_answer_that_drips_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http, "WHOLE_S", -1.0)
     no_end = pytest.raises(NoAnswerError, match="does not come to the end of its answer")
-    with stand_in("octoprint") as (_, address), open_server(address) as server, no_end:
+    with stand_in("octoprint") as (_, address), session_with(address) as server, no_end:
         server.greet()
 
 
 class Unanswered:
     """A server that takes the order to start without an answer; status() calls what it is given."""
 
-    name = "octoprint:host"
+    name, tells_percents = "octoprint:host", True
 
-    def __init__(self, status: Callable[[], JobStatus]) -> None:
+    def __init__(self, status: Callable[[], PrintStatus]) -> None:
         self.status = status
 
     def start(self, file: str) -> None:
         raise NoAnswerError("it has stopped answering")
 
 
-def follow_unanswered(status: Callable[[], JobStatus]) -> End:
+def follow_unanswered(status: Callable[[], PrintStatus]) -> PrintState:
     server: object = Unanswered(status)
     return follow_print(server, "box.gcode", 9, on_status=ignore, control=Control(), left=lambda: False)  # type: ignore[arg-type]
 
 
 def test_a_print_whose_start_was_not_answered_is_followed_all_the_same() -> None:
-    phases = iter([Phase.PRINTING] * 20)
-    assert follow_unanswered(lambda: JobStatus(next(phases, Phase.DONE), "box.gcode")) is End.DONE
+    phases = iter([PrintState.PRINTING] * 20)
+    assert follow_unanswered(lambda: PrintStatus(next(phases, PrintState.DONE), file="box.gcode")) is PrintState.DONE
 
 
 def test_the_end_of_an_earlier_print_is_not_taken_for_ours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(follow, "BEGIN_S", 0.1)
     with pytest.raises(ServerError, match="has not begun to print within"):
-        follow_unanswered(lambda: JobStatus(Phase.DONE, "other.gcode"))
+        follow_unanswered(lambda: PrintStatus(PrintState.DONE, file="other.gcode"))
 
 
 def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -521,13 +526,13 @@ def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.Monke
     monkeypatch.setattr(follow, "JOIN_S", 0.01)
     try:
         with pytest.raises(ServerError, match="octoprint:host; no answer for 0 s: the print may go on, look at the printer"):
-            follow_unanswered(lambda: JobStatus(Phase.READY if over.wait(60.0) else Phase.FAILED))
+            follow_unanswered(lambda: PrintStatus(PrintState.READY if over.wait(60.0) else PrintState.FAILED))
     finally:
         over.set()
 
 
 def test_an_error_of_a_thread_is_not_lost() -> None:
-    def broken() -> JobStatus:
+    def broken() -> PrintStatus:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
@@ -535,7 +540,7 @@ def test_an_error_of_a_thread_is_not_lost() -> None:
 
 
 def test_a_duet_that_does_not_start_says_why() -> None:
-    with stand_in("duet") as (job, address), open_server(address) as server:
+    with stand_in("duet") as (job, address), session_with(address) as server:
         file = hand_over(server)
         job.refuse["/rr_gcode"] = (200, {"buff": 240})
         job.refuse["/rr_reply"] = (200, b"Error: M32: Cannot set file to print, because a file is already being printed\n")

@@ -14,14 +14,14 @@ import pytest
 
 from machine.cli.cli import main
 from machine.link.pending_commands import Command, Control, PendingCommand
-from machine.link.progress import Progress
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.events import Temperature
-from machine.view.serving.watch_page import Watched, serve, state_of
+from machine.view.serving.watch_page import Watched, serve
 from profiles.errors import OutputError
 from tests.machine.pages import opened
 from tests.machine.peers import PATIENCE_S
 
-HALF = Progress(
+HALF = PrintStatus(
     sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=9.5, share=0.5,
     temperature=Temperature(nozzle_c=209.5, nozzle_target_c=210.0), part=2, parts=3, layer=7, file_line=123,
 )  # fmt: skip
@@ -68,7 +68,7 @@ def test_the_page_and_the_state_are_served(watched: Watched) -> None:
     assert json.loads(asked(watched, "/state")[1]) == {"state": "waiting"}
     watched.follow(HALF)
     state = json.loads(asked(watched, "/state")[1])
-    assert (state["state"], state["line"], state["acknowledged"], state["total"]) == ("printing", 123, 50, 100)
+    assert (state["state"], state["file_line"], state["acknowledged"], state["total"]) == ("printing", 123, 50, 100)
     assert (state["nozzle_c"], state["nozzle_target_c"], state["bed_c"]) == (209.5, 210.0, None)
 
 
@@ -184,7 +184,7 @@ def test_the_server_ends_with_the_print() -> None:
         pass
 
 
-def test_a_print_that_fails_is_told_as_stopped() -> None:
+def test_a_print_that_fails_is_told_as_failed() -> None:
     def failing() -> Iterator[Watched]:
         with serve(b"page") as running:
             yield running
@@ -194,7 +194,7 @@ def test_a_print_that_fails_is_told_as_stopped() -> None:
     running = next(print_)
     with pytest.raises(KeyboardInterrupt):
         next(print_)
-    assert json.loads(running.state()) == {"state": "stopped"}
+    assert json.loads(running.state()) == {"state": "failed"}
 
 
 def test_a_warning_is_told_as_long_as_the_print_lasts() -> None:
@@ -206,9 +206,10 @@ def test_a_warning_is_told_as_long_as_the_print_lasts() -> None:
 def test_how_it_ended_is_said_once() -> None:
     watched = Watched(b"")
     watched.follow(HALF)
-    watched.end("stopped")
-    watched.end("done")
-    assert state_of(HALF, "stopped") == json.loads(watched.state())
+    watched.end(PrintState.CANCELLED)
+    watched.end(PrintState.DONE)
+    state = json.loads(watched.state())
+    assert (state["state"], state["file_line"], state["heat_is_old"]) == ("cancelled", 123, True)
 
 
 def test_print_watch_follows_the_print_to_its_end(

@@ -11,11 +11,11 @@ import pytest
 from machine.firmware import dialect_of
 from machine.gcode.blocks import filled_start
 from machine.link.pending_commands import Command
-from machine.pipeline.requests import PrintRequest
+from machine.link.print_state import PrintState
+from machine.printing.destination import Simulated
+from machine.printing.job import Does, End, PrintJob
 from machine.workbench.printing.at_hand import by_hand, check_level, homing_lines, jog_target_mm
-from machine.workbench.printing.at_page import AtPage
-from machine.workbench.printing.checks import Checks
-from machine.workbench.printing.order import HandCommand, HandDoes, HandOrder
+from machine.workbench.printing.at_page import AtPage, HandCommand, HandDoes
 from profiles.errors import MoveError
 from profiles.profile import load
 
@@ -47,14 +47,13 @@ def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
 
     def serve() -> None:
         try:
-            order = HandOrder(PROFILE, PrintRequest("sim", 115200, 0.0))
-            told.state |= by_hand(order, person, Checks(told))  # type: ignore[arg-type]
+            told.tell(end=by_hand(PrintJob(Simulated(), Does.HAND, profile=PROFILE), person))
         except Exception as error:  # noqa: BLE001 - told as the process does
-            told.state |= {"end": "failed", "sentence": str(error)}
+            told.tell(end=End(PrintState.FAILED, str(error)))
 
     thread = Thread(target=serve, daemon=True)
     thread.start()
-    wait_until(lambda: told.state.get("phase") == "hand")
+    wait_until(lambda: told.state.get("state") == "in hand")
     try:
         yield person, told
     finally:
@@ -65,26 +64,26 @@ def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
 def test_a_printer_is_heated_homed_and_moved_and_its_heaters_go_off_when_it_is_let_go_of() -> None:
     with in_hand() as (person, told):
         person.hear(HandCommand(HandDoes.JOG, "X", 1.0))
-        wait_until(lambda: "once it was homed here" in told.state["progress"]["message"])
+        wait_until(lambda: "once it was homed here" in told.state["progress"].message)
         person.hear(HandCommand(HandDoes.HEAT))
-        wait_until(lambda: told.state["progress"]["nozzle_target_c"] == PROFILE.material.first_layer_nozzle_c)
-        assert told.state["progress"]["bed_target_c"] == PROFILE.material.bed_c
+        wait_until(lambda: told.state["progress"].temperature.nozzle_target_c == PROFILE.material.first_layer_nozzle_c)
+        assert told.state["progress"].temperature.bed_target_c == PROFILE.material.bed_c
         person.hear(HandCommand(HandDoes.HOME))
-        wait_until(lambda: told.state["progress"]["homed"])
-        before = told.state["progress"]["at"]
+        wait_until(lambda: told.state["progress"].homed)
+        before = told.state["progress"].at
         person.hear(HandCommand(HandDoes.JOG, "X", 5.0))
-        wait_until(lambda: told.state["progress"]["at"]["X"] == pytest.approx(before["X"] + 5.0, abs=0.01))
+        wait_until(lambda: told.state["progress"].at["X"] == pytest.approx(before["X"] + 5.0, abs=0.01))
         for _ in range(4):  # farther than the axis goes
             person.hear(HandCommand(HandDoes.JOG, "X", 99.0))
-        wait_until(lambda: "are allowed" in told.state["progress"]["message"])
-    assert (told.state["end"], told.state["sentence"]) == ("done", "let go of; the heaters are off")
+        wait_until(lambda: "are allowed" in told.state["progress"].message)
+    assert told.state["end"] == End(PrintState.DONE, "let go of; the heaters are off")
 
 
 def test_the_emergency_stop_halts_a_printer_in_hand() -> None:
     with in_hand() as (person, told):
         person.hear(Command.EMERGENCY_STOP)
         wait_until(lambda: "end" in told.state)
-    assert told.state["sentence"].startswith("emergency stop: the printer has halted")
+    assert told.state["end"].sentence.startswith("emergency stop: the printer has halted")
 
 
 def test_nothing_is_homed_or_moved_over_a_table_that_is_tilted_or_of_which_nothing_is_known() -> None:

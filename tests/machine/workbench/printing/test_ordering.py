@@ -9,13 +9,13 @@ import pytest
 
 from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
-from machine.pipeline.requests import PrintRequest
+from machine.printing.destination import parse_destination
+from machine.printing.job import Does, PrintJob
 from machine.program import Alternative
 from machine.workbench.printing.at_page import AtPage
-from machine.workbench.printing.checks import program_of
-from machine.workbench.printing.order import PrintOrder
-from machine.workbench.printing.ordering import order_of
-from machine.workbench.printing.process import Checks, carry_out
+from machine.workbench.printing.commands import job_of
+from machine.workbench.printing.job_state import Slices
+from machine.workbench.printing.process import carry_out
 from machine.workbench.work.slices import Sliced
 from profiles.errors import PlanError, PrinterError, UserError
 from profiles.profile import Profile, load
@@ -60,25 +60,26 @@ class Silent:
 
 def refusal(given: Any, port: str, **further: Any) -> UserError:
     with pytest.raises(UserError) as refused:
-        order_of(given, PrintRequest(port, **further), False)
+        job_of(given, parse_destination(port, **further), False)
     return refused.value
 
 
 def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_in_the_sentence_of_print() -> None:
     sentence = str(refusal(session(BAD), "/dev/no-such-port"))
     silent: Any = Silent()
-    by_print = carry_out(PrintOrder("box.stl", file(BAD), PROFILE, PrintRequest("sim")), AtPage(silent), Checks(silent))
-    assert (sentence, by_print["end"]) == (by_print["sentence"], "refused")
+    load = Slices("box.stl", file(BAD), PROFILE)
+    by_print, _ = carry_out(PrintJob(parse_destination("sim"), Does.PRINT, "box.stl", load, PROFILE), AtPage(silent))
+    assert (sentence, by_print.state) == (by_print.sentence, "refused")
     assert sentence.startswith("the dry run found ")
     assert "X goes to 500 mm" in sentence
-    assert order_of(session(BAD), PrintRequest("/dev/no-such-port"), True).force
+    assert job_of(session(BAD), parse_destination("/dev/no-such-port"), True).force
 
 
 @pytest.mark.parametrize(("machine", "port", "further", "sentence"), [
     ("linuxcnc_xyzac", "/dev/no-such-port", {}, "speaks linuxcnc, which opens files itself: use export"),
     ("generic_ac", "duet:printer", {}, "generic A/C table writes for marlin, but a Duet prints reprapfirmware: "),
     ("generic_ac", "/dev/no-such-port", {"baud": 7}, "baud rate 7 is not possible: "),
-    ("generic_ac", "sim", {"sim_speed": -1.0}, "--sim-speed is -1: "),
+    ("generic_ac", "sim", {"speed": -1.0}, "--sim-speed is -1: "),
 ])  # fmt: skip
 def test_what_the_machine_and_the_port_decide_is_refused_first(
     machine: str, port: str, further: dict[str, Any], sentence: str
@@ -94,20 +95,20 @@ def test_stale_slices_are_refused_before_all_else() -> None:
 
     stale = session(BAD)
     stale.slicing = SimpleNamespace(needed=needed)
-    assert str(refusal(stale, "/dev/no-such-port", baud=7)) == "slice it again"
+    assert str(refusal(stale, "/dev/no-such-port")) == "slice it again"
 
 
 def program(lines: list[str], profile: Profile, known: KnownFindings | None) -> tuple[Finding, ...]:
-    return program_of(PrintOrder("box.stl", file(lines), profile, PrintRequest("sim"), known=known)).run.findings
+    return Slices("box.stl", file(lines), profile, known)().program.run.findings
 
 
 def test_what_is_known_of_the_very_lines_for_the_very_profile_is_not_looked_for_again() -> None:
     known = known_findings(GOOD, PROFILE, [OTHER])
     assert program(GOOD, PROFILE, known) == (OTHER,)
-    order = PrintOrder("box.stl", file(GOOD), PROFILE, PrintRequest("sim"), known=known)
+    slices = Slices("box.stl", file(GOOD), PROFILE, known)
     anew = dry_run(GOOD, PROFILE)
     looked_for = {"findings": [], "interfaces": []}
-    assert summary(program_of(order).run) | looked_for == summary(anew) | looked_for
+    assert summary(slices().program.run) | looked_for == summary(anew) | looked_for
 
 
 @pytest.mark.parametrize(("lines", "profile"), [

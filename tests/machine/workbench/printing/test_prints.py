@@ -19,15 +19,13 @@ from typing import Any
 
 import pytest
 
-from machine.dryrun.timeline import UnknownTimeline
 from machine.link.journal import Journal, JournalHeading
 from machine.link.pending_commands import Command, Control
-from machine.link.progress import Progress
-from machine.link.protocol.events import Temperature
+from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import FrontEnd, notices_to, say
-from machine.pipeline.requests import PrintRequest
-from machine.printing.attendance import Observers
-from machine.printing.compatibility import refuse
+from machine.printing.checks import check
+from machine.printing.destination import parse_destination
+from machine.printing.job import Does, End, PrintJob, Scene
 from machine.printing.serial_log import SerialLog
 from machine.printing.servers import follow
 from machine.printing.servers.credentials import VARIABLE
@@ -35,9 +33,9 @@ from machine.simulator.simulator import SimulatedPrinter
 from machine.workbench.printing import running_print
 from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage
 from machine.workbench.printing.commands import COMMANDS, PageOfPrints, obey
-from machine.workbench.printing.order import FollowOrder, Order, PrintOrder, ResumeOrder
+from machine.workbench.printing.job_state import Check, JobState, Slices
 from machine.workbench.printing.prints import Prints
-from machine.workbench.printing.process import Checks, carry_out
+from machine.workbench.printing.process import carry_out
 from machine.workbench.printing.running_print import RunningPrint
 from mdp.kernels.workers import frame, listen
 from profiles.errors import PrinterError
@@ -52,8 +50,15 @@ STROKES = [f"G1 X{x} Y{y} E1.0 F60" for y in range(50) for x in (20, -20)]  # fo
 HOUR = "\n".join([*HEAT, *STROKES, "M104 S0", "M140 S0"]) + "\n"
 
 
-def order(port: str, gcode: str = HOUR, force: bool = True) -> PrintOrder:
-    return PrintOrder("hour", written(gcode), PROFILE, PrintRequest(port), force)
+def order(
+    port: str, gcode: str = HOUR, force: bool = True, profile: Profile = PROFILE, file: Path | None = None, starts: bool = True
+) -> PrintJob:
+    load = Slices("hour", file or written(gcode), profile)
+    return PrintJob(parse_destination(port), Does.PRINT, "hour", load, profile, starts, force)
+
+
+def rest_of(journal: Path, port: str) -> PrintJob:
+    return PrintJob(parse_destination(port), Does.RESUME, cut_off=journal)
 
 
 @cache
@@ -64,10 +69,10 @@ def written(gcode: str) -> Path:
     return file
 
 
-def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable[[Prints, RunningPrint], None]) -> dict[str, Any]:
+def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable[[Prints, RunningPrint], None]) -> JobState:
     """The last state of a print that is ended in some way when it runs."""
 
-    async def run() -> dict[str, Any]:
+    async def run() -> JobState:
         prints = Prints()
 
         async def reach(condition: Callable[[RunningPrint], object]) -> RunningPrint:
@@ -76,9 +81,9 @@ def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable
             return prints.prints[0]
 
         prints.begin("me", order(port))
-        begun = await reach(lambda current: current.state["phase"] == "ready")
+        begun = await reach(lambda current: current.state.state == "ready")
         begun.begin()
-        await reach(lambda current: current.state["progress"] and runs(current))
+        await reach(lambda current: current.state.progress and runs(current))
         end(prints, begun)
         state = (await reach(lambda current: current.over)).state
         await asyncio.gather(*prints._tasks)
@@ -88,7 +93,7 @@ def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable
 
 
 def heats(current: RunningPrint) -> bool:
-    return bool(current.state["progress"]["nozzle_target_c"] == 210.0)
+    return current.state.progress is not None and current.state.progress.temperature.nozzle_target_c == 210.0
 
 
 def process_of(current: RunningPrint) -> "subprocess.Popen[bytes]":
@@ -148,8 +153,8 @@ def test_whoever_dies_the_heaters_go_off(
     with SimulatedPrinter(PROFILE.machine, speed=100.0) as printer:
         state = print_until(printer.path, heats, end)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
-    assert re.fullmatch(expected, state["sentence"])
-    assert Path(state["journal"]).is_file()
+    assert re.fullmatch(expected, state.sentence)
+    assert Path(state.journal).is_file()
 
 
 GOES_ON = "is printing hour.gcode and goes on without this program: its own page commands it"
@@ -165,11 +170,11 @@ def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
     monkeypatch.setenv(VARIABLE, KEY)
     with stand_in("octoprint") as (job, address):
         job.steps = 10_000
-        ended = print_until(address, lambda current: current.state["progress"]["state"] == "printing", end)
+        ended = print_until(address, lambda current: current.state.state == "printing", end)
         assert job.state == "printing"
-    assert ended["sentence"] == expected.format(address=address)
+    assert ended.sentence == expected.format(address=address)
     assert job.files["hour.gcode"].decode() == HOUR
-    assert KEY not in f"{ended}{Path(ended['log']).read_text()}"
+    assert KEY not in f"{ended}{Path(ended.log).read_text()}"
 
 
 def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_starts_nothing(
@@ -183,13 +188,13 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
             uploading.wait(10.0)
             return super().form(body)
 
-    async def run(address: str) -> dict[str, Any]:
+    async def run(address: str) -> JobState:
         prints = Prints()
         current = RunningPrint(1, order(address), "me", prints.notify)
         printing = asyncio.create_task(current.run())
 
         async def reach(phase: str) -> None:
-            while current.state["phase"] != phase:
+            while current.state.state != phase:
                 await prints.changed(prints.version)
 
         await reach("ready")
@@ -203,25 +208,25 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
     with stand_in("octoprint", handler=Slow) as (job, address):
         ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
         assert (job.state, job.commands) == ("idle", ["M112"])
-    assert ended["sentence"] == f"emergency stop: {address} has taken it; restart the printer before the next print"
+    assert ended.sentence == f"emergency stop: {address} has taken it; restart the printer before the next print"
 
 
 # A print's process that is left and does nothing any more of what it hears.
 LEAVES = """
 import sys, time
+from machine.link.print_state import PrintState, PrintStatus
+from machine.workbench.printing.job_state import JobState
 from mdp.kernels.workers import frame, read_frames
-progress = {"state": "printing", "heat_s": time.time()}
-message = {"phase": "printing", "server": True, "progress": progress, "end": "left", "sentence": "it goes on"}
-message["stop_given"] = False
-for phase in ("printing", "over"):
-    sys.stdout.buffer.write(frame(message | {"phase": phase}))
+for state in (PrintState.PRINTING, PrintState.LEFT):
+    told = JobState(state, "hour", server=True, progress=PrintStatus(), told_s=time.time(), sentence="it goes on")
+    sys.stdout.buffer.write(frame(told))
     sys.stdout.flush()
-    for _ in zip(range(2 if phase == WAITS_FOR else 0), read_frames(sys.stdin.buffer)):
+    for _ in zip(range(2 if state == WAITS_FOR else 0), read_frames(sys.stdin.buffer)):
         pass
 """
 
 
-@pytest.mark.parametrize("waits_for", ["printing", "over"])
+@pytest.mark.parametrize("waits_for", ["printing", "left"])
 @pytest.mark.parametrize(("kind", "give", "expected", "halted", "state"), [
     ("octoprint", RunningPrint.stop_at_once, "emergency stop: {0} has taken it; ", True, "printing"),
     ("duet", RunningPrint.cancel, "the print was stopped", False, "cancelled"),
@@ -236,14 +241,14 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
-    monkeypatch.setattr(running_print, "MAIN", f"WAITS_FOR = {waits_for.replace('over', '')!r}\n{LEAVES}")
+    monkeypatch.setattr(running_print, "MAIN", f"WAITS_FOR = {waits_for.replace('left', '')!r}\n{LEAVES}")
 
-    async def run(address: str) -> dict[str, Any]:
+    async def run(address: str) -> JobState:
         prints = Prints()
         current = RunningPrint(1, order(address), "me", prints.notify)
         current._begun = True
         printing = asyncio.create_task(current.run())
-        while current.state["phase"] != waits_for:
+        while current.state.state != waits_for:
             await prints.changed(prints.version)
         give(current)
         await printing
@@ -257,16 +262,7 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
         job.steps = 10_000
         ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
         assert (job.halted, job.state) == (halted, state)
-    assert ended["sentence"].startswith(expected.format(address))
-
-
-class Agreeing:
-    """A person who would print whatever is asked."""
-
-    agreed = False
-
-    def agrees(self) -> bool:
-        raise AssertionError("nobody is asked when something speaks against the print")
+    assert ended.sentence.startswith(expected.format(address))
 
 
 class Heard:
@@ -281,18 +277,19 @@ class Heard:
 
 @pytest.mark.parametrize(("wanted", "sentence", "forcible"), [
     (order("/dev/no-such-port"), "port /dev/no-such-port does not exist", False),
-    (ResumeOrder(Path("gone.journal"), PrintRequest("/dev/none")), "journal gone.journal cannot be read: no such file", False),
-    (ResumeOrder(Path("any.journal"), PrintRequest("sim")), "--port sim: a simulated printer ends with its print", False),
-    (FollowOrder(PrintRequest("duet:127.0.0.1:9")), "duet:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9", False),
+    (rest_of(Path("gone.journal"), "/dev/none"), "journal gone.journal cannot be read: no such file", False),
+    (rest_of(Path("any.journal"), "sim"), "--port sim: a simulated printer ends with its print", False),
+    (PrintJob(parse_destination("duet:127.0.0.1:9"), Does.FOLLOW), "duet:127.0.0.1:9: nothing listens on 127.0.0.1", False),
     (order("octoprint:127.0.0.1:9"), "octoprint:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9: is OctoPrint", False),
     (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 error, the first: X goes to 500 mm", True),
-    (replace(order("sim"), gcode=Path("gone.gcode")), "these slices are not there any more: slice what is to be printed", False),
+    (order("sim", file=Path("gone.gcode")), "these slices are not there any more: slice what is to be printed", False),
 ])  # fmt: skip
-def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence: str, forcible: bool) -> None:
+def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintJob, sentence: str, forcible: bool) -> None:
     heard = Heard()
-    end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
-    assert end["sentence"].startswith(sentence)
-    assert (end["end"], end["forcible"]) == ("refused", forcible)
+    end, goes_on = carry_out(wanted, AtPage(heard))  # type: ignore[arg-type]
+    assert end.sentence.startswith(sentence)
+    assert (end.state, goes_on) == ("refused", forcible)
+    assert "state" not in heard.state  # nobody was asked
 
 
 def test_an_incomplete_journal_is_refused_at_the_page_with_the_sentence_of_resume(
@@ -301,11 +298,9 @@ def test_an_incomplete_journal_is_refused_at_the_page_with_the_sentence_of_resum
     keep_notes_in(tmp_path / "notes", monkeypatch)
     with Journal(tmp_path / "j", JournalHeading("p.gcode", "", "p", {})) as journal:
         journal.path.rename(tmp_path / "moved")
-    heard = Heard()
-    wanted = ResumeOrder(tmp_path / "moved", PrintRequest("/dev/none"))
-    end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
-    assert end["end"] == "refused"
-    assert end["sentence"].startswith(f"journal {tmp_path / 'moved'} is incomplete: its print went on when the journal could not")
+    end, _ = carry_out(rest_of(tmp_path / "moved", "/dev/none"), AtPage(Heard()))  # type: ignore[arg-type]
+    assert end.state == "refused"
+    assert end.sentence.startswith(f"journal {tmp_path / 'moved'} is incomplete: its print went on when the journal could not")
 
 
 def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_names_no_journal_any_more(tmp_path: Path) -> None:
@@ -314,13 +309,13 @@ def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_name
     with (
         log,
         Journal(tmp_path / "j", JournalHeading("p.gcode", "", "p", {})) as journal,
-        person.show(Observers(log, journal), UnknownTimeline()) as shown,
+        person.show(Scene("p", log, journal)) as show,
     ):
-        shown.open()
-        shown(Progress(1.0, Temperature()))
-        assert (heard.state["journal"], heard.state["progress"]["warning"]) == (str(tmp_path / "j"), "")
-        shown(Progress(2.0, Temperature(), warning="this print can no longer be resumed"))
-    assert (heard.state["journal"], heard.state["progress"]["warning"]) == ("", "this print can no longer be resumed")
+        show(None)
+        show(PrintStatus(elapsed_s=1.0))
+        assert (heard.state["journal"], heard.state["progress"].warning) == (str(tmp_path / "j"), "")
+        show(PrintStatus(elapsed_s=2.0, warning="this print can no longer be resumed"))
+    assert (heard.state["journal"], heard.state["progress"].warning) == ("", "this print can no longer be resumed")
 
 
 @pytest.mark.parametrize(("kind", "profile"), [("octoprint", PROFILE), ("duet", load("gen5x"))])
@@ -335,12 +330,11 @@ def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_a
         job.files["vase.gcode"] = bytes(100)
         job.start("vase.gcode")
         job.steps = 10_000
-        upload = replace(order(address), profile=profile, starts=False)
-        end = carry_out(upload, person, Checks(heard))  # type: ignore[arg-type]
+        end, _ = carry_out(order(address, profile=profile, starts=False), person)
         assert (job.state, job.files["hour.gcode"].decode()) == ("printing", HOUR)
         assert not any(asked.endswith("/start") for asked in job.asked)
         log = Path(heard.state["log"]).read_text()
-    assert (end["end"], end["sentence"]) == ("done", f"hour.gcode waits on {address}")
+    assert (end.state, end.sentence) == ("done", f"hour.gcode waits on {address}")
     assert "hour.gcode" in log
     assert KEY not in log
 
@@ -348,14 +342,18 @@ def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_a
 class Attended:
     """A print on a server that a person at a page attends, in a thread of its own."""
 
-    def __init__(self, wanted: PrintOrder) -> None:
+    def __init__(self, wanted: PrintJob) -> None:
         self.heard = Heard()
         self.person = AtPage(self.heard)  # type: ignore[arg-type]
-        checks = Checks(self.heard)  # type: ignore[arg-type]
-        threading.Thread(target=lambda: self.heard.tell(**carry_out(wanted, self.person, checks)), daemon=True).start()
-        self.until(lambda state: "phase" in state)
+        threading.Thread(target=lambda: self.heard.tell(end=carry_out(wanted, self.person)[0]), daemon=True).start()
+        self.until(lambda state: "state" in state)
         self.person.hear(BEGIN)
-        self.until(lambda state: state.get("progress", {}).get("state") == "printing")
+        self.until(lambda state: state.get("progress") and state["progress"].state == "printing")
+
+    def ended(self) -> End:
+        """How it ended, once it has."""
+        end: End = self.until(lambda state: state.get("end"))["end"]
+        return end
 
     def until(self, condition: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
         end_s = time.monotonic() + 20.0
@@ -374,23 +372,23 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
     left = "hour goes on printing on {0}: this page follows it no more"
     with stand_in("duet") as (job, address):
         job.steps = 10_000
-        wanted = PrintOrder("hour", written(HOUR), load("gen5x"), PrintRequest(address), force=True)
+        wanted = order(address, profile=load("gen5x"))
         current = Attended(wanted)
         assert job.files["hour.gcode"].decode() == HOUR
         current.person.hear(Command.FEED, 150.0)
         current.person.hear(Command.PAUSE)
-        current.until(lambda state: (state["progress"]["state"], state["progress"]["feed_percent"]) == ("paused", 150.0))
+        current.until(lambda state: (state["progress"].state, state["progress"].feed_percent) == ("paused", 150.0))
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
         current.person.hear(Command.RESUME)
-        current.until(lambda state: state["progress"]["state"] == "printing")
+        current.until(lambda state: state["progress"].state == "printing")
         for word, sentence, state in ((Command.CANCEL, "the print was stopped", "cancelled"), (LEAVE, left, "printing")):
             current.person.hear(word)
-            assert current.until(lambda state: state.get("end"))["sentence"] == sentence.format(address)
+            assert current.ended().sentence == sentence.format(address)
             assert job.state == state
             job.state = "idle"
             current = Attended(wanted)
         current.person.hear(Command.EMERGENCY_STOP)
-        assert current.until(lambda state: state.get("end"))["sentence"].startswith(stopped.format(address))
+        assert current.ended().sentence.startswith(stopped.format(address))
         assert job.halted
         assert current.person.has_stopped()
 
@@ -400,8 +398,8 @@ def test_a_print_whose_server_dies_at_any_byte_of_a_command_is_left() -> None:
     for sent in range(len(pause)):
         person = AtPage(Heard())  # type: ignore[arg-type]
         listen(BytesIO(pause[:sent]), lambda words, person=person: person.hear(*words), person.leave)  # type: ignore[misc]
-        assert person.gone()
-        assert not person.agrees()
+        assert person.left()
+        assert person.ask("") is None
 
 
 def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
@@ -413,27 +411,28 @@ def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
 
 def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> None:
     heard = Heard()
-    checks = Checks(heard)  # type: ignore[arg-type]
-    with notices_to(FrontEnd(checks.hear)):
-        with checks.that("the axes are there"):
-            refuse("an axis is missing", force=True)
-        with checks.that("the file is whole"):
-            say("one moment")
-        with pytest.raises(PrinterError, match="too hot") as refused, checks.that("it is cool"):
-            refuse("too hot", force=False)
+    person = AtPage(heard)  # type: ignore[arg-type]
+    with notices_to(FrontEnd(person.hear_notice)):
+        assert not check(["", "an axis is missing"], force=True)
+        say("one moment")
+        assert check([""], force=True)
+        person.passed("the file is whole")
+        with pytest.raises(PrinterError, match="too hot") as refused:
+            check(["too hot"], force=False)
     assert refused.value.forcible
-    assert heard.state["checks"] == (
-        {"text": "an axis is missing", "forced": True},
-        {"text": "the file is whole", "forced": False},
-    )
+    assert heard.state["checks"] == (Check("an axis is missing", forced=True), Check("the file is whole"))
     assert heard.state["said"] == ("an axis is missing", "one moment")
 
 
 def page_of(prints: Prints, name: str = "me") -> PageOfPrints:
-    async def on_bench(order: Callable[[], Order]) -> Order:
-        return order()
+    async def on_bench(job: Callable[[], PrintJob]) -> PrintJob:
+        return job()
 
     return PageOfPrints(name, SimpleNamespace(), prints, on_bench)  # type: ignore[arg-type]
+
+
+def enter(current: RunningPrint, state: str) -> None:
+    current.state = replace(current.state, state=PrintState(state))
 
 
 def prints_with_one(port: str = "sim") -> Prints:
@@ -461,14 +460,14 @@ def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_
     assert prints.prints[0].holder == "other"
 
 
-@pytest.mark.parametrize(("name", "port", "phase", "allowed"), [
+@pytest.mark.parametrize(("name", "port", "state", "allowed"), [
     ("leave", "sim", "printing", False), ("leave", "duet:printer", "printing", True),
-    ("forget", "sim", "printing", False), ("forget", "sim", "over", True), ("dance", "sim", "printing", False),
+    ("forget", "sim", "printing", False), ("forget", "sim", "done", True), ("dance", "sim", "printing", False),
     (["take"], "sim", "printing", False),
 ])  # fmt: skip
-def test_what_cannot_be_asked_of_a_print_is_refused(name: Any, port: str, phase: str, allowed: bool) -> None:
+def test_what_cannot_be_asked_of_a_print_is_refused(name: Any, port: str, state: str, allowed: bool) -> None:
     prints = prints_with_one(port)
-    prints.prints[0].state["phase"] = phase
+    enter(prints.prints[0], state)
     with nullcontext() if allowed else pytest.raises(PrinterError, match="is no command of a print"):
         obey(page_of(prints), {"do": name, "print": 1})
     assert bool(prints.prints) == (name != "forget" or not allowed)
@@ -487,7 +486,7 @@ def test_a_print_that_is_begun_twice_is_begun_once(monkeypatch: pytest.MonkeyPat
     current = RunningPrint(1, order("sim"), "me", lambda: None)
     with pytest.raises(PrinterError, match="cannot begin now"):
         current.begin()
-    current.state["phase"] = "ready"
+    enter(current, "ready")
     current.begin()
     current.begin()
     assert said == [(BEGIN,)]
@@ -501,7 +500,7 @@ def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.M
         prints = Prints()
         prints.prints += [RunningPrint(number, order("sim"), "me", lambda: None) for number in (1, 2)]
         prints._last = 2
-        prints.prints[0].state["phase"] = "over"  # by the first press
+        enter(prints.prints[0], "failed")  # by the first press
         prints.stop_at_once(1)
         del prints.prints[0]  # another page has taken it off the list
         prints.stop_at_once(1)
@@ -525,7 +524,7 @@ def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newes
         for number in range(1, 16):
             prints.begin("me", order(f"/dev/port{number}"))
             if number > 8:
-                prints.prints[-1].state["phase"] = "over"
+                enter(prints.prints[-1], "done")
         prints.begin("me", order("/dev/port16"))
         prints.stop_at_once(None)
         assert stopped == [1, 2, 3, 4, 5, 6, 7, 8, 16]

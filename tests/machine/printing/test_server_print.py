@@ -2,17 +2,17 @@
 
 import pytest
 
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.events import Temperature
-from machine.printing import network_print
-from machine.printing.network_print import ReportedProgress
-from machine.printing.servers.server import JobStatus, Phase
+from machine.printing import server_print
+from machine.printing.server_print import ReportedProgress
 
 
 def test_the_temperatures_of_a_server_that_does_not_answer_grow_old(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 100.0
-    monkeypatch.setattr(network_print, "monotonic", lambda: now_s)
+    monkeypatch.setattr(server_print, "monotonic", lambda: now_s)
     progress = ReportedProgress()
-    first, second = (JobStatus(Phase.PRINTING, temperature=Temperature(209.6, 210.0, 60.0, 60.0)) for _ in range(2))
+    first, second = (PrintStatus(PrintState.PRINTING, temperature=Temperature(209.6, 210.0, 60.0, 60.0)) for _ in range(2))
     assert progress.at(first, "").heat_age_s == 0.0
     now_s += 20.0
     assert (progress.at(first, "no answer").heat_age_s, progress.at(first, "no answer").heat_is_old) == (20.0, True)

@@ -12,8 +12,8 @@ from machine.cli.cli import main
 from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
-from machine.printing import compatibility
-from machine.printing.compatibility import exceeded_limit, firmware_mismatch, machine_mismatch
+from machine.printing import ports
+from machine.printing.checks import exceeded_limit, firmware_mismatch, machine_mismatch
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
@@ -76,7 +76,7 @@ def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
 ) -> None:
     peer, sentence = STRANGERS[name]
     with on_terminal(peer) as path:
-        hear_out(monkeypatch, compatibility, *([path] if name == "silence" else []))
+        hear_out(monkeypatch, ports, *([path] if name == "silence" else []))
         assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
     message = capsys.readouterr().err
     assert sentence.replace("PORT", path) in message
@@ -87,16 +87,16 @@ def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
 def test_the_rate_at_which_the_printer_speaks_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, rate: int
 ) -> None:
-    hear_out(monkeypatch, compatibility)
+    hear_out(monkeypatch, ports)
     with on_terminal(talking_at(rate)) as path:
         assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
     assert f"does not speak at 115200 baud but at {rate}: use --baud {rate}" in capsys.readouterr().err
 
 
 def test_the_rate_is_found_behind_rfc_2217_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    hear_out(monkeypatch, compatibility)
+    hear_out(monkeypatch, ports)
     with on_terminal(talking_at(230400)) as path, behind_rfc2217(path) as address, open_port(address, 115200) as port:
-        answer, rate = compatibility.ask_at_any_rate(port, 115200)
+        answer, rate = ports.ask_at_any_rate(port, 115200)
     assert (answer.kind, answer.letters, rate) == (Kind.PRINTER, "XYZAC", 230400)
 
 
@@ -142,23 +142,23 @@ def test_a_klipper_that_has_shut_down_wants_a_firmware_restart(tmp_path: Path, c
 def test_a_klipper_that_is_still_starting_is_waited_for(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(compatibility, "STARTING_AGAIN_S", 0.0)
+    monkeypatch.setattr(ports, "STARTING_AGAIN_S", 0.0)
     with on_terminal(klipper(STARTING, STARTING, READY)) as path, open_port(path, 115200) as wire:
-        answer = compatibility.identify_printer(wire, 115200)
+        answer = ports.identify_printer(wire, 115200)
     assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZ")
     told = capsys.readouterr().err.splitlines()
     assert [line.partition(":")[0] for line in told] == [f"Klipper v0.13.0 at {path} is still starting"] * 2
 
 
 def test_a_klipper_that_never_becomes_ready_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compatibility, "STARTING_AGAIN_S", 0.01)
-    monkeypatch.setattr(compatibility, "STARTING_S", 0.05)
+    monkeypatch.setattr(ports, "STARTING_AGAIN_S", 0.01)
+    monkeypatch.setattr(ports, "STARTING_S", 0.05)
     with (
         on_terminal(klipper(STARTING)) as path,
         open_port(path, 115200) as wire,
         pytest.raises(PrinterError, match=r"is still starting \(Klipper v0.13.0\): if it does not become ready"),
     ):
-        compatibility.identify_printer(wire, 115200)
+        ports.identify_printer(wire, 115200)
 
 
 def test_a_busy_port_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -193,7 +193,7 @@ def test_the_limits_that_the_firmware_tells_bind_the_program(tmp_path: Path, cap
 def test_a_program_for_another_machine_is_refused_unless_forced(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    hear_out(monkeypatch, compatibility)
+    hear_out(monkeypatch, ports)
     foreign = load("open5x") if "open5x" in _machines() else load(_machines()[0])
     file = file_of(tmp_path, "G1 X1 F600", *foot(foreign, 1.0, 1.0))
     with SimulatedPrinter(MACHINE) as printer:

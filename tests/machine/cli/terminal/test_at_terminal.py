@@ -8,24 +8,24 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from machine.cli.terminal.at_terminal import KEYS, ScreenState, render, status_line
 from machine.cli.terminal.keys import MORE
-from machine.cli.terminal.print_display import status
-from machine.cli.terminal.screen import KEYS, ScreenState, render
-from machine.link.progress import Progress
+from machine.link.print_state import PrintStatus
 from machine.link.protocol.events import Temperature
 from tests.machine.dryrun.test_timeline import TIMELINE
 
 NOON = datetime(2026, 11, 21, 12, 0, 0)
-MOMENT = Progress(
+MOMENT = PrintStatus(
     sent=14, acknowledged=12, total=14, elapsed_s=754.0, left_s=4335.0, share=0.62,
     temperature=Temperature(209.8, 210.0, 60.1, 60.0), part=1, parts=2, layer=1, file_line=13,
 )  # fmt: skip
 
 
-def lines(progress: Progress, words: tuple[str, ...] = (), hint: str = "", keys: bool = True, width: int = 100) -> list[str]:
+def lines(progress: PrintStatus, words: tuple[str, ...] = (), hint: str = "", keys: bool = True, width: int = 100) -> list[str]:
     """The screen as plain lines without the spaces at their ends."""
     console = Console(file=io.StringIO(), record=True, width=width, force_terminal=True, no_color=True)
-    console.print(render(ScreenState("tree.gcode to /dev/ttyACM0", progress, TIMELINE, words, hint, keys), NOON))
+    at = replace(progress, layers=TIMELINE.layers(progress.part), at=TIMELINE.at(progress.file_line))
+    console.print(render(ScreenState("tree.gcode to /dev/ttyACM0", at, words, hint, keys), NOON))
     return [line.rstrip() for line in console.export_text().splitlines()]
 
 
@@ -46,7 +46,7 @@ def test_the_pose_is_that_of_the_acknowledged_line() -> None:
 
 
 def test_what_is_not_known_is_left_out() -> None:
-    unknown = Progress(0.0, Temperature())
+    unknown = PrintStatus(elapsed_s=0.0)
     _, position, heat, bar, times, _ = lines(unknown)
     assert (position, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
     assert "%" not in bar
@@ -57,9 +57,9 @@ def test_temperatures_that_may_be_true_no_more_are_marked_with_their_age(old: di
     moment = replace(MOMENT, **old)
     mark = f"as last known {old['heat_age_s']:.0f} s ago"
     assert lines(moment)[2].startswith(f"{mark}:   nozzle 209.8 / 210 deg C   bed 60.1 / 60 deg C")
-    assert f"nozzle 210 C, bed 60 C {mark}, " in status(moment)
+    assert f"nozzle 210 C, bed 60 C {mark}, " in status_line(moment)
     for fresh in (replace(MOMENT, heat_age_s=14.0), replace(moment, temperature=Temperature())):
-        assert not any("as last known" in line for line in (*lines(fresh), status(fresh)))
+        assert not any("as last known" in line for line in (*lines(fresh), status_line(fresh)))
 
 
 def test_an_end_on_another_day_is_told_with_its_day() -> None:

@@ -1,0 +1,282 @@
+"""At terminal: the person who attends a print at a terminal: asked on stderr, with a screen and keys or plain lines.
+
+The screen shows part, layer, pose, heat, time left, the printer's words, and keys.
+"""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from threading import Event as Flag
+from typing import Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from machine.cli.terminal.interrupts import calling, interrupting, stopping
+from machine.cli.terminal.keys import Keyboard, can_type, typing
+from machine.cli.terminal.progress import is_terminal
+from machine.link.pending_commands import Control
+from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import PlainLines, plain_line, reporting, say, say_lines
+from machine.printing.job import End, Scene, Show
+from machine.quantities import duration
+from profiles.errors import JournalError
+
+MOST_WORDS = 4
+WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
+COLOURS = {"printing": "green", "finishing": "green", "paused": "yellow", "pausing": "yellow", "resuming": "yellow"}
+KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? more"
+EXIT_CODES = {PrintState.DONE: 0, PrintState.DECLINED: 1, PrintState.CANCELLED: 130, PrintState.LEFT: 130}
+
+
+def exit_code(end: End) -> int:
+    """The exit code of a command whose job has ended so."""
+    return EXIT_CODES[end.state]
+
+
+class AtTerminal:
+    """The `Person` at the terminal. yes: what is asked is answered by yes; follow: told each moment, too."""
+
+    def __init__(self, yes: bool = False) -> None:
+        self.commands, self.stop = Control(), Flag()
+        self.follow: Callable[[PrintStatus], None] = lambda status: None
+        self._yes, self._board = yes, Keyboard(self.commands)
+
+    def passed(self, sentence: str) -> None:
+        """What is as it must be is not told."""
+
+    def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
+        """Ask on stderr. Raises JournalError where nobody can answer, or look."""
+        say_lines(question)
+        listed = ", ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
+        if choices and (self._yes or not sys.stdin.isatty()):
+            raise JournalError(
+                f"a person must see at which height the tip stands ({listed}): resume at a terminal, without --yes"
+            )
+        if choices:
+            chosen = _answer(f"which? [{listed}; anything else: none] ")
+            return int(chosen) - 1 if chosen in [str(number) for number in range(1, len(choices) + 1)] else None
+        if self._yes:
+            return 0
+        if not sys.stdin.isatty():
+            raise JournalError("whether to go on is asked first: give --yes where there is no terminal to ask at")
+        return 0 if _answer("go on? [y/N] ") in ("y", "yes") else None
+
+    @contextmanager
+    def show(self, scene: Scene) -> Iterator[Show]:
+        """The screen; Ctrl-C ends a print at a port, and asks what is to become of one on a server. An upload it breaks off."""
+        if scene.uploads:
+            with reporting() as report:
+                yield lambda status: None if status is None else report(status.message, status.share)
+            return
+        self._board = board = Keyboard(self.commands, scene.server)
+        with ExitStack() as stack:
+            stack.enter_context(calling(board.interrupt) if scene.server else stopping(self.stop))
+            draw: Callable[[PrintStatus], None] | None = None
+
+            def tell(status: PrintStatus | None) -> None:
+                nonlocal draw
+                if draw is None:
+                    draw = stack.enter_context(_drawn(scene, board))
+                if status is not None:
+                    status = replace(status, message=plain_line(status.message))
+                    draw(status)
+                    self.follow(status)
+
+            yield tell
+
+    def left(self) -> bool:
+        """By the key l, or by an interrupt whose question nobody has answered."""
+        return self._board.left()
+
+    def gives_up(self) -> bool:
+        """Never: a KeyboardInterrupt says so."""
+        return False
+
+
+def _answer(prompt: str) -> str:
+    sys.stderr.write(prompt)
+    sys.stderr.flush()
+    with interrupting():
+        return sys.stdin.readline().strip().lower()
+
+
+@contextmanager
+def _drawn(scene: Scene, board: Keyboard) -> Iterator[Callable[[PrintStatus], None]]:
+    if not is_terminal():
+        yield _StatusLines()
+        return
+    with ExitStack() as stack:
+        keys = can_type()
+        if keys:
+            stack.enter_context(typing(board.press))
+        screen = stack.enter_context(Screen(scene, lambda: board.hint, keys))
+
+        def follow(status: PrintStatus) -> None:
+            board.follow(status)
+            screen.tell(status)
+
+        yield follow
+
+
+class _StatusLines:
+    """Plain lines: one every few seconds, and at once when something has changed."""
+
+    def __init__(self) -> None:
+        self._lines, self._last, self._warning = PlainLines(), (PrintState.PRINTING, ""), ""
+
+    def __call__(self, status: PrintStatus) -> None:
+        if status.warning != self._warning:
+            self._warning = status.warning
+            say(status.warning)
+        before, self._last = self._last, (status.state, status.message)
+        self._lines.show(status_line(status), at_once=before != self._last)
+
+
+def status_line(status: PrintStatus) -> str:
+    """One line that tells where a print stands."""
+    phrases = [f"{100 * status.share:.0f} %"] if status.share is not None else []
+    if status.share is None and (status.total is not None or status.acknowledged):
+        phrases.append(f"line {status.acknowledged}")
+    if status.part is not None:
+        phrases.append(f"part {status.part}" + (f" of {status.parts}" if status.parts else ""))
+    if status.layer is not None:
+        phrases.append(f"layer {status.layer}")
+    nozzle, bed = status.temperature.nozzle_c, status.temperature.bed_c
+    if nozzle is not None:
+        old = f" as last known {status.heat_age_s:.0f} s ago" if status.heat_is_old else ""
+        phrases.append(f"nozzle {nozzle:.0f} C" + (f", bed {bed:.0f} C" if bed is not None else "") + old)
+    if status.left_s is not None:
+        phrases.append(f"{duration(status.left_s)} left")
+    return f"{status.state}: " + ", ".join(phrases) + (f"; {status.message}" if status.message else "")
+
+
+@dataclass(frozen=True)
+class ScreenState:
+    """What stands on the screen. title: what is printed where; words: the printer's last ones; hint: a question or an explanation
+    in place of the keys; beginning: what stands there as long as there is no part."""
+
+    title: str
+    progress: PrintStatus
+    words: tuple[str, ...] = ()
+    hint: str = ""
+    keys: bool = True
+    beginning: str = "starting"
+
+
+def render(state: ScreenState, now: datetime) -> RenderableType:
+    """The whole screen at a moment."""
+    progress = state.progress
+    lines = [_head(state), _position(state), _heat(progress), _bar(progress), _times(progress, now)]
+    if progress.warning:
+        lines.append(Text(plain_line(progress.warning), style="bold red"))
+    lines += _words(state.words)
+    if state.hint or state.keys:
+        lines.append(Text(plain_line(state.hint or KEYS), style="bold yellow" if state.hint else "dim"))
+    return Group(*lines)
+
+
+def _head(state: ScreenState) -> RenderableType:
+    row = Table.grid(expand=True)
+    row.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
+    row.add_column(justify="right", no_wrap=True)
+    shown = state.progress.state
+    row.add_row(Text(plain_line(state.title), style="bold"), Text(shown, style=f"bold {COLOURS.get(shown, 'red')}"))
+    return row
+
+
+def _position(state: ScreenState) -> Text:
+    progress = state.progress
+    phrases = []
+    if progress.part is not None:
+        phrases.append(f"part {progress.part}{_of(progress.parts)}")
+    if progress.layer is not None:
+        phrases.append(f"layer {progress.layer}{_of(progress.layers)}")
+    turned = zip(("tilt", "turn"), list(progress.at.items())[3:], strict=False)
+    phrases += [f"{axis} {letter} {value:.1f} deg" for axis, (letter, value) in turned]
+    return _phrases_line(phrases or [state.beginning])
+
+
+def _of(count: int | None) -> str:
+    return f" of {count}" if count else ""
+
+
+def _heat(progress: PrintStatus) -> Text:
+    heat = progress.temperature
+    old = [f"as last known {progress.heat_age_s:.0f} s ago:"] if progress.heat_is_old and heat.words else []
+    phrases = [
+        f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " deg C"
+        for name, now_c, target_c in (("nozzle", heat.nozzle_c, heat.nozzle_target_c), ("bed", heat.bed_c, heat.bed_target_c))
+        if now_c is not None
+    ]
+    overrides = [f"feed {progress.feed_percent:.0f} %", f"flow {progress.flow_percent:.0f} %"]
+    return _phrases_line([*old, *phrases, *overrides])
+
+
+def _bar(progress: PrintStatus) -> RenderableType:
+    row = Table.grid(expand=True, padding=(0, 1))
+    row.add_column(ratio=1)
+    row.add_column(justify="right", no_wrap=True)
+    share = progress.share
+    row.add_row(ProgressBar(total=1.0, completed=share or 0.0), Text("" if share is None else f"{100 * share:.0f} %"))
+    return row
+
+
+def _times(progress: PrintStatus, now: datetime) -> Text:
+    phrases = [f"{duration(progress.elapsed_s)} so far"]
+    if progress.left_s is not None:
+        end = now + timedelta(seconds=progress.left_s)
+        day = "" if end.date() == now.date() else f"{end:%a %d %b} "
+        phrases += [f"{duration(progress.left_s)} left", f"done at {day}{end:%H:%M}"]
+    if progress.total is not None or progress.acknowledged:
+        phrases.append(f"line {progress.acknowledged}{_of(progress.total)}")
+    return _phrases_line(phrases)
+
+
+def _words(words: tuple[str, ...]) -> list[Text]:
+    short = (word if len(word) <= WORD_LENGTH else word[:WORD_LENGTH] + "..." for word in words)
+    return [Text(f"  {plain_line(word)}", style="cyan") for word in short]
+
+
+def _phrases_line(phrases: list[str]) -> Text:
+    return Text("   ".join(phrases), no_wrap=True, overflow="ellipsis")
+
+
+class Screen:
+    """`with Screen(...) as screen:` screen.tell(progress) redraws; the terminal is as before afterwards.
+
+    A terminal that has gone away (a closed window) ends the drawing, not the print.
+    """
+
+    def __init__(self, scene: Scene, hint: Callable[[], str], keys: bool) -> None:
+        self._scene, self._hint, self._keys = scene, hint, keys
+        self._live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
+        self._gone = False
+
+    def tell(self, status: PrintStatus) -> None:
+        """Draw where the print stands."""
+        if self._gone:
+            return
+        scene = self._scene
+        scene.messages.add(status.message)
+        words = tuple(scene.messages.last)[-MOST_WORDS:]
+        state = ScreenState(scene.title, status, words, self._hint(), self._keys, scene.beginning)
+        try:
+            self._live.update(render(state, datetime.now()), refresh=True)
+        except OSError:
+            self._gone = True
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        try:
+            self._live.stop()
+        except OSError:
+            return

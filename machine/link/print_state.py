@@ -1,0 +1,124 @@
+"""Print state: where a print stands, from the questions before it to its end, and which state may follow which.
+
+A print at a port, one on a print server and a printer in hand have the same states. `PrintStatus` is a moment of any of them: the
+stream and the servers make it, a terminal's screen and the pages show it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from machine.link.protocol.events import Temperature
+
+OLD_HEAT_S = 15.0  # a printer reports every few seconds, and is asked when it does not
+
+
+class PrintState(StrEnum):
+    """A state by the word that people read."""
+
+    CHECKING = "checking"  # nothing but questions has gone to the printer
+    READY = "ready"  # a print can begin: a person's word is waited for, or a server prints nothing
+    UPLOADING = "uploading"  # a print server gets the file
+    PRINTING = "printing"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    RESUMING = "resuming"
+    RECONNECTING = "reconnecting"  # the port is lost
+    FINISHING = "finishing"  # all lines are sent, the last moves are waited for
+    IN_HAND = "in hand"  # nothing is printed: a person heats and moves the machine
+    CANCELLING = "cancelling"  # the heaters go off
+    DONE = "done"
+    CANCELLED = "cancelled"  # by a person
+    LEFT = "left"  # a print server goes on with it by itself
+    DECLINED = "declined"  # a person did not want it: nothing has moved
+    REFUSED = "refused"  # by a check: nothing has moved
+    FAILED = "failed"
+    OFFLINE = "offline"  # the print server is there, its printer is not
+
+    @property
+    def is_over(self) -> bool:
+        """Whether a print has ended so."""
+        return self in OVER
+
+    @property
+    def is_printing(self) -> bool:
+        """Whether a print is under way."""
+        return self in ACTIVE
+
+
+S = PrintState
+OVER = frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.REFUSED, S.FAILED})
+UNHEARD = frozenset({S.CANCELLING, S.RECONNECTING})  # no report is taken
+AWAY = frozenset({S.PAUSING, S.PAUSED})  # the tip, from the print
+_LIVE = {S.PRINTING, S.PAUSING, S.PAUSED, S.RESUMING, S.RECONNECTING, S.FINISHING}
+ACTIVE = frozenset({*_LIVE, S.CANCELLING})
+_ENDS = {S.CANCELLING, S.CANCELLED, S.FAILED}
+
+TABLE: Mapping[PrintState, frozenset[PrintState]] = {
+    # A state may stay as it is. A server tells of its print now and then, so that its states follow in any order.
+    S.CHECKING: frozenset({S.READY, S.IN_HAND, S.REFUSED, S.DECLINED, *_LIVE, *_ENDS, S.LEFT}),
+    S.READY: frozenset({S.CHECKING, S.UPLOADING, S.DECLINED, S.REFUSED, *_LIVE, *_ENDS, S.LEFT, S.DONE}),
+    S.UPLOADING: frozenset({S.READY, S.DECLINED, S.DONE, S.LEFT, *_LIVE, *_ENDS}),
+    **{state: frozenset({*_LIVE, *_ENDS, S.DONE, S.LEFT, S.READY, S.OFFLINE}) for state in _LIVE},
+    S.IN_HAND: frozenset({*_ENDS, S.DONE}),
+    S.CANCELLING: frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.FAILED, S.READY, S.OFFLINE, *_LIVE}),  # it may be refused
+    S.LEFT: frozenset({S.CANCELLING}),  # a print that its server goes on with is stopped after all
+    **{state: frozenset() for state in OVER - {S.LEFT}},
+    S.OFFLINE: frozenset(S) - OVER,
+}
+
+
+def follows(before: PrintState, after: PrintState) -> bool:
+    """Whether a state may come after another."""
+    return before is after or after in TABLE[before]
+
+
+@dataclass(frozen=True)
+class PrintStatus:
+    """A moment of a print. None: not known (yet).
+
+    file_line: line in the program's file of the newest acknowledged command, from 1; file, bytes_read: what a print server
+    prints, and how far into it. layers: of the part; at: where the axes stand, by their letters, mm and deg. message: the newest
+    word to the person watching; warning: what that person must know from now on, beside every message; "" when there is none.
+    heat_age_s: since the temperatures were reported. homed: a printer in hand may be moved.
+    """
+
+    state: PrintState = PrintState.PRINTING
+    elapsed_s: float = 0.0
+    temperature: Temperature = field(default_factory=Temperature)
+    sent: int = 0
+    acknowledged: int = 0
+    total: int | None = None
+    left_s: float | None = None
+    share: float | None = None
+    part: int | None = None
+    parts: int | None = None
+    layer: int | None = None
+    layers: int | None = None
+    file_line: int = 0
+    file: str = ""
+    bytes_read: int | None = None
+    at: Mapping[str, float] = field(default_factory=dict)
+    feed_percent: float = 100.0
+    flow_percent: float = 100.0
+    message: str = ""
+    warning: str = ""
+    heat_age_s: float = 0.0
+    homed: bool = False
+
+    @property
+    def heat_is_old(self) -> bool:
+        """Whether the temperatures are only those last known."""
+        return self.heat_age_s >= OLD_HEAT_S or self.state in UNHEARD or self.state.is_over
+
+    def json(self) -> dict[str, Any]:
+        """The status for a page, where nothing is nested but `at`."""
+        values: dict[str, Any] = asdict(self)
+        heat: dict[str, float | None] = values.pop("temperature")
+        return values | heat | {"heat_is_old": self.heat_is_old}
+
+
+def last_known(heat: Temperature, age_s: float) -> str:
+    """Temperatures behind the last words of a print, for what hears no more of its heaters; "" where none were told."""
+    return f"; {heat.words} as last known, {age_s:.0f} s before" if heat.words else ""

@@ -1,0 +1,233 @@
+"""Checks: whether a printer, the machine's profile and a program belong together, before anything moves.
+
+What speaks against a job is a sentence: it is raised, or with --force told.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from machine.dryrun.dryrun import summary
+from machine.dryrun.starvation import find_starvation
+from machine.firmware import dialect_of, dialects, firmware_of, identify
+from machine.firmware.klipper import stepper_name
+from machine.gcode.commands import command_named
+from machine.gcode.line_text import macro_name
+from machine.link.identification import Answer, Kind
+from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import say
+from machine.pipeline.embedded_profile import read_embedded_profile
+from machine.pipeline.programs import LoadedProgram, count_of_errors, refuse_errors
+from machine.pipeline.requests import FORCE_GOES_ON
+from machine.printing.destination import Destination, SerialPort, Server
+from machine.printing.servers.server import ServerIdentity
+from machine.printing.servers.servers import dialect_mismatch
+from machine.program import Program
+from profiles.errors import PrinterError, ServerError
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
+SLACK = 0.01  # mm or deg: what the firmware and the program round
+# What a program depends on: made for one such machine it is wrong on another. Speeds and accelerations are not among it.
+SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
+AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
+
+
+def check(sentences: Iterable[str], force: bool) -> bool:
+    """Raise PrinterError for the first sentence that speaks against a job, or with force tell all; whether there is none."""
+    found = False
+    for sentence in filter(None, sentences):
+        if not force:
+            raise PrinterError(f"{sentence} ({FORCE_GOES_ON})", forcible=True)
+        found = True
+        say(sentence, forced=True)
+    return not found
+
+
+def check_machine(answer: Answer | None, machine: Machine) -> None:
+    """Refuse a machine whose firmware takes no lines, or is not that of the printer; None: nothing is known of it."""
+    check_dialect(machine)
+    if answer is not None and (sentence := firmware_mismatch(answer, machine)):
+        raise PrinterError(f"{sentence} ({FORCE_GOES_ON})", forcible=True)
+
+
+def check_destination(destination: Destination, machine: Machine) -> None:
+    """Refuse a machine whose dialect is not read there, which is known before anybody is asked. Raises PrinterError."""
+    if not isinstance(destination, Server):
+        check_dialect(machine)
+    elif sentence := dialect_mismatch(destination, machine.name, machine.dialect):
+        raise PrinterError(sentence)
+
+
+def check_dialect(machine: Machine) -> None:
+    """Refuse a machine whose firmware takes no lines over a serial port."""
+    if not dialect_of(machine).serial:
+        streamed = ", ".join(name for name, dialect in dialects().items() if dialect.serial)
+        raise PrinterError(
+            f"{machine.name} speaks {machine.dialect}, which opens files itself: use export; print serves the dialects {streamed}"
+        )
+
+
+def machine_sentences(answer: Answer | None, machine: Machine) -> Iterator[str]:
+    """What speaks against a machine at a printer that has answered so; None: nothing is known of it."""
+    if answer is not None:
+        yield firmware_mismatch(answer, machine)
+
+
+def program_sentences(answer: Answer | None, loaded: LoadedProgram) -> Iterator[str]:
+    """What speaks against a program: it was made for another machine, or leaves the limits that the firmware tells."""
+    program, profile = loaded.program, loaded.profile
+    own, sections = read_embedded_profile(program.lines, profile, frozenset())
+    if "machine" in sections:
+        yield machine_mismatch(own.machine, profile.machine, loaded.name)
+    if answer is not None:
+        machine, reached = profile.machine, {letter: reach for letter, reach in summary(program.run)["axes"].items() if reach}
+        rotary = (machine.tilt.letter, machine.turn.letter)
+        followed = machine.coordinates == "workpiece"  # X Y Z of such a file are no places of the axes
+        yield exceeded_limit(answer, {key: reach for key, reach in reached.items() if key in rotary or not followed})
+
+
+def error_sentences(loaded: LoadedProgram, force: bool) -> Iterator[str]:
+    """The errors of the dry run, last of all. Raises MoveError for them without force."""
+    if not force:
+        refuse_errors(loaded.program.run.errors, force=False)
+    yield count_of_errors(loaded.program.run.errors)
+
+
+def with_starvation(destination: Destination, program: Program, profile: Profile) -> Program:
+    """The program with what the dry run finds of the line's rate."""
+    if not isinstance(destination, SerialPort) or not destination.is_rate_limited:
+        return program
+    return replace(program, run=find_starvation(program.run, program.lines, profile.machine, destination.baud))
+
+
+def server_machine_sentences(server: Server, greeting: ServerIdentity, machine: Machine) -> Iterator[str]:
+    """What speaks against a machine behind a print server. Raises PrinterError for a dialect that it does not read."""
+    check_destination(server, machine)
+    yield from machine_sentences(printer_of(greeting), machine)
+    yield lacking_steppers(greeting, machine)
+    yield _unknown_macros(lacking_macros(greeting, _block_lines(machine)), machine.name)
+
+
+def server_program_sentences(greeting: ServerIdentity, loaded: LoadedProgram) -> Iterator[str]:
+    """What speaks against a program behind a print server: macros that its Klipper lacks, too."""
+    yield from program_sentences(printer_of(greeting), loaded)
+    lacking = lacking_macros(greeting, _block_lines(loaded.profile.machine))
+    unknown = [name for name in lacking_macros(greeting, loaded.program.lines) if name not in lacking]
+    yield _unknown_macros(unknown, loaded.name)
+
+
+def check_free(server: str, status: PrintStatus) -> None:
+    """Refuse a server that cannot begin a print now. Raises ServerError."""
+    if status.state.is_printing:
+        now = f"{server} is {status.state} {status.file or 'another file'} now"
+        raise ServerError(f"{now}: wait until that is done; send without --start hands a file over meanwhile")
+    if status.state is PrintState.OFFLINE:
+        raise ServerError(f"{server} cannot print now: {status.message or 'its printer is not connected'}")
+
+
+def check_idle(server: str, status: PrintStatus) -> None:
+    """Refuse a server that prints, or whose printer is not there, where only questions are asked. Raises ServerError."""
+    if status.state.is_printing:
+        raise ServerError(f"{server} is {status.state} {status.file or 'a file'} now: ask it when that is done")
+    if status.state is PrintState.OFFLINE:
+        raise ServerError(f"{server} cannot tell its settings now: {status.message or 'its printer is not connected'}")
+
+
+def firmware_mismatch(answer: Answer, machine: Machine) -> str:
+    """Why this firmware cannot print for a machine, as a sentence; "" when it can, or does not tell enough to say."""
+    firmware = identify(answer.words)
+    dialects = tuple(firmware.dialects) if firmware is not None else ()  # none: what it understands is not known
+    if dialects and machine.dialect not in dialects:
+        return (
+            f"the printer's firmware is {answer.firmware}, but {machine.name} writes for {machine.dialect}: "
+            f"machine.dialect must be {' or '.join(dialects)}"
+        )
+    wanted = "XYZ" + (machine.tilt.letter + machine.turn.letter if machine.tilts else "")
+    lacking = [letter for letter in wanted if letter not in answer.letters]
+    if not firmware_of(machine).line.reports_rotary_axes or not answer.letters or not lacking:
+        return ""
+    return (
+        f"the printer's firmware moves {' '.join(answer.letters)}, but {machine.name} needs {' '.join(wanted)}: "
+        f"{' and '.join(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
+    )
+
+
+def exceeded_limit(answer: Answer, reached: Mapping[str, Sequence[float]]) -> str:
+    """Which axis of a program leaves the limits that the firmware tells, as a sentence; "" when none does.
+
+    reached: letter -> least and greatest value of the program, mm or deg. Firmwares clip such a move without a word.
+    """
+    for letter, (low, high) in reached.items():
+        least, most = answer.limits.get(letter, (low, high))
+        if low < least - SLACK or high > most + SLACK:
+            return (
+                f"the program moves {letter} from {low:.2f} to {high:.2f}, but the printer's firmware allows "
+                f"{least:g} to {most:g}: the machine profile's limits must be those of the firmware"
+            )
+    return ""
+
+
+def machine_mismatch(recorded: Machine, chosen: Machine, file: str) -> str:
+    """Why a program made for one machine is wrong on another, as a sentence; "" when both are the same to it."""
+    if recorded.name != chosen.name:
+        return f"{file} was made for the machine {recorded.name}, not for {chosen.name}"
+    for key in SHAPING:
+        if (then := getattr(recorded, key)) != (now := getattr(chosen, key)):
+            return _changed(file, chosen, key, then, now)
+    for axis in ("tilt", "turn"):
+        for key in AXIS:
+            if (then := getattr(getattr(recorded, axis), key)) != (now := getattr(getattr(chosen, axis), key)):
+                return _changed(file, chosen, f"{axis}.{key}", then, now)
+    return ""
+
+
+def _changed(file: str, machine: Machine, key: str, then: object, now: object) -> str:
+    return f"{file} was made when machine.{key} of {machine.name} was {_text(then)}, but it is {_text(now)}"
+
+
+def _text(value: object) -> str:
+    return ", ".join(f"{x:g}" for x in value) if isinstance(value, tuple) else str(value)
+
+
+def lacking_steppers(greeting: ServerIdentity, machine: Machine) -> str:
+    """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or does not tell."""
+    if greeting.steppers is None or not machine.tilts:
+        return ""
+    wanted = [stepper_name(axis) for axis in (machine.tilt, machine.turn)]
+    lacking = [name for name in wanted if name not in greeting.steppers]
+    if not lacking:
+        return ""
+    there = ", ".join(sorted(greeting.steppers)) or "none"
+    sections = " and ".join(f"[manual_stepper {name}]" for name in lacking)
+    return (
+        f"{machine.name} turns its table by {sections}, which this Klipper lacks; it has {there}: machine.tilt.stepper names it"
+    )
+
+
+def lacking_macros(greeting: ServerIdentity, lines: Iterable[str]) -> list[str]:
+    """The macros that lines call and a Klipper does not have; [] when it has all or does not tell."""
+    if greeting.commands is None:
+        return []
+    called = dict.fromkeys(name for line in lines if (name := macro_name(line)))
+    return [name for name in called if name not in greeting.commands and not command_named(name).shows]
+
+
+def _block_lines(machine: Machine) -> list[str]:
+    blocks = machine.gcode
+    return [line for block in (blocks.start, blocks.before_part, blocks.after_part, blocks.end) for line in block.split("\n")]
+
+
+def _unknown_macros(names: list[str], caller: str) -> str:
+    """Klipper answers an unknown command with a text and goes on (klippy/gcode.py, cmd_default): nothing would be homed."""
+    if not names:
+        return ""
+    sections = " and ".join(f"[gcode_macro {name}]" for name in names)
+    return f"{caller} calls {' and '.join(names)}, which this Klipper does not know and would pass over: it needs {sections}"
+
+
+def printer_of(greeting: ServerIdentity) -> Answer | None:
+    """What a server tells of its printer, as a printer at a port would have answered."""
+    if not greeting.firmware:
+        return None
+    return Answer(Kind.PRINTER, f"FIRMWARE_NAME:{greeting.firmware}", greeting.letters, greeting.limits)

@@ -1,0 +1,263 @@
+"""Ports: a line to the printer at a port, who answers there, and what answers at each port of this computer.
+
+A simulated printer that runs keeps a file in the state folder with its path and a word on what it is, locked as long as it runs:
+another terminal may get the path of one that was killed, and must not be written to.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from threading import Event
+from time import monotonic, sleep
+from typing import Any
+
+from machine.firmware.firmware import BAUDS, LineRules
+from machine.link.identification import QUICK_S, Answer, Kind, ask, ask_at_any_rate
+from machine.link.port import Port, RefusedPortError, SerialDevice, open_port, serial_devices
+from machine.notices import say
+from machine.pipeline.requests import BAUD
+from machine.printing.destination import AtPrinter, Simulated
+from machine.simulator.contact import ProbedTable
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
+from profiles.files import lock
+from profiles.folders import state_folder
+from profiles.machine import Machine
+
+ECHO = ("M114", "M115")
+STARTING_S, STARTING_AGAIN_S = 60.0, 5.0  # Klipper takes 5 to 20 s until its boards are connected
+TIMEOUT_S = 4.0
+LONGEST_S = TIMEOUT_S + QUICK_S * len(BAUDS)
+AT_A_TIME = 16  # ports asked at once: each takes seconds when nothing answers
+
+
+@contextmanager
+def open_line(at: AtPrinter, machine: Machine, table: ProbedTable | None = None) -> Iterator[Port]:
+    """A line to a printer, alone; to a simulated one of a machine, whose table may be sensed. Raises PortError."""
+    if isinstance(at, Simulated):
+        with SimulatedPrinter(machine, at.speed or inf, table=table) as printer, open_port(printer.path, BAUD) as wire:
+            yield wire
+        return
+    with open_port(at.name, at.baud) as wire:
+        yield wire
+
+
+def rate_of(at: AtPrinter) -> int:
+    """The rate of a line, bits a second."""
+    return BAUD if isinstance(at, Simulated) else at.baud
+
+
+def identify_printer(wire: Port, baud: int, halted: bool = False) -> Answer:
+    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is.
+
+    One that is still starting is waited for. halted: one that has halted will do, if a command lets it print again.
+    """
+    answer, rate = ask_at_any_rate(wire, baud)
+    end_s = monotonic() + STARTING_S
+    while answer.kind is Kind.STARTING and monotonic() < end_s:
+        say(f"{answer.firmware} at {wire.name} is still starting: waiting up to {end_s - monotonic():.0f} s more")
+        sleep(STARTING_AGAIN_S)
+        answer = ask(wire)
+    if not (halted and answer.kind is Kind.HALTED and rate == baud and answer.revival != LineRules.revival):
+        check_answer(answer, wire.name, baud, rate)
+    return answer
+
+
+def check_answer(answer: Answer, port: str, baud: int, rate: int) -> None:
+    """Refuse what is no printer, or one that answers at another rate; raises PrinterError with a sentence of what it is."""
+    if answer.kind.is_printer and rate != baud:
+        raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: use --baud {rate}")
+    if answer.kind is not Kind.PRINTER:
+        error, refusal, _ = NO_PRINTERS[answer.kind]
+        raise error(refusal.format(port=port, baud=baud, **_words(answer)))
+
+
+def _words(answer: Answer) -> dict[str, str]:
+    """What a sentence about an answer may name. Marlin says of its work only that it does something, or waits."""
+    words = answer.words[:60]
+    usual = answer.words.startswith(("processing", "paused for", "busy")) or not words
+    work = "it heats, moves or waits for a person" if usual else words
+    stranger = "it sends back what it is told" if answer.words in ECHO else f"it says {words!r}"
+    return {"words": words, "work": work, "stranger": stranger, "firmware": answer.firmware, "revival": answer.revival}
+
+
+# What answers that is no printer to print on: the error, as a sentence, and how it is listed.
+NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
+    Kind.BUSY: (
+        PrinterError,
+        "the printer at {port} is busy ({work}): wait until it is done, or restart it",
+        "a printer that is busy ({work}), at {baud} baud",
+    ),
+    Kind.STARTING: (
+        PrinterError,
+        "the printer at {port} is still starting ({firmware}): if it does not become ready, look at Klipper's own log",
+        "a printer that is still starting ({firmware}), at {baud} baud",
+    ),
+    Kind.HALTED: (
+        FirmwareError,
+        "the printer at {port} has stopped with an error of its own ({words}): {revival} before the next print",
+        "a printer that has stopped with an error ({words}), at {baud} baud",
+    ),
+    Kind.STRANGER: (
+        PrinterError,
+        "what answers at {port} is no printer: {stranger} instead of answering M115",
+        "something answers but is no printer: {stranger}",
+    ),
+    Kind.RUBBISH: (
+        PortError,
+        "only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
+        "the firmware's settings tell its rate for --baud",
+        "rubbish at {baud} baud, and nothing at the usual other rates: --baud N tries another",
+    ),
+    Kind.SILENT: (
+        SilenceError,
+        "nothing answers at {port}: is the printer switched on, and is {baud} baud the firmware's rate? "
+        "One that has halted says nothing until it is switched off and on",
+        "nothing answers",
+    ),
+}
+
+
+def describe_answer(answer: Answer, baud: int) -> str:
+    """What answers, for a person."""
+    if answer.kind is Kind.PRINTER:
+        axes = f", axes {' '.join(answer.letters)}" if answer.letters else ""
+        return f"{answer.firmware or 'a printer that does not name its firmware'}{axes}, at {baud} baud"
+    return NO_PRINTERS[answer.kind][2].format(baud=baud, **_words(answer))
+
+
+@dataclass(frozen=True)
+class PortReport:
+    """A port, and what answers there at which rate; trouble: why it could not be asked, reason: the same behind its name."""
+
+    device: SerialDevice
+    answer: Answer | None = None
+    baud: int = 0
+    trouble: str = ""
+    reason: str = ""
+
+
+def known_ports() -> tuple[SerialDevice, ...]:
+    """Those in /dev/serial/by-id first, running simulators of this user last."""
+    return (*serial_devices(), *running_simulators())
+
+
+def ask_ports(devices: Sequence[SerialDevice], baud: int, over: Event, in_use: Iterable[str] = ()) -> list[PortReport]:
+    """What answers at each; a set `over` ends the asking. in_use: those at which this program prints are not opened."""
+    names = frozenset(in_use)
+
+    def ask(device: SerialDevice) -> PortReport:
+        if names & {device.name, device.path}:
+            return _refused(device, RefusedPortError(device.name, "prints now"))
+        return ask_port(device, baud, over)
+
+    with ThreadPoolExecutor(AT_A_TIME) as pool:
+        try:
+            return list(pool.map(ask, devices))
+        except BaseException:
+            over.set()
+            raise
+
+
+def ask_port(device: SerialDevice, baud: int, over: Event | None = None) -> PortReport:
+    """Open a port for this program alone and see what answers; a set `over` ends the asking."""
+    try:
+        with open_port(device.name, baud) as port:
+            return PortReport(device, *ask_at_any_rate(port, baud, TIMEOUT_S, over))
+    except PortError as error:
+        return _refused(device, error)
+
+
+def _refused(device: SerialDevice, error: PortError) -> PortReport:
+    return PortReport(device, trouble=str(error), reason=error.reason if isinstance(error, RefusedPortError) else str(error))
+
+
+def describe(report: PortReport) -> str:
+    """Two or three lines for a person."""
+    device = report.device
+    lines = [device.name]
+    what = [device.path if device.path != device.name else "", device.description]
+    what.append(f"serial number {device.serial_number}" if device.serial_number else "")
+    lines.append(", ".join(word for word in what if word))
+    lines.append(answer_words(report))
+    return "\n    ".join(line for line in lines if line) + "\n"
+
+
+def answer_words(report: PortReport) -> str:
+    """What answers, or why the port could not be asked, for a person who sees the port's name; "" where it was not asked."""
+    if report.answer is None:
+        return report.reason
+    return describe_answer(report.answer, report.baud)
+
+
+def port_json(report: PortReport) -> dict[str, Any]:
+    """The same for a program: every key always there, null where it is not known."""
+    answer, device = report.answer, report.device
+    printer = answer is not None and answer.kind.is_printer
+    return {
+        "port": device.name,
+        "path": device.path,
+        "description": device.description,
+        "serial_number": device.serial_number,
+        "answer": None if answer is None else answer.kind.value,
+        "baud": report.baud if printer else None,
+        "firmware": answer.firmware if answer is not None and answer.kind is Kind.PRINTER else None,
+        "axes": list(answer.letters) if answer is not None else [],
+        "limits": {letter: list(limits) for letter, limits in answer.limits.items()} if answer is not None else {},
+        "trouble": report.trouble or None,
+    }
+
+
+@contextmanager
+def announced(description: str, path: str) -> Iterator[Callable[[str], None]]:
+    """List a simulated printer while it runs; call what is given with a new path of it."""
+    try:
+        text = (_folder() / str(os.getpid())).open("w", encoding="utf-8")
+    except OSError:  # a full disk: it is not listed
+        yield lambda now: None
+        return
+    lock(text.fileno())
+
+    def tell(now: str) -> None:
+        with suppress(OSError):
+            text.seek(0)
+            text.truncate()
+            text.write(f"{now}\n{description}\n")
+            text.flush()
+
+    tell(path)
+    try:
+        yield tell
+    finally:
+        with suppress(OSError):
+            Path(text.name).unlink(missing_ok=True)
+        with suppress(OSError):
+            text.close()
+
+
+def running_simulators() -> tuple[SerialDevice, ...]:
+    """Those that run now, by path; what is left of others is removed."""
+    devices = []
+    try:
+        files = sorted(_folder().iterdir())
+    except OSError:
+        return ()
+    for file in files:
+        with suppress(OSError), file.open("r+", encoding="utf-8") as text:
+            path, _, description = text.read().partition("\n")
+            if path and lock(text.fileno()):  # an empty one is of a simulator that has not locked it yet
+                file.unlink(missing_ok=True)
+                continue
+            if path:
+                devices.append(SerialDevice(path, path, description.strip(), ""))
+    return tuple(sorted(devices, key=lambda device: device.path))
+
+
+def _folder() -> Path:
+    folder = state_folder() / "simulators"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder

@@ -1,0 +1,222 @@
+"""Serial print: a program streamed to a printer at a port, or to the simulated one on a pseudo-terminal, before a person."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from dataclasses import replace
+from itertools import chain
+from math import inf, isfinite
+
+from machine.dryrun.timeline import Timeline
+from machine.firmware import dialect_of
+from machine.link.identification import Answer, Kind
+from machine.link.journal import Journal
+from machine.link.port import open_port
+from machine.link.print_state import PrintStatus
+from machine.link.progress import Schedule
+from machine.link.resume import ResumePoint
+from machine.link.shutdown import Heaters
+from machine.link.status import PrinterStatus
+from machine.link.stream import Outcome, print_lines
+from machine.notices import say, show
+from machine.pipeline.programs import LoadedProgram
+from machine.printing.checks import (
+    CLEAN,
+    check,
+    check_dialect,
+    error_sentences,
+    machine_sentences,
+    program_sentences,
+    with_starvation,
+)
+from machine.printing.destination import AtPrinter, SerialPort, Simulated
+from machine.printing.job import CANCELLED, DONE, End, Person, PrintJob, Scene
+from machine.printing.journal_folder import new_journal
+from machine.printing.ports import describe_answer, identify_printer
+from machine.printing.serial_log import SerialLog, new_log, tap
+from machine.program import Program
+from machine.quantities import duration
+from machine.simulator.board import BuildOptions
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import OutputError, PrinterError
+from profiles.machine import Machine
+
+USB_BYTES, QUEUE = 1024, 16  # the simulated printer is a board with native USB: more lines at a time halve what a line costs
+HEATERS = {
+    True: "heaters off",
+    False: "the printer did not confirm that its heaters are off: look at it",
+    None: "nothing had been sent yet",
+}
+Begin = Callable[[PrinterStatus], ResumePoint]  # of a resumed print: decides where it goes on, by where the printer stands
+
+
+class SerialPrinter:
+    """The `Printer` at a port, or the simulated one."""
+
+    def __init__(self, job: PrintJob, at: AtPrinter, person: Person) -> None:
+        self._job, self._at, self._person = job, at, person
+        self._answer: Answer | None = None  # of the simulated one nothing is asked
+
+    def greet(self) -> None:
+        """Ask who answers at the port."""
+        if isinstance(self._at, SerialPort):
+            with open_port(self._at.name, self._at.baud) as wire:
+                self._answer = identify_printer(wire, self._at.baud)
+
+    def fit(self, machine: Machine) -> None:
+        """Refuse a machine whose firmware takes no lines, or is not that of the printer."""
+        check_dialect(machine)
+        if check(machine_sentences(self._answer, machine), self._job.force):
+            self._person.passed(self._who(machine))
+
+    def ready(self, loaded: LoadedProgram) -> Program:
+        """The program with what the dry run finds of this line's rate."""
+        sentences = chain(program_sentences(self._answer, loaded), error_sentences(loaded, self._job.force))
+        if check(sentences, self._job.force):
+            self._person.passed(CLEAN)
+        return with_starvation(self._at, loaded.program, loaded.profile)
+
+    def print(self, loaded: LoadedProgram) -> End:
+        """Stream it and say how it ended, with a log and a journal."""
+        simulated = isinstance(self._at, Simulated)
+        journalled = self._journal(loaded) if not simulated or self._job.journal is not None else nullcontext()
+        title = f"{loaded.name} to {self._at.title}"
+        with new_log("print", title, self._job.log) as log, _pointing_to(log), journalled as journal:
+            if isinstance(self._at, Simulated):
+                return _print_simulated(loaded, self._at, Scene(title, log, journal), self._person)
+            outcome = stream_program(loaded, self._at, Scene(title, log, journal), self._person)
+            return report_end(outcome, log, journal)
+
+    def _journal(self, loaded: LoadedProgram) -> AbstractContextManager[Journal | None]:
+        """The journal; a print that was not told where to keep it goes on without one where none can be written."""
+        file = self._job.journal
+        try:
+            return new_journal(loaded.program.lines, loaded.profile, loaded.name, loaded.source, file)
+        except OutputError as error:
+            if file is not None:
+                raise
+            say(f"this print cannot be resumed when it is cut off: {error}")
+            return nullcontext()
+
+    def _who(self, machine: Machine) -> str:
+        """Who answers, where it is a printer for the machine."""
+        if isinstance(self._at, Simulated):
+            speed = f"{self._at.speed:g} times as fast as a real one" if self._at.speed else "as fast as it can"
+            return f"a simulated {machine.name}, {speed}"
+        assert self._answer is not None
+        described = describe_answer(self._answer, self._at.baud)
+        return f"{described}, answers at {self._at.name} and is one for {machine.name}"
+
+
+def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person: Person) -> End:
+    """Stream to the simulated printer and tell what it has done."""
+    machine = loaded.profile.machine
+    usb = loaded.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
+    speed = at.speed or inf
+    with SimulatedPrinter(machine, speed, build=BuildOptions(queue=QUEUE)) as printer:
+        pace, port = speed if isfinite(speed) else None, SerialPort(printer.path)
+        outcome = stream_program(replace(loaded, profile=usb), port, scene, person, pace=pace)
+        record = printer.record
+    if outcome.cancelled:
+        return report_end(outcome, scene.log)
+    segments, volumes = record.deposited(loaded.profile.material.diameter_mm)
+    planned = float(loaded.program.run.segment_mm3.sum())
+    laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
+    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C at the end"
+    moves = f"{len(record.start)} moves in {duration(float(record.duration_s.sum()))}"
+    show(f"simulated printer: {moves}, {laid}, {heaters}\n")
+    if record.clamped or record.unknown:
+        raise PrinterError(
+            f"the simulated printer met {record.clamped} coordinates out of limits and {record.unknown} unknown commands"
+        )
+    return DONE
+
+
+def stream_program(
+    loaded: LoadedProgram, at: SerialPort, scene: Scene, person: Person, *, begin: Begin | None = None, pace: float | None = 1.0
+) -> Outcome:
+    """Stream a program while a person watches and commands it. pace: seconds of the print that pass in one of the clock; None: as
+    fast as it goes. What is shown begins when a resumed print does: before, the person is asked."""
+    timeline = Timeline(loaded.program.run)
+
+    def traffic(direction: str, data: bytes) -> None:
+        scene.log.note(direction, data)
+        scene.messages.hear(direction, data)
+
+    with ExitStack() as stack:
+        tell = stack.enter_context(person.show(scene))
+        begun = begin is None
+        if begun:
+            tell(None)
+
+        def begin_then_show(status: PrinterStatus) -> ResumePoint:
+            nonlocal begun
+            assert begin is not None
+            start = begin(status)
+            begun = True
+            tell(None)
+            return start
+
+        def on_progress(status: PrintStatus) -> None:
+            if begun:
+                tell(replace(status, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))
+
+        return print_lines(
+            loaded.program.lines,
+            at.name,
+            at.baud,
+            on_progress=on_progress,
+            stop=person.stop,
+            schedule=Schedule(timeline.remaining_s, pace),
+            limit=dialect_of(loaded.profile.machine).longest_line,
+            control=person.commands,
+            profile=loaded.profile,
+            medium=tap(traffic),
+            journal=scene.journal,
+            begin=None if begin is None else begin_then_show,
+        )
+
+
+@contextmanager
+def _pointing_to(log: SerialLog) -> Iterator[None]:
+    """Say where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
+    if log.trouble:
+        say(f"the traffic is not logged: {log.file}: {log.trouble}")
+    try:
+        yield
+    except PrinterError:
+        _point_to(log)
+        raise
+    except KeyboardInterrupt:  # the second one: nobody waited for the printer's word
+        say("ended at once: whether the heaters are off is not known, look at the printer")
+        raise
+
+
+def _point_to(log: SerialLog) -> None:
+    """Say where the log is, and whether it is whole; it ends here."""
+    log.close()
+    if log.trouble:
+        say(f"what was sent and received is not wholly in {log.file}: {log.trouble}")
+    else:
+        say(f"all that was sent and received is in {log.file}")
+
+
+def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal | None = None) -> End:
+    """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one, or
+    that this is not possible. Closes the journal first: only what is on the disk is promised."""
+    if journal is not None:
+        journal.close()
+        if journal.trouble:
+            say(journal.warning)
+    for warning in outcome.warnings:
+        say(f"the printer said: {warning}")
+    if outcome.warnings and log is not None:
+        _point_to(log)
+    if outcome.cancelled:
+        heaters = f"{Heaters.HALTED.value}: {outcome.halted}" if outcome.halted else HEATERS[outcome.heaters_off]
+        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
+        if journal is not None and journal.last.executed and not journal.trouble:
+            say(f"tiltprint resume {journal.path} goes on with it")
+        return CANCELLED
+    summary = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
+    show(f"{summary} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")
+    return DONE
