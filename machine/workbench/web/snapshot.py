@@ -8,8 +8,7 @@ from typing import Any, Literal
 from machine.dryrun.findings import Finding
 from machine.program import Alternative
 from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
-from machine.view.front import front_record
-from machine.view.parts import page_colours
+from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.model import Model
