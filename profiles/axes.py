@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from profiles.frozen import Frozen, Limits, Vector, advanced, rare
+from profiles.frozen import Effect, Frozen, Limits, Vector, advanced, rare
 
 Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
 
@@ -20,8 +20,12 @@ class LinearAxis(Frozen):
     limits_mm: Limits = advanced("Travel", "limits build volume size stroke")(
         ..., "least and greatest position the firmware accepts, mm"
     )
-    speed_mm_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=5000)(..., "greatest speed, mm/s")
-    acceleration_mm_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000)(..., "acceleration, mm/s2")
+    speed_mm_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=5000, effect=Effect.PRICES)(
+        ..., "greatest speed, mm/s"
+    )
+    acceleration_mm_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000, effect=Effect.PRICES)(
+        ..., "acceleration, mm/s2"
+    )
     home_mm: float | None = rare("Position at home", "endstop")(
         None,
         "what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, mm; left out: "
@@ -59,8 +63,12 @@ class RotaryAxis(Frozen):
     budget_deg: float | None = advanced("Winding of the cables", "limit", ge=180, le=100000)(
         None, "how far cables let the axis wind to either side of zero_deg, deg: it is unwound before; left out: no cable"
     )
-    speed_deg_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=3600)(..., "greatest speed, deg/s")
-    acceleration_deg_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000)(..., "acceleration, deg/s2")
+    speed_deg_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=3600, effect=Effect.PRICES)(
+        ..., "greatest speed, deg/s"
+    )
+    acceleration_deg_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000, effect=Effect.PRICES)(
+        ..., "acceleration, deg/s2"
+    )
     home_deg: float | None = rare("Position at home", "endstop")(
         None,
         "what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, deg; left out: "

@@ -1,6 +1,7 @@
 """Frozen: what all validated values of a profile share, and the keys that they are made of."""
 
 from collections.abc import Callable, Iterable
+from enum import IntEnum
 from functools import partial
 from types import NoneType
 from typing import Any, Self, get_args
@@ -54,16 +55,27 @@ UNITS = (  # what the names of keys end with -> how a page shows the unit
 )
 
 
-def _key(level: str, title: str, synonyms: str = "", **allowed: Any) -> Callable[[Any, str], Any]:
+class Effect(IntEnum):
+    """What a changed key does to a front of parts that was found before, from the least to the greatest: nothing, its rows have
+    other prices, the machine may reach fewer of them, or a search may find another front."""
+
+    NONE = 0
+    PRICES = 1
+    REACH = 2
+    FRONT = 3
+
+
+def _key(level: str, title: str, synonyms: str = "", effect: Effect | None = None, **allowed: Any) -> Callable[[Any, str], Any]:
     """A key of a profile, whose default (`...` where it has none) and meaning are the arguments of what is returned.
 
     Two calls keep a key within a few lines: in one call each argument would have a line of its own. level: who needs the key;
-    title: what a page calls it; synonyms: words of other slicers that neither title nor key has; allowed: what pydantic's Field
-    takes to restrict values.
+    title: what a page calls it; synonyms: words of other slicers that neither title nor key has; effect: of a change on the
+    parts that a search has found, None: as profiles.effect has it for the key's section; allowed: what pydantic's Field takes to
+    restrict values.
     """
 
     def field(default: Any, description: str) -> Any:
-        extra: dict[str, Any] = {"level": level, "synonyms": synonyms}
+        extra: dict[str, Any] = {"level": level, "synonyms": synonyms} | ({} if effect is None else {"effect": effect})
         return Field(default, title=title, description=description, json_schema_extra=extra, **allowed)
 
     return field

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, WithJsonSchema, model_validator
 
 from profiles.axes import STANDING, LinearAxis, RotaryAxis
-from profiles.frozen import Frozen, Vector, advanced, rare, simple
+from profiles.frozen import Effect, Frozen, Vector, advanced, rare, simple
 from profiles.wording import keys, nearest
 
 # The firmwares' dialects of G-code that a profile may name, which machine/firmware/ writes -> whether its firmware can keep the
@@ -118,16 +118,22 @@ class Table(Frozen):
 class Blocks(Frozen):
     """G-code blocks; {placeholders} are listed in docs/profiles.md."""
 
-    start: Block = advanced("Start G-code", "custom script begin")(..., "before the first part: homing, heating, priming")
-    end: Block = advanced("End G-code", "custom script finish")(..., "after the last part: heaters off, parking")
-    before_part: Block = advanced("G-code before a part", "custom script")("", "before each reorientation")
-    after_part: Block = advanced("G-code after a part", "custom script")("", "after each part")
-    before_layer: Block = advanced("G-code before a layer", "custom script layer change before_layer_gcode layer_gcode")(
+    start: Block = advanced("Start G-code", "custom script begin", effect=Effect.NONE)(
+        ..., "before the first part: homing, heating, priming"
+    )
+    end: Block = advanced("End G-code", "custom script finish", effect=Effect.NONE)(
+        ..., "after the last part: heaters off, parking"
+    )
+    before_part: Block = advanced("G-code before a part", "custom script", effect=Effect.NONE)("", "before each reorientation")
+    after_part: Block = advanced("G-code after a part", "custom script", effect=Effect.NONE)("", "after each part")
+    before_layer: Block = advanced(
+        "G-code before a layer", "custom script layer change before_layer_gcode layer_gcode", effect=Effect.NONE
+    )(
         "",
         "before each layer, over the print: only commands that are known to move nothing and to change no mode; macros are "
         "refused",
     )
-    resume: Block = rare("G-code after a power cut", "custom script recovery")(
+    resume: Block = rare("G-code after a power cut", "custom script recovery", effect=Effect.NONE)(
         "",
         "after a power cut, a print on the table: makes the axes know where they stand, and leaves the tip at {clear_z_mm} or "
         "above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all are taken to stand "
@@ -138,7 +144,7 @@ class Blocks(Frozen):
 class Machine(Frozen):
     """A printer whose head moves on X Y Z over a table that tilts about one axis and turns about another, or stands still."""
 
-    name: str = advanced("Name of the machine", "printer")(..., "what people call it")
+    name: str = advanced("Name of the machine", "printer", effect=Effect.NONE)(..., "what people call it")
     shape: Literal["table", "fixed"] = advanced("Shape", "kinematics 3-axis 5-axis")(
         "table", "table: it tilts and turns; fixed: three axes only, tilt and turn are left out, all is printed in one part"
     )
@@ -160,22 +166,22 @@ class Machine(Frozen):
     tool_mm: Vector = advanced("From the tip to X Y Z", "tool offset length")(
         (0.0, 0.0, 0.0), "from the nozzle tip to the point whose position X Y Z tell, mm"
     )
-    junction_speed_mm_s: float = advanced("Corner speed", "jerk junction deviation square corner velocity", ge=0, le=100)(
-        8.0, "speed change that the firmware makes at once at a corner (jerk), mm/s"
-    )
-    receive_bytes: int = rare("Receive buffer", "RX_BUFFER_SIZE serial", ge=64, le=65536)(
+    junction_speed_mm_s: float = advanced(
+        "Corner speed", "jerk junction deviation square corner velocity", ge=0, le=100, effect=Effect.PRICES
+    )(8.0, "speed change that the firmware makes at once at a corner (jerk), mm/s")
+    receive_bytes: int = rare("Receive buffer", "RX_BUFFER_SIZE serial", ge=64, le=65536, effect=Effect.NONE)(
         128, "receive buffer of the board's serial port, bytes (Marlin: RX_BUFFER_SIZE): less is on its way at a time"
     )
-    extruder_speed_mm_s: float = advanced("Extruder speed", "E maximum feedrate", gt=0, le=500)(
+    extruder_speed_mm_s: float = advanced("Extruder speed", "E maximum feedrate", gt=0, le=500, effect=Effect.PRICES)(
         60.0, "greatest speed of the filament, mm/s"
     )
-    extruder_acceleration_mm_s2: float = advanced("Extruder acceleration", "E maximum", gt=0, le=100000)(
+    extruder_acceleration_mm_s2: float = advanced("Extruder acceleration", "E maximum", gt=0, le=100000, effect=Effect.PRICES)(
         1500.0, "acceleration of the filament, mm/s2"
     )
-    arcs: bool = advanced("Arcs", "arc fitting G2 G3 welder")(
+    arcs: bool = advanced("Arcs", "arc fitting G2 G3 welder", effect=Effect.NONE)(
         False, "true: strokes along circles are written as arcs, G2 and G3; the firmware must know them"
     )
-    arc_tolerance_mm: float = advanced("Arc tolerance", "arc fitting resolution", ge=0.003, le=0.5)(
+    arc_tolerance_mm: float = advanced("Arc tolerance", "arc fitting resolution", ge=0.003, le=0.5, effect=Effect.NONE)(
         0.025, "an arc stays so near to the path it replaces, mm; 0.025 is an eighteenth of a bead"
     )
     table: Table
@@ -186,7 +192,7 @@ class Machine(Frozen):
     clearance_mm: float = advanced("Clearance between head and table", "collision distance", ge=0, le=100)(
         1.0, "least distance kept between head and table, mm"
     )
-    lift_mm: float = advanced("Lift while the table moves", "z hop", ge=0, le=500)(
+    lift_mm: float = advanced("Lift while the table moves", "z hop", ge=0, le=500, effect=Effect.NONE)(
         10.0, "extra height above everything printed while the table moves, mm"
     )
     pause_cools_after_min: float = advanced("Nozzle off after a pause of, minutes", "idle timeout", ge=0, le=1440)(
@@ -195,27 +201,29 @@ class Machine(Frozen):
         "goes on; as long as Prusa's M600 (M600_TIMEOUT 600 s) and Klipper (idle_timeout) wait, Marlin's M600 waits 45 s "
         "(PAUSE_PARK_NOZZLE_TIMEOUT); 0: never",
     )
-    purge_mm: float = simple("Purge line", "prime line intro wipe", ge=0, le=500)(
+    purge_mm: float = simple("Purge line", "prime line intro wipe", ge=0, le=500, effect=Effect.PRICES)(
         0.0,
         "length of the line that is printed at the plate's edge, clear of the print, after the start block, so that the nozzle "
         "is full and clean, mm; 0: none, or the start block has one itself",
     )
-    nozzle_limit_c: float = advanced("Hottest nozzle", "maximum temperature", gt=0, le=600)(
+    nozzle_limit_c: float = advanced("Hottest nozzle", "maximum temperature", gt=0, le=600, effect=Effect.NONE)(
         300.0, "greatest nozzle temperature, deg C"
     )
-    nozzle_heating_c_s: float = rare("Heating of the nozzle", "heat-up rate", gt=0, le=50)(
+    nozzle_heating_c_s: float = rare("Heating of the nozzle", "heat-up rate", gt=0, le=50, effect=Effect.PRICES)(
         1.5, "how fast the nozzle gets hotter when it is near the heat of printing, deg C/s: by it waiting is estimated"
     )
-    bed_limit_c: float = advanced("Hottest bed", "maximum temperature heatbed", ge=0, le=300)(
+    bed_limit_c: float = advanced("Hottest bed", "maximum temperature heatbed", ge=0, le=300, effect=Effect.NONE)(
         120.0, "greatest bed temperature, deg C; 0: no heated bed"
     )
-    thumbnails_px: list[tuple[Pixels, Pixels]] = advanced("Pictures in the G-code", "thumbnails preview", max_length=4)(
-        [], "width and height of the pictures in the G-code's head, pixels; web pages show them"
-    )
-    uncalibrated: list[str] = rare("Keys without a source", "calibration")(
+    thumbnails_px: list[tuple[Pixels, Pixels]] = advanced(
+        "Pictures in the G-code", "thumbnails preview", max_length=4, effect=Effect.NONE
+    )([], "width and height of the pictures in the G-code's head, pixels; web pages show them")
+    uncalibrated: list[str] = rare("Keys without a source", "calibration", effect=Effect.NONE)(
         [], "keys whose values no source gives; the dry run names them"
     )
-    sources: dict[str, str] = rare("Sources of values")({}, "for a key or a table of keys: where its value comes from")
+    sources: dict[str, str] = rare("Sources of values", effect=Effect.NONE)(
+        {}, "for a key or a table of keys: where its value comes from"
+    )
     gcode: Blocks
 
     def heating_s(self, rise_c: float, since_s: float = 0.0) -> float:

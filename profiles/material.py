@@ -1,68 +1,70 @@
 """The material: filament, temperatures, cooling, retraction."""
 
-from profiles.frozen import Frozen, advanced, rare, simple
+from profiles.frozen import Effect, Frozen, advanced, rare, simple
 
 
 class Material(Frozen):
     """A filament and how it wants to be melted."""
 
-    name: str = rare("Name of the material", "filament")(..., "what people call it")
+    name: str = rare("Name of the material", "filament", effect=Effect.NONE)(..., "what people call it")
     diameter_mm: float = simple("Filament diameter", ge=1, le=4)(1.75, "filament diameter, mm")
-    density_g_cm3: float = advanced("Density", "filament weight grams", gt=0, le=10)(1.24, "density, g/cm3")
-    price_per_kg: float | None = simple("Price per kilogram", "filament cost spool money", ge=0, le=1e6)(
+    density_g_cm3: float = advanced("Density", "filament weight grams", gt=0, le=10, effect=Effect.NONE)(1.24, "density, g/cm3")
+    price_per_kg: float | None = simple("Price per kilogram", "filament cost spool money", ge=0, le=1e6, effect=Effect.NONE)(
         None, "what a kilogram costs, so that reports tell what a print costs; absent: they do not"
     )
-    currency: str = simple("Currency of the price", "filament cost money euro dollar", max_length=12)(
+    currency: str = simple("Currency of the price", "filament cost money euro dollar", max_length=12, effect=Effect.NONE)(
         "", "what the price is counted in, as EUR; stands behind it in reports"
     )
-    nozzle_c: float = simple("Nozzle temperature", "hotend extruder printing heat", ge=150, le=450)(
+    nozzle_c: float = simple("Nozzle temperature", "hotend extruder printing heat", ge=150, le=450, effect=Effect.NONE)(
         ..., "nozzle temperature, deg C"
     )
-    first_layer_nozzle_c: float = simple("First layer nozzle temperature", "initial layer hotend extruder heat", ge=150, le=450)(
-        ..., "nozzle temperature of the first layer on the plate, deg C"
-    )
-    homing_nozzle_c: float = advanced("Nozzle temperature while homing", "preheat ooze hotend", ge=0, le=450)(
+    first_layer_nozzle_c: float = simple(
+        "First layer nozzle temperature", "initial layer hotend extruder heat", ge=150, le=450, effect=Effect.NONE
+    )(..., "nozzle temperature of the first layer on the plate, deg C")
+    homing_nozzle_c: float = advanced("Nozzle temperature while homing", "preheat ooze hotend", ge=0, le=450, effect=Effect.NONE)(
         150.0, "nozzle while the machine homes and the bed heats, deg C: nothing may ooze at 150"
     )
-    standby_c: float | None = advanced("Nozzle temperature while paused", "standby idle hotend", ge=0, le=450)(
-        None, "nozzle while a print is paused, deg C; left out: as hot as it prints"
+    standby_c: float | None = advanced(
+        "Nozzle temperature while paused", "standby idle hotend", ge=0, le=450, effect=Effect.NONE
+    )(None, "nozzle while a print is paused, deg C; left out: as hot as it prints")
+    bed_c: float = simple("Bed temperature", "heatbed build plate heat", ge=0, le=200, effect=Effect.NONE)(
+        ..., "bed temperature, deg C; 0: bed off"
     )
-    bed_c: float = simple("Bed temperature", "heatbed build plate heat", ge=0, le=200)(..., "bed temperature, deg C; 0: bed off")
-    fan: float = simple("Part fan, at most", "cooling fan speed maximum", ge=0, le=1)(
+    fan: float = simple("Part fan, at most", "cooling fan speed maximum", ge=0, le=1, effect=Effect.NONE)(
         ..., "part fan in layers that take least_layer_time_s or less, 0 to 1"
     )
-    fan_least: float = simple("Part fan, at least", "cooling fan speed minimum", ge=0, le=1)(
+    fan_least: float = simple("Part fan, at least", "cooling fan speed minimum", ge=0, le=1, effect=Effect.NONE)(
         0.35, "part fan in layers that take fan_layer_time_s or more, at most fan; between, in between"
     )
-    fan_layer_time_s: float = advanced("Least fan in layers longer than", "cooling layer time", gt=0, le=3600)(
-        60.0, "layers that take longer have cooled by themselves and need only fan_least, s"
-    )
-    fan_bridge: float | None = advanced("Part fan on bridges and overhangs", "cooling bridging bridges fan speed", ge=0, le=1)(
-        None, "part fan on bridges and overhanging walls; absent: fan"
-    )
-    fan_infill_bridge: float | None = rare("Part fan over infill", "cooling internal bridge fan speed", ge=0, le=1)(
-        None, "part fan on the first solid layer over sparse infill; absent: fan_bridge"
-    )
-    fan_off_layers: int = advanced("First layers without fan", "cooling disable fan no cooling initial", ge=0, le=1000)(
-        1, "lowest layers on the plate without any fan: they must stick to it"
-    )
-    fan_full_layer: int = advanced("Full fan from layer", "cooling full fan speed at layer", ge=0, le=1000)(
+    fan_layer_time_s: float = advanced(
+        "Least fan in layers longer than", "cooling layer time", gt=0, le=3600, effect=Effect.NONE
+    )(60.0, "layers that take longer have cooled by themselves and need only fan_least, s")
+    fan_bridge: float | None = advanced(
+        "Part fan on bridges and overhangs", "cooling bridging bridges fan speed", ge=0, le=1, effect=Effect.NONE
+    )(None, "part fan on bridges and overhanging walls; absent: fan")
+    fan_infill_bridge: float | None = rare(
+        "Part fan over infill", "cooling internal bridge fan speed", ge=0, le=1, effect=Effect.NONE
+    )(None, "part fan on the first solid layer over sparse infill; absent: fan_bridge")
+    fan_off_layers: int = advanced(
+        "First layers without fan", "cooling disable fan no cooling initial", ge=0, le=1000, effect=Effect.NONE
+    )(1, "lowest layers on the plate without any fan: they must stick to it")
+    fan_full_layer: int = advanced("Full fan from layer", "cooling full fan speed at layer", ge=0, le=1000, effect=Effect.NONE)(
         0, "layer above the plate from which the fan may blow fully; it rises evenly from fan_off_layers to there"
     )
-    interlayer_strength_mpa: float = rare("Strength across layers", "tensile bond", gt=0, le=500)(
+    interlayer_strength_mpa: float = rare("Strength across layers", "tensile bond", gt=0, le=500, effect=Effect.FRONT)(
         20.0,
         "tensile strength across layers, MPa; PLA printed well reaches 34, 3D Print. Addit. Manuf. 2020; ordinary prints and "
         "other filaments bond less",
     )
-    cold_weld_factor: float = rare("Strength on cold plastic, as a share", "tensile bond weld", gt=0, le=1)(
+    cold_weld_factor: float = rare("Strength on cold plastic, as a share", "tensile bond weld", gt=0, le=1, effect=Effect.FRONT)(
         0.6,
         "factor on interlayer_strength_mpa where a part stands on plastic that has cooled: an assumption, no such joint has been "
         "measured; strength across layers is 25 to 50 % below that along them, but 75 to 90 % with fibres or long times between "
         "layers, Duty and others, Solid Freeform Fabrication 2018",
     )
-    bridge_longest_mm: float = advanced("Longest bridge of this material", "bridging supports", ge=1, le=100)(
-        10.0, "level places spanned by straight lines up to this long, held at both ends, print without support, mm"
-    )
+    bridge_longest_mm: float = advanced(
+        "Longest bridge of this material", "bridging supports", ge=1, le=100, effect=Effect.FRONT
+    )(10.0, "level places spanned by straight lines up to this long, held at both ends, print without support, mm")
     flow: float = simple("Flow", "extrusion multiplier flow ratio", ge=0.5, le=1.5)(1.0, "factor on all extruded volume")
     retract_mm: float = simple("Retraction", "retract length retraction distance stringing oozing", ge=0, le=15)(
         ..., "filament pulled back before a travel that crosses outside, mm"
@@ -73,7 +75,7 @@ class Material(Frozen):
     wipe_mm: float = advanced("Wipe", "retract retraction wipe while retracting stringing", ge=0, le=50)(
         2.0, "way back over the paths just printed while filament is pulled back, mm; 2 mm rub the drop off, 0: none"
     )
-    coast_mm: float = advanced("Coasting", "coast end of path ooze", ge=0, le=10)(
+    coast_mm: float = advanced("Coasting", "coast end of path ooze", ge=0, le=10, effect=Effect.NONE)(
         0.0, "last stretch of a path before a retraction that is printed by pressure alone, mm; 0: no coasting"
     )
     retract_prime_extra_mm: float = advanced(
@@ -82,7 +84,7 @@ class Material(Frozen):
     prime_extra_mm: float = advanced("Extra filament after a turn of the table", "retract restart length prime", ge=0, le=10)(
         0.0, "filament pushed beyond what was retracted after a reorientation, along the first stroke inside, mm"
     )
-    pressure_advance: float | None = advanced("Pressure advance", "linear advance K", ge=0, le=2)(
+    pressure_advance: float | None = advanced("Pressure advance", "linear advance K", ge=0, le=2, effect=Effect.NONE)(
         None,
         "how much the extruder runs ahead of pressure, s: Marlin's M900 K, Klipper's SET_PRESSURE_ADVANCE, RepRapFirmware's "
         "M572; absent: what the firmware has",

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from difflib import get_close_matches
 from types import UnionType
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -97,7 +97,7 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Literal:
         return ("one of " if len(inner) > 1 else "") + ", ".join(_shown(value) for value in inner)
-    if origin is UnionType:
+    if origin in (UnionType, Union):
         return _allowed(inner[0], metadata)
     if origin is tuple:
         return f"a list of {('', '', 'two', 'three')[len(inner)]} numbers"

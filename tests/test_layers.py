@@ -37,7 +37,7 @@ CONFINED = {
     "starlette": ("machine/workbench/", "machine/view/serving/"),
     "uvicorn": ("machine/workbench/", "machine/view/serving/"),
     "websockets": (),
-    "pydantic": ("profiles/", "machine/pipeline/project_record.py"),
+    "pydantic": ("profiles/", "machine/pipeline/project_record.py", "machine/workbench/"),
     "rich": ("machine/cli/", "machine/pipeline/", "mdp/batch/"),
     "prompt_toolkit": ("machine/cli/",),
     "PIL": ("machine/pipeline/pictures.py", "machine/pipeline/residual_picture.py"),

@@ -1,6 +1,6 @@
 """Measure the serial link: its share of a UART's bandwidth, lines a second over a pseudo-terminal, memory over millions of lines.
 
-Run: python tools/bench_link.py [terminal] [sim] [uart] [virtual] [memory] [alone] [--lines 100000] [--file FILE.gcode]
+Run: python -m tools.bench_link [terminal] [sim] [uart] [virtual] [memory] [alone] [--lines 100000] [--file FILE.gcode]
 (without a name: all of them)
 
 sim: as `print --port sim` streams, its serial log, limits of the machine and display of progress included;
@@ -26,8 +26,8 @@ from machine.printing.serial_print import QUEUE, USB_BYTES
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PARTS = ["terminal", "sim", "uart", "virtual", "memory", "alone"]
 BAUDS = (115200, 250000)

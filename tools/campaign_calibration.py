@@ -18,18 +18,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
+from machine.cli.commands.measuring.at_port import PrinterProber, ProbingSession
 from machine.firmware import dialect_of, firmware_of
 from machine.kinematics.table import machine_points
 from machine.setup.calibration.fit import calibrate
 from machine.setup.calibration.piece.fit import correct
 from machine.setup.calibration.piece.pads import Piece
-from machine.setup.calibration.probing.ball import contact_heights
-from machine.setup.calibration.probing.clear import find_in_the_way
+from machine.setup.calibration.probing.ball import contact_heights, find_in_the_way
 from machine.setup.calibration.probing.measure import AROUND, WIDE, Measuring
 from machine.setup.calibration.program import calibration_pen
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.virtual import PATH, VirtualPrinter
+from machine.simulator.contact import ProbedTable
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import UserError
@@ -39,6 +37,7 @@ from tests.machine.setup.calibration.direct import HEIGHT_MM, DirectProber, prob
 from tests.machine.setup.calibration.misaligned import prediction_errors_mm
 from tests.machine.setup.calibration.piece.pieces import off, read_off, seam_mm, standing
 from tests.machine.setup.calibration.test_directions import worst_predictions_mm
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 MOST_MM, FLAT_MM = 0.05, 0.5
 SHARE = 0.99

@@ -1,6 +1,6 @@
 """Hold the plastic of G-code files of ours against the room that there is for it, interface by interface and layer by layer.
 
-    python tools/check_plastic.py FILE.gcode ... [--maps FOLDER] [--layers]
+    python -m tools.check_plastic FILE.gcode ... [--maps FOLDER] [--layers]
 
 One row an interface (a part's first layer on earlier parts): its section, mm2; the share of it in contact; plastic over room of
 all of it, %; square millimetres with more than 110 % and with less than 90 %, % of it; along which share of the outer walls
@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.dryrun.balance.interfaces import LEAST, MOST, Interface, interfaces, wall_edges
-from machine.dryrun.balance.layers import layer_balances
+from machine.dryrun.balance.interfaces import LEAST, MOST, Interface, interfaces
 from machine.dryrun.dryrun import dry_run
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.pictures import write_png
 from profiles.profile import load
+from tools.layer_balance import layer_balances, wall_edges
 
 HEAD = (
     "file",

@@ -1,6 +1,6 @@
 """What the nozzle leaves at the seams of joints: wipes, primes and travels on the rim, and how well the walls meet.
 
-    python tools/check_seams.py MODEL|FILE.gcode ... [--list] [--set KEY=VALUE ...]
+    python -m tools.check_seams MODEL|FILE.gcode ... [--list] [--set KEY=VALUE ...]
 
 A joint is where a part's first layer lies on earlier parts, its rim the outline of that layer in the plane of the cut. One row a
 joint. Counted is what the tip does at the height of a layer, of this part or of earlier ones, on that layer's outline (its middle
@@ -21,9 +21,8 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from compare_prints import mesh_of
 
-from machine.dryrun.balance.interfaces import AT_THE_EDGE, NO_PART, interfaces, wall_edges
+from machine.dryrun.balance.interfaces import AT_THE_EDGE, NO_PART, interfaces
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import shift, workpiece_points
@@ -37,6 +36,8 @@ from mdp.search.orient import orient_and_decompose
 from mdp.search.search import SearchRequest, decompose
 from profiles.machine import Machine
 from profiles.profile import Profile, load
+from tools.compare_prints import mesh_of
+from tools.layer_balance import wall_edges
 
 HEAD = ("model", "part", "rim mm", "wipes", "below", "primes", "below", "travels", "below", "walls mm", "p95", "met %")
 ON_RIM = 0.75  # of the outer wall's width: its own middle lies half of it inside

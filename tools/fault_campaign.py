@@ -4,7 +4,7 @@ A print must end in exactly the program's strokes, each once and in order, or wi
 machine safe: heaters off by the printer's own account, nothing moving; or, where nobody can reach the printer any more, with
 a message that says so. Sender and printer share a virtual clock: a print takes a second, and is the same at every run.
 
-Run: python tools/fault_campaign.py [--scripts 1000] [--first 0] [--lines 2000] [--jobs 2]
+Run: python -m tools.fault_campaign [--scripts 1000] [--first 0] [--lines 2000] [--jobs 2]
 """
 
 import argparse
@@ -21,11 +21,11 @@ import numpy as np
 
 from machine.link.stream import print_lines
 from machine.simulator.board import BuildOptions
-from machine.simulator.faults import HEALED, KINDS, Fault, FaultScript, random_script
+from machine.simulator.faults import KINDS, Fault, FaultScript
 from machine.simulator.record import Record
-from machine.simulator.virtual import PATH, EndlessError, VirtualPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
+from tests.machine.virtual_printer import HEALED, PATH, EndlessError, VirtualPrinter, random_script
 
 PROFILE = load()
 # Firmwares that never ask for a line again, over a line that loses no bytes of theirs.

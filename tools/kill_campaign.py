@@ -1,6 +1,6 @@
 """Kill a host, or cut the power, at random moments of a print and resume from its journal.
 
-Run: python tools/kill_campaign.py [MOMENTS] [SEED] [--power stock|advanced | --repeats]
+Run: python -m tools.kill_campaign [MOMENTS] [SEED] [--power stock|advanced | --repeats]
 (default 200 moments; figures: tools/RESULTS.md)
 A moment passes when the executed moves, both runs together, are the program's without a gap; what was done twice is counted.
 
@@ -40,9 +40,9 @@ from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import JournalError
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 LIMIT = 95
@@ -116,7 +116,7 @@ def serve(link: str, record: str, speed: float) -> None:
 def printer(folder: Path, speed: float) -> Iterator[Path]:
     """A printer in a process of its own; folder/record.json is there afterwards."""
     link = folder / "tty"
-    words = [sys.executable, __file__, "--printer", str(link), str(folder / "record.json"), str(speed)]
+    words = [sys.executable, "-m", "tools.kill_campaign", "--printer", str(link), str(folder / "record.json"), str(speed)]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         if process.stdin is None or process.stdout is None:
             return

@@ -195,9 +195,9 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
     """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
 
     With --port the machine goes from touch to touch and you take the tip onto the mark by keys; with --probe it measures a ball
-    by itself. Without a port a terminal asks for the touches one by one; with --printed they are read off a printed piece.
+    by itself. Without a port -o writes a program and a sheet to fill in; with --printed they are read off a printed piece.
     """
-    from machine.cli.commands.measuring.calibrate import ask_for_touches, evaluate_sheet, write_program
+    from machine.cli.commands.measuring.calibrate import evaluate_sheet, write_program
 
     out, measured, probing = asked.out, asked.measured, asked.probing
     if asked.printed:
@@ -226,9 +226,7 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
         return write_program(asked, asked.given.profile(), out)
     if measured is not None and out is None:
         return evaluate_sheet(asked, measured)
-    if out is None and _is_at_terminal():
-        return ask_for_touches(asked)
-    raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+    raise typer.BadParameter("one of --port PORT, -o OUT.gcode, --measured FILE and --printed FILE.gcode is expected")
 
 
 def _read_off(asked: requests.CalibrationRequest) -> int:

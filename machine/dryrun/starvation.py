@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.motion import standstills
-from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
+from machine.firmware.firmware import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
 from machine.gcode.line_text import is_plain_move, read_line
 from machine.gcode.reader.parsed import Indices32, ParsedProgram

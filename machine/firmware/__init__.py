@@ -1,7 +1,7 @@
-"""Firmwares: what each one is told, how it answers and how it is simulated; one file a firmware, one line of the table.
+"""Firmwares: what each one is told, how it answers and how it is simulated; one line of the table each.
 
 `dialect_of(machine)` is what is written for a machine, `simulation_of(machine)` how its firmware is simulated, `identify(text)`
-the firmware of an answer to M115. `line` has what a byte and a numbered line cost on the serial line, and its rates.
+the firmware of an answer to M115. `firmware` has what a byte and a numbered line cost on the serial line, and its rates.
 """
 
 from machine.firmware.dialect import Dialect
@@ -9,11 +9,9 @@ from machine.firmware.firmware import Firmware
 from machine.firmware.grblhal import GRBLHAL
 from machine.firmware.klipper import KLIPPER
 from machine.firmware.linuxcnc import LINUXCNC
-from machine.firmware.marlin import MARLIN, SIMULATED
-from machine.firmware.repetier import REPETIER
+from machine.firmware.marlin import MARLIN, REPETIER, SIMULATED, SMOOTHIEWARE
 from machine.firmware.reprapfirmware import REPRAPFIRMWARE
 from machine.firmware.simulation import SimulationRules
-from machine.firmware.smoothieware import SMOOTHIEWARE
 from profiles.machine import Machine
 
 __all__ = ["FIRMWARES", "Dialect", "Firmware", "dialect_of", "dialects", "firmware_of", "identify", "simulation_of"]

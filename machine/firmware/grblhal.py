@@ -4,8 +4,7 @@ M851 and M850 switch its A/C kinematics, whose places count from the turn axis. 
 M104, M109, M140 and M190 need a plug-in of the machine's own.
 """
 
-from machine.firmware.command import Command
-from machine.firmware.dialect import Dialect
+from machine.firmware.dialect import Command, Dialect
 from machine.firmware.firmware import Firmware
 
 COMMANDS = {

@@ -10,11 +10,8 @@ nothing: when the program behind it dies the port closes. M114 names X Y Z E onl
 from collections.abc import Mapping
 from dataclasses import replace
 
-from machine.firmware.command import HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command
-from machine.firmware.dialect import Dialect
-from machine.firmware.firmware import Firmware
-from machine.firmware.line import LineRules
-from machine.firmware.probing import ProbingRules
+from machine.firmware.dialect import HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command, Dialect
+from machine.firmware.firmware import Firmware, LineRules, ProbingRules
 from machine.firmware.simulation import Idle, SimulationRules
 from profiles.axes import RotaryAxis
 

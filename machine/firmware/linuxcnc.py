@@ -6,8 +6,7 @@ code that it does not know and that the machine has not remapped, at a word with
 (rs274ngc/interp_array.cc, interp_check.cc).
 """
 
-from machine.firmware.command import Command
-from machine.firmware.dialect import Dialect
+from machine.firmware.dialect import Command, Dialect
 from machine.firmware.firmware import Firmware
 
 _LACKS = (

@@ -1,16 +1,15 @@
-"""Marlin 2.1: rotary axes are the words of AXIS4_NAME and AXIS5_NAME; M73, M486 and arcs are build options it may lack.
+"""Marlin 2.1, and the firmwares that print what is written for it.
 
+Rotary axes are the words of AXIS4_NAME and AXIS5_NAME; M73, M486 and arcs are build options it may lack.
 TCP (G43.4, G49) exists in the fork DerAndere1/Marlin, branch Marlin2ForPipetBot, only. Its F on mixed moves counts X Y Z.
 Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
 """
 
-from machine.firmware.command import HEATING_S, PROBING_S, Command
-from machine.firmware.dialect import Dialect
-from machine.firmware.firmware import Firmware
-from machine.firmware.line import LineRules
-from machine.firmware.marlin_settings import settings_report
-from machine.firmware.probing import ProbingRules
-from machine.firmware.simulation import Idle, SimulationRules
+from collections.abc import Iterable, Mapping
+
+from machine.firmware.dialect import HEATING_S, PROBING_S, Command, Dialect
+from machine.firmware.firmware import Firmware, LineRules, ProbingRules
+from machine.firmware.simulation import Idle, SimulatedSettings, SimulationRules
 
 # Meanings from gcode/gcode.h; what heats: gcode/bedlevel/G26.cpp, gcode/probe/G76_M871.cpp, gcode/temp/M306.cpp.
 # fmt: off
@@ -75,6 +74,51 @@ FIRST_MOVE_DELAY_S, FIRST_MOVE_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE: an i
 # gcode/control/M17_M18_M84.cpp: the idle time after which manage_inactivity (MarlinCore.cpp) lets the motors go; 0: never.
 MOTORS_STAY_ON = "M84 S0"
 
+# MarlinSettings::report in module/settings.cpp and the M..._report functions of gcode/config and gcode/control (Marlin 2.1): M503
+# puts `echo:` before every line and a heading before each; asked one by one M92, M201, M203, M204, M205 and M211 tell the line
+# alone, two places behind the point, axes by the letters of their words.
+STEPS_E = 93.0  # a mm of filament
+HEADINGS = {
+    "M92": "Steps per unit",
+    "M203": "Max feedrates (units/s)",
+    "M201": "Max Acceleration (units/s2)",
+    "M204": "Acceleration (units/s2) (P<print-accel> R<retract-accel> T<travel-accel>)",
+    "M205": "Advanced (B<min_segment_time_us> S<min_feedrate> T<min_travel_feedrate> X<max_jerk> Y<max_jerk> Z<max_jerk>)",
+    "M211": "Soft endstops",
+}
+
+
+def settings_report(command: str, settings: SimulatedSettings) -> list[str]:
+    """The lines that answer a command without words; [] for one that tells nothing."""
+    lines = _lines(settings)
+    if command == "M503":
+        told = ("echo:; Linear Units:", "echo:  G21 ; (mm)")
+        return [*told, *(line for name, heading in HEADINGS.items() for line in _under(heading, lines[name]))]
+    return lines.get(command, [])
+
+
+def _lines(settings: SimulatedSettings) -> Mapping[str, list[str]]:
+    letters, soft = settings.letters, settings.soft_limits
+    least, most = (_words(letters, [ends[side] for ends in settings.limits]) for side in (0, 1))
+    accelerations = f"P{settings.printing:.2f} R{settings.accelerations[-1]:.2f} T{settings.travelling:.2f}"
+    return {
+        "M92": [f"  M92{_words(letters, (*settings.steps, STEPS_E))}"],
+        "M203": [f"  M203{_words(letters, settings.speeds)}"],
+        "M201": [f"  M201{_words(letters, settings.accelerations)}"],
+        "M204": [f"  M204 {accelerations}"],
+        "M205": [f"  M205 B20000.00 S0.00 T0.00{_words(letters, [settings.jerk] * len(letters))}"],
+        "M211": [f"  M211 S{int(soft)} ; {'ON' if soft else 'OFF'}", f"  Min: {least}   Max: {most}"],
+    }
+
+
+def _under(heading: str, lines: Iterable[str]) -> list[str]:
+    return [f"echo:; {heading}:", *(f"echo:{line}" for line in lines)]
+
+
+def _words(letters: str, values: Iterable[float]) -> str:
+    return "".join(f" {letter}{value:.2f}" for letter, value in zip(letters, values, strict=False))
+
+
 SIMULATED = SimulationRules(
     identity="FIRMWARE_NAME:Marlin bugfix-2.1.x (simulated) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin "
     "PROTOCOL_VERSION:1.0 MACHINE_TYPE:tiltprint EXTRUDER_COUNT:1 AXIS_COUNT:{axes} UUID:cede2a2f-41a2-4748-9b12-c55c62f367ff",
@@ -110,3 +154,9 @@ MARLIN = Firmware(
     simulated=SIMULATED,
     probing=PROBING,
 )
+
+# These print what is written for Marlin. Repetier: `ok 12` names the line, nothing reports the free places: its own host counts
+# characters against the receive buffer. M84 S sets the idle time of its motors as Marlin's does (Commands.cpp,
+# STEPPER_INACTIVE_TIME 360). Smoothieware: no ok follows its Resend.
+REPETIER = Firmware(name="Repetier-Firmware", signs=("repetier",), line=LineRules(places=16, keep_awake=MOTORS_STAY_ON))
+SMOOTHIEWARE = Firmware(name="Smoothieware", signs=("smoothie",), line=LineRules(resend_ok=False))

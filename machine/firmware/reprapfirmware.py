@@ -9,11 +9,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from machine.firmware.command import PERSON_S, Command
-from machine.firmware.dialect import Dialect
-from machine.firmware.firmware import Firmware
-from machine.firmware.line import LineRules
-from machine.firmware.probing import ProbingRules
+from machine.firmware.dialect import PERSON_S, Command, Dialect
+from machine.firmware.firmware import Firmware, LineRules, ProbingRules
 from machine.firmware.simulation import SimulatedSettings, SimulationRules
 
 # docs.duet3d.com/User_manual/Reference/Gcodes; GCodes/GCodes2.cpp, 3.6: G10 and M568 share SetOrReportOffsets, M144 S1 switches

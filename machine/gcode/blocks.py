@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from machine.firmware import dialect_of
 from machine.firmware.dialect import Dialect
+from machine.firmware.firmware import FRAME_CHARACTERS
 from machine.firmware.klipper import stepper_name
-from machine.firmware.line import FRAME_CHARACTERS
 from machine.gcode.commands import COMMANDS, Heat, command_named, heat_in, homes, stands_still
 from machine.gcode.line_text import plain_line, read_line
 from machine.gcode.words import FLAG, MACRO

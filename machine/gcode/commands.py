@@ -15,8 +15,7 @@ from collections.abc import Mapping
 from enum import Enum
 
 from machine.firmware import FIRMWARES
-from machine.firmware.command import EEPROM_S, HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command
-from machine.firmware.dialect import Dialect
+from machine.firmware.dialect import EEPROM_S, HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command, Dialect
 from machine.gcode.line_text import MESSAGES, read_line
 from machine.gcode.words import MACRO, read_letters, read_number, read_values, read_words, split_command
 from profiles.errors import GcodeError

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from machine.firmware import Dialect
 from machine.gcode.lines import Bytes, Texts
-from machine.kinematics.coordinates import axis_positions, followed_places
+from machine.kinematics.table import axis_positions, followed_places
 from machine.planning.moves import RICHER
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Indices

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
+from machine.gcode.commands import command_in
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.connection import GREETING_STATES, Connection
 from machine.link.protocol.events import Event, Position, position_in
 from machine.link.protocol.framing import LINE_LIMIT
-from machine.link.protocol.slow_commands import is_waited_for
 from machine.link.protocol.states import State
 from machine.link.protocol.timeout import Timing
 from profiles.errors import PortError
@@ -51,7 +51,7 @@ class Exchange:
     def waits(self) -> bool:
         """Whether the printer is at a command that is waited for when the print is ended: homing, above all."""
         window = self.connection.window
-        return any(is_waited_for(window.command(line.number)) for line in window.flight)
+        return any(command_in(window.command(line.number)).must_end for line in window.flight)
 
     def greet(self) -> None:
         """Agree on line numbers and learn how the printer answers."""

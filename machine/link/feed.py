@@ -11,7 +11,6 @@ from machine.gcode.words import PAUSE_REMARK
 from machine.link.exchange import Exchange
 from machine.link.journal import FINISHED, LEFT, PAUSED, Checkpoint, Journal
 from machine.link.line_history import Barriers, LineHistory, PlannerReports, SentLine, shifts
-from machine.link.line_outcome import position_differences
 from machine.link.pause.park_moves import lift_move
 from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
@@ -22,6 +21,7 @@ from machine.link.protocol.events import Event, Ok, Position
 from machine.link.protocol.framing import command_of, name_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
+from machine.link.status import position_differences
 from machine.link.watchdog import PrinterReports, Watchdog
 from profiles.errors import PrinterError
 

@@ -8,7 +8,7 @@ from threading import Event as Flag
 from time import monotonic
 
 from machine.firmware import identify
-from machine.firmware.line import BAUDS, LineRules
+from machine.firmware.firmware import BAUDS, LineRules
 from machine.link.port import Port
 from machine.link.protocol import events
 from machine.link.protocol.decoder import LineDecoder

@@ -6,34 +6,29 @@ The file has its full size, on the disk, before the print begins, and records ar
 loses none. The slot changes with each fsync, so that the disk always holds a whole record.
 
 A journal is trusted only when its newest record is the newest of its print. The first record that cannot be written or synced is
-therefore final: the journal is marked as incomplete (incomplete_mark.py) and cannot be read any more. A computer that restarts
-loses what was not yet on the disk; `computer_ran_on` tells whether that can have happened.
+therefore final: the journal is marked as incomplete and cannot be read any more. A computer that restarts
+loses what was not yet on the disk; `computer_ran_on` tells whether that can have happened. The mark overwrites the first byte of
+the journal in place, which needs no free block. A disk that can no longer be written (a stick that was removed, a read-only
+remount) cannot take that mark, so the same is noted under the journal's key in other folders.
 
 The file is locked as long as its print runs; the system releases the lock when the program dies, however it does.
 """
 
 import json
 import os
+import sys
 import threading
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from os.path import isdir, isfile, lexists
+from os.path import isdir, isfile, lexists, samestat
 from pathlib import Path
 from typing import Any, Self
 from uuid import uuid4
 from zlib import crc32
 
-from machine.link.disk.incomplete_mark import (
-    BINARY,
-    MARK,
-    is_at,
-    is_noted_incomplete,
-    mark_incomplete,
-    note_incomplete,
-    write_at,
-)
 from profiles.errors import JournalError, OutputError, reason
 from profiles.files import lock
+from profiles.folders import state_folders
 
 FORMAT = 3  # in 2 a full disk ended the journal without a trace, in 1 the newest record might lack a change of height
 PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
@@ -46,6 +41,9 @@ LONGEST_BYTES = 1_000_000  # of the heading, which holds the resolved profile
 BEYOND_MM = 1e9  # and deg: no machine has such a place, and no filament such a length
 PRIVATE = 0o600  # what a person prints concerns nobody else
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")  # of Linux
+MARK = b"!"
+MEMORY = Path("/dev/shm")  # of Linux: can be written when no disk can, and lasts until the computer restarts
+BINARY = getattr(os, "O_BINARY", 0)  # Windows would write carriage returns otherwise
 
 
 @dataclass(frozen=True)
@@ -378,3 +376,86 @@ def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:
 
 def _is_pose(values: list[Any]) -> bool:
     return all(value is None or (isinstance(value, int | float) and abs(value) < BEYOND_MM) for value in values)
+
+
+def write_at(descriptor: int, offset: int, data: bytes) -> None:
+    """Write all bytes at a place of an open file. Raises OSError, also when only some were written."""
+    os.lseek(descriptor, offset, os.SEEK_SET)
+    if os.write(descriptor, data) < len(data):
+        raise OSError("not all of it was written")
+
+
+def mark_incomplete(path: Path, descriptor: int | None, heading: bytes) -> bool:
+    """Mark an open journal, and the file at its path where that is another one with the same heading (a stick that was plugged
+    in again, a copy). Returns whether the mark is on the disk, and no such file is left without it.
+    """
+    marked = descriptor is not None and _mark(descriptor)
+    if descriptor is not None and is_at(path, descriptor):
+        return marked
+    if not isfile(path):
+        return marked
+    with suppress(OSError):
+        there = os.open(path, os.O_RDWR | BINARY)
+        try:
+            return _mark(there) if os.read(there, len(heading))[1:] == heading[1:] else marked
+        finally:
+            os.close(there)
+    return False
+
+
+def _mark(descriptor: int) -> bool:
+    try:
+        write_at(descriptor, 0, MARK)
+        os.fsync(descriptor)
+    except OSError:
+        return False
+    return True
+
+
+def is_at(path: Path, descriptor: int) -> bool:
+    """Whether a path still leads to an open file, which was not deleted, moved or replaced."""
+    if sys.platform == "win32":  # an open file is none of these there
+        return True
+    try:
+        return samestat(os.stat(path), os.fstat(descriptor))
+    except OSError:
+        return False
+
+
+def note_incomplete(key: str) -> bool:
+    """Note in every folder that can be written that the journal of this key is incomplete; returns whether there was one."""
+    return sum(map(_note, _notes(key))) > 0
+
+
+def _note(file: Path) -> bool:
+    try:
+        if file.parent != MEMORY:
+            file.parent.mkdir(0o700, parents=True, exist_ok=True)
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | BINARY, 0o600)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        _sync_folder(file.parent)
+    except OSError:
+        return False
+    return True
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring the names of files to the disk, where the system can do that."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def is_noted_incomplete(key: str) -> bool:
+    """Whether some folder notes that the journal of this key is incomplete."""
+    return any(map(lexists, _notes(key)))
+
+
+def _notes(key: str) -> list[Path]:
+    return [folder / f"tiltprint-{key}.incomplete" for folder in (*state_folders(), MEMORY)]

@@ -12,7 +12,7 @@ from time import monotonic
 from typing import Any, Self
 from urllib.parse import urlsplit
 
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from profiles.errors import PortError, causes
 
 try:

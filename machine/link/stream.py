@@ -8,7 +8,6 @@ from threading import Event as Flag
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.feed import Feed
 from machine.link.journal import Journal
-from machine.link.line_outcome import line_was_done
 from machine.link.medium import SERIAL, Medium, reopen
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
 from machine.link.port import find_again, find_device, stable_name
@@ -18,7 +17,7 @@ from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint
 from machine.link.shutdown import SETTLE_S, HeaterGuard, Heaters, lift_tip
-from machine.link.status import PrinterStatus, query_status
+from machine.link.status import PrinterStatus, line_was_done, query_status
 from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError, add_words
 from profiles.profile import Profile
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 from urllib.parse import SplitResult, urlsplit
 
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.pipeline.requests import BAUD, SIMULATED
 from profiles.errors import PrinterError, ServerError
 

@@ -15,13 +15,13 @@ from threading import Event
 from time import monotonic, sleep
 from typing import Any
 
-from machine.firmware.line import BAUDS, LineRules
+from machine.firmware.firmware import BAUDS, LineRules
 from machine.link.identification import QUICK_S, Answer, Kind, ask, ask_at_any_rate
 from machine.link.port import Port, RefusedPortError, SerialDevice, open_port, serial_devices
 from machine.notices import say
 from machine.pipeline.requests import BAUD
 from machine.printing.destination import AtPrinter, Simulated
-from machine.simulator.contact.probe import ProbedTable
+from machine.simulator.contact import ProbedTable
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 from profiles.files import lock

@@ -1,17 +1,20 @@
-"""The board of a simulated printer: its build options, clock, motion, heaters and fan, and the words its commands read."""
+"""The board of a simulated printer: its build options, clock, motion, heaters and fan, and the orders it is given."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
+from typing import NamedTuple
 
 from machine.firmware import simulation_of
-from machine.simulator.contact.probe import ProbedTable
+from machine.gcode.line_text import MESSAGES
+from machine.gcode.words import read_values, read_words
+from machine.simulator.contact import ProbedTable
 from machine.simulator.motion import Motion, WordValues
 from profiles.machine import Machine
 
 # None: done, answered with ok; a text: its own ok; else the virtual times at which a slow command wants to look again.
 Work = Iterator[float] | str | None
-Command = Callable[["Board", WordValues, str], Work]
+Command = Callable[["Board", "Order"], Work]
 
 NOZZLE_S, BED_S = 60.0, 240.0  # time constants of a 40 W hot end and a 300 W plate
 EVENTS = 10000  # kept where the moves are not all kept either
@@ -19,6 +22,28 @@ ROOM_C = 20.0
 GUARD_S, GUARD_C = 40.0, 4.0  # Marlin's THERMAL_PROTECTION_PERIOD and _HYSTERESIS
 WATCH_S = 40.0  # Marlin's WATCH_TEMP_PERIOD: a heater that has a target must have become warmer by then
 CALM_C = 1.0  # as near to its target a heater counts as there
+
+
+class Order(NamedTuple):
+    """A command as words.split_command parts it into name and rest."""
+
+    name: str
+    rest: str
+
+    @property
+    def text(self) -> str:
+        """The whole command."""
+        return self.name + self.rest
+
+    @property
+    def words(self) -> WordValues:
+        """Its words; a text that is shown has none."""
+        return {} if self.name in MESSAGES else dict(read_words(self.rest))
+
+    @property
+    def values(self) -> dict[str, str]:
+        """KEY=VALUE of a macro."""
+        return read_values(self.rest)
 
 
 @dataclass(frozen=True)
@@ -154,6 +179,11 @@ class Board:
             self.troubles.append((self.now_s, what))
         if self._most_events is not None and len(self.events) > 2 * self._most_events:
             del self.events[: self._most_events]
+
+    def refuse(self, text: str) -> None:
+        """Say that a command is not known."""
+        self.unknown += 1
+        self.say(self.rules.unknown.format(text))
 
     def temperatures(self) -> str:
         """Nozzle and bed as the firmware reports them."""

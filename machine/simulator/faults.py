@@ -1,7 +1,7 @@
 """Fault scripts: what goes wrong on a serial line and in a printer, where or how often, the same at every run of a seed."""
 
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf, log
 from pathlib import Path
@@ -22,9 +22,6 @@ BYTE_KINDS: tuple[Kind, ...] = get_args(ByteKind)
 OK_KINDS: tuple[Kind, ...] = get_args(OkKind)
 MOMENT_KINDS: tuple[Kind, ...] = get_args(MomentKind)
 KINDS = BYTE_KINDS + OK_KINDS + MOMENT_KINDS
-LINE_BYTES = 36  # of a stroke on the wire, so that byte faults fall among the lines
-MOST_S = 3.0  # that random delays and stalls last
-HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # what a sender can heal without stopping
 
 # Keys of a fault in a file beside kind, place and direction, with the kinds that know them.
 KEYS: dict[str, tuple[Kind, ...]] = {
@@ -90,28 +87,6 @@ def units_of(kind: Kind) -> tuple[Unit, ...]:
     if kind in BYTE_KINDS:
         return ("byte",)
     return ("answer",) if kind in OK_KINDS else ("line", "byte", "answer")
-
-
-def random_script(
-    seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS, line_bytes: int = LINE_BYTES
-) -> FaultScript:
-    """`count` faults of these kinds at random places of those lines, the same for the same seed.
-
-    line_bytes: how long a line is on the wire, so that byte faults fall among them. Answers are taken to be half as long. One in
-    eight of stalls, blocks and disconnections lasts for ever.
-    """
-    rng = random.Random(seed)
-    return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines, line_bytes) for _ in range(count)), seed)
-
-
-def _random_fault(rng: random.Random, kind: Kind, lines: range, line_bytes: int) -> Fault:
-    line, to_host = rng.choice(lines), rng.random() < 0.5
-    seconds = inf if rng.random() < 0.125 and kind != "delay" else rng.uniform(0.05, MOST_S)
-    if kind in BYTE_KINDS:
-        at = int((line + rng.random()) * line_bytes / (2 if to_host else 1))
-        return Fault(kind, at, to_host, rng.randrange(8), seconds=seconds)
-    value = max(1, line - rng.randint(-2, 12)) if kind == "spurious resend" else None
-    return Fault(kind, line, value=value, seconds=seconds)
 
 
 def read_script(path: Path) -> FaultScript:

@@ -10,13 +10,10 @@ from math import inf
 
 from machine.firmware import dialect_of
 from machine.gcode.commands import PATHS
-from machine.gcode.line_text import MESSAGES
-from machine.gcode.words import read_values, read_words, split_command
-from machine.simulator.board import Board, BuildOptions, Work
-from machine.simulator.commands import COMMANDS
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.macros import command_of
-from machine.simulator.motion_commands import move
+from machine.gcode.words import read_words, split_command
+from machine.simulator.board import Board, BuildOptions, Order, Work
+from machine.simulator.commands import command_of, move
+from machine.simulator.contact import ProbedTable
 from machine.simulator.receiver import EmergencyParser, Receiver
 from machine.simulator.record import Record, record_of
 from profiles.machine import Machine
@@ -48,7 +45,6 @@ class SimulatedFirmware:
         self._said: list[str] = []
         self.board = Board(machine, self._build, self._said.append, kept_moves, table)
         self._rules = self.board.rules
-        self._macros = dialect_of(machine).macros
         self.board.busy_every_s = self._busy_default_s = busy_s if self._build.busy and self._rules.has_build_options else 0.0
         self._receiver = Receiver(self._rules, dialect_of(machine).longest_line, self._build.rx_ring, self._build.checksums)
         self._room = (self._build.queue if self._rules.has_build_options else None) or self._rules.queue_lines
@@ -261,7 +257,7 @@ class SimulatedFirmware:
                 if not planner.free(board.now_s):
                     self._sleep(planner.next_s())
                     return
-                answer = move(board, dict(read_words(rest)), text)
+                answer = move(board, dict(read_words(rest)))
             else:
                 answer = self._begin(text, name, rest)
                 if self.dead:
@@ -285,17 +281,12 @@ class SimulatedFirmware:
         if name == "M112":
             self._stop_at_once()
             return None
-        if self._macros:
-            macro = command_of(name.upper())
-            if macro is not None:
-                return macro(self.board, read_values(rest))
-        command = COMMANDS.get(name) if name not in self._rules.lacks else None
+        command = command_of(self.board, name)
         if command is None:
             if not (self._build.realtime and name in ("S0", "P0", "R0")):
-                self.board.unknown += 1
-                self._said.append(self._rules.unknown.format(text))
+                self.board.refuse(text)
             return None
-        answer = command(self.board, {} if name in MESSAGES else dict(read_words(rest)), name + rest)
+        answer = command(self.board, Order(name, rest))
         if self.board.number is not None:
             self._receiver.last, self.board.number = self.board.number, None
         return answer

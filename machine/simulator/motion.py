@@ -7,7 +7,7 @@ from machine.firmware import simulation_of
 from machine.firmware.simulation import SimulatedSettings
 from machine.gcode.arcs import arc_centre, chords, sweep_rad
 from machine.gcode.modes import Modes, axes_of
-from machine.kinematics.coordinates import origin_mm
+from machine.kinematics.table import origin_mm
 from machine.simulator.planner import Axes, ExecutedMoves, Planner, block_of
 from mdp.pose import Pose, rotation, shift
 from profiles.machine import Machine

@@ -13,13 +13,12 @@ from time import monotonic
 from typing import Any, Self
 
 from machine.simulator.board import BuildOptions, build_options
-from machine.simulator.cable import Cable
-from machine.simulator.contact.probe import ProbedTable
+from machine.simulator.cable import Cable, Uart
+from machine.simulator.contact import ProbedTable
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import BUSY_S, SimulatedFirmware
 from machine.simulator.record import Record
 from machine.simulator.terminal import Server, Terminal, terminals_exist
-from machine.simulator.uart import Uart
 from profiles.machine import Machine
 
 UNREAD_BYTES = 1 << 20  # answers kept for a host that does not read; older ones are dropped beyond

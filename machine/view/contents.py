@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from machine.gcode.reader.parsed import ParsedProgram
 from machine.program import Alternative, Program, joints_of_print
-from machine.view import findings, layers, paths, scene
+from machine.view import layers, paths, scene
 from machine.view.encoding import pack
-from machine.view.front import front_records
-from machine.view.parts import page_colours
+from machine.view.parts import front_records, page_colours
 from machine.view.report import parts_report, print_report, with_alternatives
 from machine.view.text import line_patterns
 from mdp.decomposition import Decomposition
@@ -67,7 +66,7 @@ def of_print(
         "thinned": {"rows": count, "kept": len(shown)} if len(shown) < count else None,
         "parts": _with_colours(_parts(program, by_layer, ends_s, shown, solids)),
         "front": [] if decomposition is None else front_records(decomposition),
-        "findings": findings.finding_records(run, profile.machine, known, shown),
+        "findings": scene.finding_records(run, profile.machine, known, shown),
         "report": print_report(
             program,
             profile,

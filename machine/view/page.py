@@ -1,13 +1,17 @@
-"""Page: the template, its scripts and a packed block put together into one HTML file that fetches nothing."""
+"""Page: the template, its scripts and a packed block put together into one HTML file that fetches nothing.
+
+ES modules that import each other become one script that imports nothing.
+"""
 
 import base64
 import re
 from collections.abc import Sequence
+from graphlib import TopologicalSorter
+from hashlib import sha256
 from html import escape
 from pathlib import Path
 
 from machine.program import Alternative, Program
-from machine.view.bundle import bundle, hash_source
 from machine.view.contents import compared, of_parts, of_print
 from machine.view.encoding import with_header
 from mdp.decomposition import Decomposition
@@ -16,6 +20,8 @@ from profiles.profile import Profile
 TEMPLATE = Path(__file__).parent / "template"
 MARKER = re.compile(r"<!--(?:TITLE|CSP|DATA)-->|/\*(?:STYLE|SCRIPT)\*/")
 DATA = b'<script type="application/octet-stream" id="tiltprint">'
+IMPORT = re.compile(r'^import \{ (.*) \} from "(.*)";$', re.MULTILINE)
+EXPORT = re.compile(r"^export ((?:async )?function|const|class) ([\w$]+)", re.MULTILINE)
 
 
 def parts_page(decomposition: Decomposition, profile: Profile, alternatives: Sequence[Alternative] = ()) -> bytes:
@@ -45,8 +51,7 @@ def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> byte
 
 
 def page(title: str, block: bytes, live: bool = False) -> bytes:
-    """The HTML file. title: any text; block: from machine.view.bundle import bundle, hash_source
-    from machine.view.contents; live: it may ask its own server for the state."""
+    """The HTML file. title: any text; block: from machine.view.contents; live: it may ask its own server for the state."""
     style, script, body = _template()
     put = {
         "<!--TITLE-->": escape(title),
@@ -68,3 +73,35 @@ def policy(style: str, script: str, live: bool) -> str:
 def _template() -> tuple[str, str, str]:
     """Style, scripts as one, and the page around them."""
     return (TEMPLATE / "style.css").read_text("utf-8"), bundle(TEMPLATE / "main.js"), (TEMPLATE / "page.html").read_text("utf-8")
+
+
+def bundle(entry: Path) -> str:
+    """The script of a module and of all that it imports. Each keeps its names to itself: it is a function that gives what it
+    exports, known to the others as modules["FOLDER/NAME"]. Raises CycleError."""
+    texts, waiting = dict[Path, str](), [entry.resolve()]
+    while waiting:
+        file = waiting.pop()
+        if file not in texts:
+            texts[file] = file.read_text("utf-8")
+            waiting += _imported(file, texts[file])
+    order = TopologicalSorter({file: sorted(_imported(file, text)) for file, text in sorted(texts.items())}).static_order()
+    return "\n".join(['"use strict";', "const modules = {};", *(_module(file, texts[file]) for file in order)])
+
+
+def _imported(file: Path, text: str) -> list[Path]:
+    return [(file.parent / name).resolve() for _, name in IMPORT.findall(text)]
+
+
+def _module(file: Path, text: str) -> str:
+    exported = ", ".join(name for _, name in EXPORT.findall(text))
+    text = IMPORT.sub(lambda taken: f"const {{ {taken[1]} }} = {_known(file.parent / taken[2])};", EXPORT.sub(r"\1 \2", text))
+    return f"{_known(file)} = (() => {{\n{text}return {{ {exported} }};\n}})();"
+
+
+def _known(file: Path) -> str:
+    return f'modules["{file.resolve().parent.name}/{file.stem}"]'
+
+
+def hash_source(text: str) -> str:
+    """How a content security policy names the one script or style that a page may have."""
+    return f"'sha256-{base64.b64encode(sha256(text.encode()).digest()).decode()}'"

@@ -1,11 +1,17 @@
-"""Parts: how pictures and pages show them: their colours, and which of their faces are risky before and after the cuts."""
+"""Parts: how pictures and pages show them: their colours, and which of their faces are risky before and after the cuts;
+and the ways to cut a model that a search has found.
+"""
+
+import shlex
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.decomposition import ORDER_TOLERANCE_MM, Part
+from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, FrontRow, Part
 from mdp.mesh import Floats
 from mdp.overhang import risky_above, risky_upright
+from mdp.save import front_values, plane_values
 from profiles.profile import Profile
 
 # Okabe and Ito's colours for all kinds of colour vision, without vermilion, which is too near to the red of risky faces.
@@ -45,3 +51,21 @@ def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> ND
 def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> float:
     """The area of those faces."""
     return float(part.mesh.areas_mm2[risky_before(part, angle_deg, count_platform_faces)].sum())
+
+
+def front_record(row: FrontRow) -> dict[str, Any]:
+    """A row of a front as pages know it. planes: in print order, from part 2 on; why: of the chosen row, else ""."""
+    planes = [plane_values(plane) for plane in reversed(row.planes)]
+    return front_values(row) | {"why": row.reason, "planes": planes}
+
+
+def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:
+    """The rows of a front with the colours of their parts, and the command that takes each."""
+    return [
+        {
+            **front_record(row),
+            "colours": page_colours(row.parts),
+            "command": f"tiltprint decompose {shlex.quote(decomposition.name)} --parts {row.parts}",
+        }
+        for row in decomposition.front
+    ]

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
-SAME = 1e-6  # cosine of a right angle, and share of a box's size by which its corners may lie off
+SAME = 1e-6  # cosine of a right angle, and share of a box's volume that a solid within may lack
 PLURAL = {"is": "are", "changes": "change"}
 MOST_TOLD = 8  # settings in a sentence
 THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
@@ -145,7 +145,7 @@ class Marks:
             return None
         mesh = Mesh(self._moved(solid.vertices), solid.faces.astype(np.int32))
         room = self._box(*_bounds(item)) if self._several and item.surfaces(PART) else None
-        box = _box_at(mesh.vertices)
+        box = _box_around(mesh.vertices)
         if box is None or not isclose(float(np.prod(np.subtract(box.max_mm, box.min_mm))), mesh.volume_mm3, rel_tol=SAME):
             return MeshVolume(self._path, mesh, room)
         return _within(box, room)
@@ -153,7 +153,7 @@ class Marks:
     @cached_property
     def _axes(self) -> tuple[Vector, Vector, Vector] | None:
         """The axes of what is level in the file, where it lies now; None: it is level there, too."""
-        cube = _box_at(corners((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) @ self._turn.T)
+        cube = _box_around(corners((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) @ self._turn.T)
         assert cube is not None  # a rotation leaves it one
         return cube.axes
 
@@ -196,8 +196,9 @@ def _within(box: Zone, room: Zone | None) -> Zone:
     return Zone((x0, y0, z0), (x1, y1, z1))
 
 
-def _box_at(points: Floats) -> Zone | None:
-    """The box with these (8, 3) corners; None where they are those of none."""
+def _box_around(points: Floats) -> Zone | None:
+    """The box whose corners (8, 3) points may be: around them, along the shortest three lines from the first that are at right
+    angles. None: there are none, or there are not eight points. Whether it is one the volume between them tells."""
     if len(points) != 8:
         return None
     sides = points[1:] - points[0]
@@ -217,10 +218,7 @@ def _box_at(points: Floats) -> Zone | None:
     axes[2] *= np.sign(np.linalg.det(axes))
     rows = [(x, y, z) for x, y, z in axes.tolist()]
     level = np.allclose(axes, np.eye(3), rtol=0.0, atol=SAME)
-    box = _box_along(None if level else (rows[0], rows[1], rows[2]), points)
-    places, low, high = box.along(points), np.array(box.min_mm), np.array(box.max_mm)
-    near = np.minimum(np.abs(places - low), np.abs(places - high)).max()
-    return box if near <= SAME * lengths[-1] and len(np.unique(places > 0.5 * (low + high), axis=0)) == 8 else None
+    return _box_along(None if level else (rows[0], rows[1], rows[2]), points)
 
 
 def _box_along(axes: tuple[Vector, Vector, Vector] | None, points: Floats) -> Zone:

@@ -258,7 +258,7 @@ def check(remainder: Remainder, limits: Bounds, step_mm: float, direction: Ints,
     return Feasibility(reason, *(column[at] for column in columns))
 
 
-def refusals(scored: ScoredCandidates, least_gain_mm2: float, is_weak: Callable[[Plane], bool]) -> dict[Reason, int]:
+def count_rejected(scored: ScoredCandidates, least_gain_mm2: float, is_weak: Callable[[Plane], bool]) -> dict[Reason, int]:
     """How many of all planes of a solid each reason takes, to report why nothing can be cut. scored: at least those of its
     candidates that gain least_gain_mm2; is_weak: called only for planes that pass every other check."""
     limits, step_mm = scored.limits, scored.limits.step_mm

@@ -34,6 +34,14 @@ class Node:
     cut_cost: CutCost = UNCUT
 
     @property
+    def root(self) -> "Node":
+        """The whole model."""
+        node = self
+        while node.parent is not None:
+            node = node.parent
+        return node
+
+    @property
     def path(self) -> "list[Node]":
         """The nodes from the whole model to this one: the k-th of them has k cuts."""
         return [self] if self.parent is None else [*self.parent.path, self]
@@ -107,7 +115,7 @@ class Node:
     @property
     def saved_mm2(self) -> float:
         """How much less it costs when the search stops here than the whole model does."""
-        return self.path[0].cost_mm2 - self.cost_mm2
+        return self.root.cost_mm2 - self.cost_mm2
 
     @cached_property
     def stairs_mm2(self) -> float:

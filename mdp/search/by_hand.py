@@ -1,4 +1,4 @@
-"""Planes by hand: a person's cuts made in turn, completed by the search where they are left open, or refused with the reason.
+"""Planes by hand: a person's cuts made in turn, completed by the search where they are left open, or rejected with the reason.
 
 Only what cannot be printed forbids a person's plane: it misses the model, cuts the platform, lets something float, is out of
 the machine's reach, lets the head meet the table, leaves a sliver or a base that the nozzle could break, or passes through a zone
@@ -219,17 +219,24 @@ def rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
 
 
 def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """A refusal where the head would meet what stands beside the limbs of a plane."""
+    """A rejection where the head would meet what stands beside the limbs of a plane."""
     if plane.limbs_mm is None or problem.is_clear(node, plane):
         return None
     return Rejection(node, REASONS[Reason.STANDING], Reason.STANDING)
 
 
 def _unfit(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """Why a plane cannot cut a node, what stands beside limbs left aside: what the sweep finds, or no pose serves the part."""
-    why = _rejection(problem, node, plane)
-    if why is not None or not problem.settings.clearance:
-        return why
+    """Why a plane cannot cut a node, what stands beside limbs left aside: it cuts nothing, the sweep finds something against it,
+    or no pose serves the part."""
+    missed = _miss(problem, node, plane)
+    if missed is not None:
+        return Rejection(node, missed)
+    limits = _limits(problem, plane.normal[None])
+    reason, sliver_mm = problem.check(node, plane, limits)
+    if reason != Reason.FEASIBLE:
+        return Rejection(node, _sentence(problem, node, plane, limits, reason, sliver_mm), reason)
+    if not problem.settings.clearance:
+        return None
     points, machine = node.corners_cut(plane) + problem.place_mm, problem.machine
     if len(points) == 0:
         return Rejection(node, "nothing lies above its plane", Reason.REACH)
@@ -246,15 +253,8 @@ def _limits(problem: Problem, directions: Floats) -> Bounds:
     return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
 
 
-def _rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """Why a person's plane may not cut a node, in a sentence with its numbers; None: the sweep finds nothing against it."""
-    missed = _miss(problem, node, plane)
-    if missed is not None:
-        return Rejection(node, missed)
-    limits, settings = _limits(problem, plane.normal[None]), problem.settings
-    reason, sliver_mm = problem.check(node, plane, limits)
-    if reason == Reason.FEASIBLE:
-        return None
+def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason: Reason, sliver_mm: float) -> str:
+    """What the sweep finds against a plane, with its numbers."""
     text = REASONS[reason]
     match reason:
         case Reason.PLATFORM:
@@ -274,8 +274,8 @@ def _rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
             text = f"its plane would pass through zone {problem.zones.crossed(plane)} of [[keep]], which stays whole"
         case Reason.WEAK:
             stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
-            text += f": {settings.nozzle_load_n:g} N at its top are {stress}"
-    return Rejection(node, text, reason)
+            text += f": {problem.settings.nozzle_load_n:g} N at its top are {stress}"
+    return text
 
 
 def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
@@ -314,7 +314,7 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
         if reason[row] == Reason.FEASIBLE:
             offset = float(offset_mm[row]) if planned.offset_mm is None else planned.offset_mm
             plane = Plane(directions[direction[row]], offset)
-            if _rejection(problem, node, plane) is None and problem.cut(node, plane) is not None:
+            if _unfit(problem, node, plane) is None and problem.cut(node, plane) is not None:
                 return plane
     counts = [(int((reason == why).sum()), text) for why, text in REASONS.items()]
     shares = "; ".join(f"{count} because {text}" for count, text in counts if count)

@@ -22,10 +22,10 @@ from mdp.ranking.candidates import (
     ScoredCandidates,
     bounds_of,
     check,
+    count_rejected,
     directions,
     lost_mm2,
     platform_disc,
-    refusals,
     residual_mm2,
     score_candidates,
     seam_mm2,
@@ -153,10 +153,10 @@ class Problem:
             self._root_scored = scored
         return CandidateTable(scored, node, self.model, self.least_gain_mm2, partial(self.is_weak, node))
 
-    def refusals(self) -> dict[Reason, int]:
+    def count_rejected(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
         scored, is_weak = self._root_scored or self.table(self.root).scored, partial(self.is_weak, self.root)
-        return refusals(scored, self.least_gain_mm2, is_weak)
+        return count_rejected(scored, self.least_gain_mm2, is_weak)
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""

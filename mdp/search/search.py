@@ -258,7 +258,7 @@ def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> l
     elif rows > 1 or parts > 1 or request.parts == 1:
         notes += _fewer_parts(request.parts, parts, "the search found")
     else:
-        counts = problem.refusals()
+        counts = problem.count_rejected()
         shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
         notes.append(f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}")
     if zones.no_seam.anywhere and problem.terms.seam_mm <= 0.0:

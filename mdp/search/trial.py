@@ -32,7 +32,7 @@ from profiles.frozen import Vector
 from profiles.profile import Profile
 
 MOST_TRIED = 16  # places for a plane that the sweep finds nothing against
-APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were refused;
+APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were rejected;
 # once a place is found, those passed over on the way to it are searched by bisection
 MOST_PLACES = 20  # of an obstacle that are marked
 
@@ -55,7 +55,7 @@ class Touch:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """places_mm: of the workpiece frame, where what a plane is refused for lies; touch: the head that would meet the table."""
+    """places_mm: of the workpiece frame, where what a plane is rejected for lies; touch: the head that would meet the table."""
 
     places_mm: tuple[Vector, ...] = ()
     touch: Touch | None = None
@@ -65,7 +65,7 @@ class Obstacle:
 class Trial:
     """parts: those that could be cut off, from the second in print order on, None for the others. refused: why the part of this
     number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can. unchecked:
-    how many parts, from the second on, have not been looked at yet: they may still be refused, the figures stand."""
+    how many parts, from the second on, have not been looked at yet: they may still be rejected, the figures stand."""
 
     parts: tuple[PartForecast | None, ...]
     refused_part: int = 0
@@ -94,15 +94,15 @@ class Trials:
         order = planes[::-1]
         self._keep_alike(order)
         known = len(self._keys)
-        refused = self._cut_off(order[known : int(min(known + most_cuts, len(order) - 1))])
+        rejected = self._cut_off(order[known : int(min(known + most_cuts, len(order) - 1))])
         done = len(self._keys)
-        if refused is None and done < len(order):
-            refused = self._look(order[done])
-        if refused is not None:
+        if rejected is None and done < len(order):
+            rejected = self._look(order[done])
+        if rejected is not None:
             parts, _ = self._surface.parts(self._named(order[:done]))
-            obstacle = find_refused(self._problem, refused, order[done])
+            obstacle = obstacle_of(self._problem, rejected, order[done])
             unknown = [None] * (len(order) - done)
-            return Trial((*unknown, *parts[::-1]), len(order) + 1 - done, refused.text, obstacle=obstacle)
+            return Trial((*unknown, *parts[::-1]), len(order) + 1 - done, rejected.text, obstacle=obstacle)
         parts, left_mm2 = self._surface.parts(self._named(order))
         support_mm2, seam_mm = left_mm2 + sum(part.support_mm2 for part in parts), sum(part.rim_mm for part in parts)
         return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=max(len(order) - 1 - done, 0))
@@ -129,17 +129,17 @@ class Trials:
         if not self._cut_later(planes, number):
             return None
         apart_mm = APART_SHARE * float(np.ptp(self._problem.mesh.vertices @ planes[number - 2].normal))
-        refused, passed_over = list[Plane](), list[Plane]()
+        rejected, passed_over = list[Plane](), list[Plane]()
         for plane in planes_near(self._problem, self._node, planes[number - 2]):
-            if any(_are_near(plane, other, apart_mm) for other in refused):
+            if any(_are_near(plane, other, apart_mm) for other in rejected):
                 passed_over.append(plane)
             elif self._can_take(planes, number, plane):
                 nearer = [other for other in passed_over if _are_near(plane, other, apart_mm)]
                 first = bisect_left(nearer, True, key=lambda other: self._can_take(planes, number, other))
                 return (*nearer, plane)[first]
             else:
-                refused.append(plane)
-                if len(refused) == MOST_TRIED:
+                rejected.append(plane)
+                if len(rejected) == MOST_TRIED:
                     break
         return None
 
@@ -192,21 +192,21 @@ def _key(plane: Plane) -> Key:
     return *plane.normal.tolist(), plane.offset_mm, *limbs_mm
 
 
-def find_refused(problem: Problem, refused: Rejection, plane: Plane) -> Obstacle | None:
+def obstacle_of(problem: Problem, rejected: Rejection, plane: Plane) -> Obstacle | None:
     """Where a plane that may not cut a node is in the way; None where that is not known."""
-    named = name_limbs(refused.node, plane)
+    named = name_limbs(rejected.node, plane)
     if isinstance(named, Rejection):
         return None
-    if refused.reason == Reason.CLEARANCE:
-        return Obstacle(touch=_touch(problem, refused.node, named))
-    places = _refused_places(problem, refused, named)
+    if rejected.reason == Reason.CLEARANCE:
+        return Obstacle(touch=_touch(problem, rejected.node, named))
+    places = _places_against(problem, rejected, named)
     return Obstacle(tuple(_vector(place) for place in places[:MOST_PLACES])) if len(places) else None
 
 
-def _refused_places(problem: Problem, refused: Rejection, plane: Plane) -> Sequence[Floats]:
+def _places_against(problem: Problem, rejected: Rejection, plane: Plane) -> Sequence[Floats]:
     """The places that speak against a plane; none where that is not known."""
-    node = refused.node
-    match refused.reason:
+    node = rejected.node
+    match rejected.reason:
         case Reason.PLATFORM:
             centre, radius = problem.platform_disc
             across = plane.normal[:2] / max(float(np.hypot(*plane.normal[:2])), 1e-12)

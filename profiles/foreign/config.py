@@ -5,10 +5,11 @@ The other programs name the same things otherwise, which a table tells, so the r
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+OF_NOZZLE = "% of the nozzle"  # ends a width that is in percent of a nozzle that the file does not tell
 NOTHING = ("", "nil")  # PrusaSlicer's filament overrides are nil where the printer's value holds
 NAMES = (  # of PrusaSlicer, OrcaSlicer and Cura; empty: as PrusaSlicer has it, or nothing
     ("extrusion_width", "line_width", "line_width"),
@@ -112,19 +113,21 @@ NAMES = (  # of PrusaSlicer, OrcaSlicer and Cura; empty: as PrusaSlicer has it, 
 ORCASLICERS = {orcaslicers: key for key, orcaslicers, _ in NAMES if orcaslicers}
 CURAS = {curas: key for key, _, curas in NAMES if curas}
 
-Entry = tuple[str, str]  # name and text of a setting as its file has them
+Entry = tuple[str, str]  # name of a setting as its file has it, and its text as PrusaSlicer would have it
 
 
 @dataclass(frozen=True)
 class Config:
     """What a file says. entries: by PrusaSlicer's key; unknown: names in the file that no key stands for; process, material: what
-    the presets are called, empty where the file does not tell."""
+    the presets are called, empty where the file does not tell. own: of entries whose text is not the file's, the file's own text
+    and what was made of it, "" where the two mean the same."""
 
     program: str
     entries: Mapping[str, Entry]
     unknown: tuple[str, ...] = ()
     process: str = ""
     material: str = ""
+    own: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def text(self, key: str) -> str | None:
         """The text of a key, of the first extruder where there are several; None where nothing is said."""
@@ -167,13 +170,17 @@ def finite(text: str) -> float | None:
     return number if number is not None and isfinite(number) else None
 
 
-def width_of_nozzle(text: str, nozzle: str) -> str:
-    """A line's width that is in percent of the nozzle, in mm, "0" where the nozzle is not told; any other as it is."""
-    percent = finite(text.strip()[:-1]) if text.strip().endswith("%") else None
+def width_of_nozzle(text: str, nozzle: str) -> tuple[str, str]:
+    """A line's width that is in percent of the nozzle, in mm, and how it was worked out; ending in OF_NOZZLE where the nozzle is
+    not told; any other as it is."""
+    first = first_of(text)
+    percent = finite(first[:-1]) if first.endswith("%") else None
     if percent is None:
-        return text
+        return text, ""
     diameter_mm = finite(first_of(nozzle))
-    return f"{percent / 100.0 * diameter_mm:g}" if diameter_mm is not None else "0"
+    if diameter_mm is None:
+        return first[:-1] + OF_NOZZLE, ""
+    return f"{percent / 100.0 * diameter_mm:g}", f"{percent:g} % of nozzle_diameter ({diameter_mm:g})"
 
 
 def first_of(text: str) -> str:

@@ -7,7 +7,7 @@ auto_extrusion_width); where it means "the firmware's", nothing is taken.
 from collections.abc import Callable
 from math import pi
 
-from profiles.foreign.config import Config
+from profiles.foreign.config import OF_NOZZLE, Config
 
 AUTO_WIDTH, AUTO_NARROW = 1.125, 1.0  # of the nozzle: walls and infill, uppermost skins and support
 ROUND_ENDS = 1.0 - pi / 4.0  # of a bead's height: by how much beads side by side overlap
@@ -16,6 +16,12 @@ ROUND_ENDS = 1.0 - pi / 4.0  # of a bead's height: by how much beads side by sid
 Converted = tuple[float | bool | str | None, str]
 Convert = Callable[[Config, str], Converted]
 NO_NUMBER: Converted = (None, "is no number")
+
+
+def no_number(config: Config, key: str) -> Converted:
+    """Why a setting gives no number."""
+    is_of_nozzle = (config.text(key) or "").endswith(OF_NOZZLE)
+    return (None, "a percentage of the nozzle, which the file does not tell") if is_of_nozzle else NO_NUMBER
 
 
 def number(config: Config, key: str) -> Converted:
@@ -54,7 +60,7 @@ def above_zero(zero: str) -> Convert:
     def convert(config: Config, key: str) -> Converted:
         value = config.number(key)
         if value is None:
-            return NO_NUMBER
+            return no_number(config, key)
         return (value, "") if value > 0.0 else (None, f"0: {zero}")
 
     return convert
@@ -76,7 +82,7 @@ def part_of(base: str, zero: str = "") -> Convert:
         if value is not None:
             return (value, "") if value > 0.0 or not zero else (None, f"0: {zero}")
         if part is None:
-            return NO_NUMBER
+            return no_number(config, key)
         if whole_value is None:
             return None, f"a percentage of {base}, which the file does not tell"
         return round(part * whole_value, 6), f"{100.0 * part:g} % of {base} ({whole_value:g})"
@@ -110,6 +116,8 @@ def width(height: str = "layer_height", auto: float = AUTO_WIDTH) -> Convert:
             value, how = part_of(height, "by the nozzle")(config, name)
             if value is not None:
                 return value, how if name == key else f"0 is {name}"
+            if config.text(name) is not None and config.number(name) != 0.0:
+                return None, how if name == key else f"0 is {name}, {how}"
         nozzle = config.number("nozzle_diameter")
         if nozzle is None:
             return None, "0 is by the nozzle, which the file does not tell"

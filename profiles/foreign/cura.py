@@ -7,7 +7,7 @@ cura/Settings/CuraContainerStack.py). Names: Cura, resources/definitions/fdmprin
 
 import configparser
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from itertools import zip_longest
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,7 +16,7 @@ from zipfile import ZipFile
 from profiles.errors import ProfileError, first_line, reason
 from profiles.files import DAMAGED_ZIP
 from profiles.foreign.config import CURAS, Config, Entry, finite, without_still_fan
-from profiles.foreign.cura_formulas import worked_out
+from profiles.foreign.cura_formulas import USUAL, worked_out
 
 PROGRAM = "Cura"
 SLICER_FILE = re.compile(r"Cura/(.*)\.inst\.cfg$")  # members of a slicer file that have settings
@@ -52,6 +52,7 @@ DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, configparser.Error, Elemen
 MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
 PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
 RAFT_LAYERS = {"raft_base_layers": 1, "raft_interface_layers": 1, "raft_surface_layers": 2}  # with Cura's own numbers
+BESIDE_OTHERS = frozenset({*RAFT_LAYERS, "layer_0_z_overlap"})  # read by _raft
 WORDS = {
     "fill_pattern": {
         "lines": "rectilinear",
@@ -74,7 +75,7 @@ def read_profile(file: Path) -> Config:
 
 def of_values(values: Mapping[str, str], name: str = "") -> Config:
     """Settings under Cura's names, formulas worked out where that can be."""
-    entries, formulas, known = dict[str, Entry](), list[str](), worked_out(values)
+    entries, hows, formulas, known = dict[str, Entry](), dict[str, str](), list[str](), worked_out(values)
     for theirs, text in known.items():
         switch, word, off = HOLDS.get(theirs, ("", "", None))
         if text.startswith("="):
@@ -83,27 +84,39 @@ def of_values(values: Mapping[str, str], name: str = "") -> Config:
         key = CURAS.get(theirs, theirs)
         if (said := known.get(switch, word)).lower() != word and not said.startswith("="):
             entries |= {key: (theirs, off)} if off is not None else {}
-        elif theirs not in (*RAFT_LAYERS, "layer_0_z_overlap"):  # read beside others (_raft)
+            hows[key] = f"{switch} is {said}"
+        elif (theirs in values or theirs in CURAS) and theirs not in BESIDE_OTHERS:
             entries[key] = theirs, _said(key, text)
-    if (angle_deg := finite(known.get("support_angle", ""))) is not None:  # Cura's is from the vertical
+            if values.get(theirs, text) != text:
+                hows[key] = f"that is {text}"
+            elif theirs not in values:
+                hows[key] = f"Cura's own formula: {USUAL[theirs]}"
+    for theirs in {HOLDS[theirs][0] for theirs in HOLDS if theirs in values}:
+        entries.pop(theirs, None)
+    if (angle_deg := finite(known.get("support_angle", ""))) is not None:
         entries["support_material_threshold"] = "support_angle", f"{90.0 - angle_deg:g}"
-    entries = without_still_fan(entries | _raft(known))
-    return Config(PROGRAM, entries, tuple(f"{own} (a formula)" for own in formulas), name, name)
+        hows["support_material_threshold"] = "from the vertical, as here"
+    for key, theirs, text, how in _raft(known):
+        entries[key], hows[key] = (theirs, text), how
+    changed = {key: values.get(theirs, text) for key, (theirs, text) in entries.items() if values.get(theirs) != text}
+    own = {key: (text, hows.get(key, "")) for key, text in changed.items()}
+    unknown = tuple(f"{theirs} (a formula)" for theirs in formulas)
+    return Config(PROGRAM, without_still_fan(entries), unknown, name, name, own)
 
 
-def _raft(values: Mapping[str, str]) -> dict[str, Entry]:
-    """The number of raft layers and the gap above the raft, less what the first layer sinks into it.
+def _raft(values: Mapping[str, str]) -> Iterator[tuple[str, str, str, str]]:
+    """The number of raft layers and the gap above the raft, less what the first layer sinks into it. Of each the key, the name in
+    the file, the text, and how it was worked out.
 
     A value that the file does not give as a number is Cura's default: the sinking is half of the gap.
     """
-    entries = dict[str, Entry]()
     if (kind := values.get("adhesion_type", "")) and not kind.startswith("="):
-        layers = sum(_number(values.get(key, ""), usual) for key, usual in RAFT_LAYERS.items())
-        entries["raft_layers"] = "adhesion_type", f"{layers:g}" if kind == "raft" else "0"
+        counts = [_number(values.get(key, ""), usual) for key, usual in RAFT_LAYERS.items()] if kind == "raft" else [0.0]
+        yield "raft_layers", "adhesion_type", f"{sum(counts):g}", " + ".join(f"{count:g}" for count in counts) + " layers"
     if (gap_mm := finite(values.get("raft_airgap", ""))) is not None:
         into_mm = _number(values.get("layer_0_z_overlap", ""), 0.5 * gap_mm)
-        entries["raft_contact_distance"] = "raft_airgap", f"{max(gap_mm - into_mm, 0.0):g}"
-    return entries
+        less = f"{gap_mm:g} less {into_mm:g} (layer_0_z_overlap)"
+        yield "raft_contact_distance", "raft_airgap", f"{max(gap_mm - into_mm, 0.0):g}", less
 
 
 def _number(text: str, usual: float) -> float:

@@ -81,8 +81,9 @@ def _about(row: Row, said: str) -> str:
 
 def unused(config: Config) -> list[str]:
     """Names of theirs that no rule reads: what there is nothing like here, and what belongs to the machine."""
-    read = {source for kind in KINDS for _, source, _ in RULES[kind]} | CONDITIONS
-    return sorted({name for key, (name, _) in config.entries.items() if key not in read} | set(config.unknown))
+    keys = {source for kind in KINDS for _, source, _ in RULES[kind]} | CONDITIONS
+    read = {name for key, (name, _) in config.entries.items() if key in keys}
+    return sorted({name for name, _ in config.entries.values()} - read | set(config.unknown))
 
 
 def stay(profile: Imported) -> list[str]:
@@ -106,7 +107,9 @@ def _rows(config: Config, kind: str, base: str, sources: Collection[str] | None 
         if value and (refused := _refusal(base, kind, key, value)):
             value, how = "", refused
         done |= {key} if value else set()
-        yield Row(*config.entries[source], key, value, how)
+        name, theirs = config.entries[source]
+        text, worked_out = config.own.get(source, (theirs, ""))
+        yield Row(name, text, key, value, worked_out or how if value else how)
 
 
 def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str, Any], list[str]]:

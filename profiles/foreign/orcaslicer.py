@@ -6,6 +6,7 @@ PrusaSlicer's are of the layer's height.
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,23 +41,25 @@ def read_preset(file: Path, document: Mapping[str, Any]) -> Config:
     values.setdefault("nozzle_diameter", _nozzle(file, document))
     name, kind = str(document.get("name", file.stem)), TYPES.get(str(document.get("type", "")), "")
     config = of_values(values, name if kind == "process" else "", name if kind == "material" else "")
-    return config if not missing else Config(config.program, config.entries, (*config.unknown, missing), name, name)
+    return config if not missing else replace(config, unknown=(*config.unknown, missing), process=name, material=name)
 
 
 def of_values(values: Mapping[str, str], process: str = "", material: str = "") -> Config:
     """Settings under OrcaSlicer's names."""
-    entries: dict[str, Entry] = {}
+    entries, own = dict[str, Entry](), dict[str, tuple[str, str]]()
     for name, text in values.items():
         key = ORCASLICERS.get(name, name)
         if name in ORCASLICERS and key.endswith("extrusion_width"):
-            entries[key] = name, width_of_nozzle(text, values.get("nozzle_diameter", ""))
+            theirs, how = width_of_nozzle(text, values.get("nozzle_diameter", ""))
         else:
-            entries[key] = name, WORDS.get(key, {}).get(text, text)
+            theirs, how = WORDS.get(key, {}).get(text, text), ""
+        entries[key] = name, theirs
+        own |= {key: (text, how)} if theirs != text else {}
     plate = PLATES.get(values.get("curr_bed_type", ""), "hot_plate_temp")
-    if plate in values:
-        entries["bed_temperature"] = plate, values[plate]
+    if plate in entries:
+        entries["bed_temperature"] = entries.pop(plate)
     process, material = process or values.get("print_settings_id", ""), material or first_filament(values)
-    return Config(PROGRAM, without_still_fan(entries), (), process, material)
+    return Config(PROGRAM, without_still_fan(entries), (), process, material, own)
 
 
 def values_of(document: Mapping[str, Any]) -> dict[str, str]:

@@ -19,7 +19,7 @@ SECTION = re.compile(r"\[(.+)\]")
 # SuperSlicer has the widths of lines by their distance, too; its percentages of widths and of layers are of the nozzle, and
 # flows are percentages (supermerill/SuperSlicer, src/libslic3r/PrintConfig.cpp, ratio_over).
 OF_SUPERSLICER = frozenset({"extrusion_spacing", "perimeter_extrusion_spacing", "external_perimeter_extrusion_spacing"})
-OF_NOZZLE = ("extrusion_width", "min_layer_height", "max_layer_height")
+WIDTHS = ("extrusion_width", "min_layer_height", "max_layer_height")
 FLOWS = ("bridge_flow_ratio", "over_bridge_flow_ratio")
 SHOWN = 8  # presets that a sentence names
 JSON_BLOCK = re.compile(r"^; prusaslicer_json_config = begin\r?\n(.*?)^; prusaslicer_json_config = ", re.MULTILINE | re.DOTALL)
@@ -142,13 +142,14 @@ def _parents(text: str) -> Iterator[str]:
 def _config(values: Mapping[str, str], process: str, material: str) -> Config:
     if not OF_SUPERSLICER & values.keys():
         return Config("PrusaSlicer", {key: (key, value) for key, value in values.items()}, (), process, material)
-    entries = {key: (key, _said(key, value, values.get("nozzle_diameter", ""))) for key, value in values.items()}
-    return Config("SuperSlicer", entries, (), process, material)
+    said = {key: _said(key, value, values.get("nozzle_diameter", "")) for key, value in values.items()}
+    own = {key: (values[key], how) for key, (text, how) in said.items() if text != values[key]}
+    return Config("SuperSlicer", {key: (key, text) for key, (text, _) in said.items()}, (), process, material, own)
 
 
-def _said(key: str, text: str, nozzle: str) -> str:
-    """A value of SuperSlicer as PrusaSlicer would say it."""
-    if key.endswith(OF_NOZZLE):
+def _said(key: str, text: str, nozzle: str) -> tuple[str, str]:
+    """A value of SuperSlicer as PrusaSlicer would say it, and how it was worked out."""
+    if key.endswith(WIDTHS):
         return width_of_nozzle(text, nozzle)
     percent = finite(text[:-1]) if key in FLOWS and text.endswith("%") else None
-    return text if percent is None else f"{percent / 100.0:g}"
+    return (text, "") if percent is None else (f"{percent / 100.0:g}", "percent as a share")

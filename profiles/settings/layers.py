@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from profiles.frozen import Frozen, Vector, advanced, rare, simple
+from profiles.frozen import Effect, Frozen, Vector, advanced, rare, simple
 
 SkinPattern = Literal["monotonic", "rectilinear", "concentric"]
 
@@ -10,17 +10,19 @@ SkinPattern = Literal["monotonic", "rectilinear", "concentric"]
 class Layers(Frozen):
     """Size and turn of the model, heights of layers, widths of lines."""
 
-    name: str = rare("Name of the process")(..., "what people call it")
-    scale: float = advanced("Scale of the model", "size factor shrink enlarge", gt=0, le=100000)(
+    name: str = rare("Name of the process", effect=Effect.NONE)(..., "what people call it")
+    scale: float = advanced("Scale of the model", "size factor shrink enlarge", gt=0, le=100000, effect=Effect.FRONT)(
         1.0, "factor on the model's size before anything else"
     )
-    rotate_deg: Vector = advanced("Turns of the model", "orientation rotation")(
+    rotate_deg: Vector = advanced("Turns of the model", "orientation rotation", effect=Effect.FRONT)(
         (0.0, 0.0, 0.0), "turns of the model about x, then y, then z before anything else, deg"
     )
     self_supporting_angle_deg: float = simple(
-        "Steepest overhang without support", "threshold angle overhang angle supports", ge=0, le=85
+        "Steepest overhang without support", "threshold angle overhang angle supports", ge=0, le=85, effect=Effect.FRONT
     )(45.0, "steepest overhang, from the printing direction, that prints without support, deg")
-    layer_height_mm: float = simple("Layer height", "resolution quality thickness", ge=0.02, le=2)(0.2, "height of a layer, mm")
+    layer_height_mm: float = simple("Layer height", "resolution quality thickness", ge=0.02, le=2, effect=Effect.FRONT)(
+        0.2, "height of a layer, mm"
+    )
     first_layer_height_mm: float = simple("First layer height", "initial layer height thickness", ge=0.02, le=2)(
         0.2, "height of the first layer on the plate, mm"
     )
@@ -35,7 +37,7 @@ class Layers(Frozen):
     most_layer_height_mm: float = advanced("Thickest adaptive layer", "maximum layer height variable", ge=0.02, le=2)(
         0.28, "adaptive layers are not thicker: seven tenths of the nozzle still bond well, mm"
     )
-    line_width_mm: float = simple("Line width", "extrusion width", ge=0.1, le=4)(0.45, "width of a bead, mm")
+    line_width_mm: float = simple("Line width", "extrusion width", ge=0.1, le=4, effect=Effect.FRONT)(0.45, "width of a bead, mm")
     first_layer_line_width_mm: float | None = advanced("First layer line width", "initial layer extrusion width", ge=0.1, le=4)(
         None, "width of all beads of the first layer on the plate: wide ones stick; absent: as elsewhere, mm"
     )

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import model_validator
 
-from profiles.frozen import Frozen, advanced, rare, simple
+from profiles.frozen import Effect, Frozen, advanced, rare, simple
 
 ANY_MATERIAL_MM = 5.0  # what bridges in whatever is printed
 FARTHEST_MM = 1000.0  # no plate reaches so far from its turn axis
@@ -18,13 +18,13 @@ class Support(Frozen):
         0.5, "walls with less than this share of their width on plastic below count as overhanging"
     )
     bridge_longest_mm: float | None = advanced(
-        "Longest bridge without support", "bridging max bridge length don't support bridges", ge=1, le=100
+        "Longest bridge without support", "bridging max bridge length don't support bridges", ge=1, le=100, effect=Effect.FRONT
     )(
         None,
         "level places spanned by straight lines up to this long, held at both ends, print without support, mm; absent: the "
         "material's; 1: next to nothing is left without support",
     )
-    arch_longest_mm: float = advanced("Widest arch without support", "arches holes", ge=0, le=100)(
+    arch_longest_mm: float = advanced("Widest arch without support", "arches holes", ge=0, le=100, effect=Effect.FRONT)(
         6.0,
         "arches whose flat crown is no wider than this print without support, for each layer reaches little further than the one "
         "below; the crown of a level hole is 0.7 of its diameter wide, mm",
@@ -43,9 +43,9 @@ class Support(Frozen):
     infill_bridge_flow: float = rare("Flow of the first solid layer over infill", "internal bridge flow ratio", ge=0.3, le=2)(
         1.0, "factor on extruded volume of the first solid layer over sparse infill, which spans it"
     )
-    support: Literal["none", "auto", "enforced"] = simple("Support", "supports enable generate support material enforcers only")(
-        "auto", "auto: support what the decomposition left risky; enforced: only what overhangs in a plan's [[support]]"
-    )
+    support: Literal["none", "auto", "enforced"] = simple(
+        "Support", "supports enable generate support material enforcers only", effect=Effect.FRONT
+    )("auto", "auto: support what the decomposition left risky; enforced: only what overhangs in a plan's [[support]]")
     support_style: Literal["tree", "grid"] = simple("Support style", "supports tree organic grid snug type")(
         "tree",
         "tree: what hangs is gathered into branches, which saves plastic and time; grid: columns straight down where they find "
@@ -110,7 +110,7 @@ class Support(Frozen):
         "whatever stands on it has plastic under it",
     )
     support_least_mm2: float = advanced(
-        "Smallest place that is supported", "supports minimum area remove small overhangs", ge=0, le=1000
+        "Smallest place that is supported", "supports minimum area remove small overhangs", ge=0, le=1000, effect=Effect.FRONT
     )(1.0, "a hanging place smaller than this, seen from above, holds itself, mm2")
 
     @property
@@ -122,9 +122,9 @@ class Support(Frozen):
 class Plate(Frozen):
     """Part 1 on the plate."""
 
-    place_mm: tuple[float, float] = advanced("Place on the plate", "position move offset centre center xy arrange")(
-        MIDDLE, "where the middle of the model stands on the plate: x and y from the turn axis; several stand about it, mm"
-    )
+    place_mm: tuple[float, float] = advanced(
+        "Place on the plate", "position move offset centre center xy arrange", effect=Effect.REACH
+    )(MIDDLE, "where the middle of the model stands on the plate: x and y from the turn axis; several stand about it, mm")
     complete_objects: bool = advanced(
         "One model after the other", "complete individual objects sequential print sequence by object"
     )(False, "several models on one plate are printed one after the other, each whole, not layer by layer together")
@@ -196,12 +196,14 @@ class Interface(Frozen):
         "it. A bond welds as long as it is hot, seconds (Ai and Vogt, doi s40964-022-00275-w); heat above the glass transition "
         "added 15 % in PA-CF (PMC7284967)",
     )
-    interface_first_layer_fan: float = advanced("Fan in the first layer on plastic", "bond weld cooling", ge=0, le=1)(
+    interface_first_layer_fan: float = advanced(
+        "Fan in the first layer on plastic", "bond weld cooling", ge=0, le=1, effect=Effect.NONE
+    )(
         0.0,
         "factor on the part fan in a part's first layer on plastic: what is blown on is cold before it has welded (Ai and Vogt, "
         "doi s40964-022-00275-w)",
     )
-    interface_fan: float = advanced("Fan in the next layers on plastic", "bond weld cooling", ge=0, le=1)(
+    interface_fan: float = advanced("Fan in the next layers on plastic", "bond weld cooling", ge=0, le=1, effect=Effect.NONE)(
         0.3, "factor on the part fan in the other layers of a part on plastic: air chills the bond"
     )
     interface_extra_walls: int = advanced("Extra walls on plastic", "bond perimeters strength", ge=0, le=50)(

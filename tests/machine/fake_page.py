@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from machine.view.bundle import bundle
-from machine.workbench.web.page import OWN
+from machine.view.page import bundle
+from machine.workbench.web.server import OWN
 
 NODE = shutil.which("node")
 FAKE = Path(__file__).with_suffix(".js")

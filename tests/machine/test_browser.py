@@ -13,8 +13,7 @@ from machine.dryrun.dryrun import dry_run
 from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.events import Temperature
 from machine.program import Program
-from machine.view.bundle import bundle
-from machine.view.page import TEMPLATE, parts_page, print_page
+from machine.view.page import TEMPLATE, bundle, parts_page, print_page
 from machine.view.serving.watch_page import serve
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane

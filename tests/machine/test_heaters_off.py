@@ -15,9 +15,7 @@ import pytest
 from machine.cli.commands import console as console_module
 from machine.cli.commands.console import console
 from machine.cli.commands.measuring import at_port
-from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
-from machine.cli.commands.measuring.mover import PrinterMover
-from machine.cli.commands.measuring.prober import ProbingSession
+from machine.cli.commands.measuring.at_port import PrinterMover, ProbingSession, begin_cold, cold_session, tip_raised_after
 from machine.cli.terminal.requests import ConsoleRequest
 from machine.link.medium import Medium, Wire
 from machine.link.stream import print_lines
@@ -27,13 +25,13 @@ from machine.printing.command_session import CommandSession, LeftError, StopErro
 from machine.printing.destination import SerialPort
 from machine.printing.job import Does, End, PrintJob
 from machine.setup.calibration.program import calibration_pen
-from machine.simulator.virtual import PATH, VirtualPrinter
 from machine.workbench.printing import at_hand
 from machine.workbench.printing.at_hand import by_hand
 from machine.workbench.printing.at_page import AtPage, HandCommand, HandDoes
 from mdp.pose import Pose
 from profiles.errors import FirmwareError, MoveError, PortError, PrinterError
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 # Fast axes make a run short; the printer of every run is another one.
 PROFILE = load(settings=["machine.x.speed_mm_s=500", "machine.y.speed_mm_s=500", "machine.z.speed_mm_s=100"])

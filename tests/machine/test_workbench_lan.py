@@ -18,7 +18,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from machine.workbench.access.addresses import network_addresses
+from machine.workbench.access.network import network_addresses
 from mdp.save import stl
 from tests.machine.browser import Browser
 from tests.machine.prints import PrintPage

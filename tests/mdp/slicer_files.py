@@ -8,8 +8,9 @@ from xml.sax.saxutils import quoteattr
 
 import manifold3d as m3
 import numpy as np
+import pytest
 
-from mdp.mesh import Floats, together
+from mdp.mesh import Floats, Mesh, together
 from tests.mdp.files import threemf_mesh, threemf_model
 from tests.shapes import from_manifold
 
@@ -31,6 +32,11 @@ RELATIONS = (
     '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="r" '
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel" Target="/3D/3dmodel.model"/></Relationships>'
 )
+BLOCK = m3.Manifold.cube((30.0, 30.0, 20.0), True)
+BOX = m3.Manifold.cube((10.0, 8.0, 30.0), True)
+CYLINDER = m3.Manifold.cylinder(40.0, 5.0, circular_segments=24, center=True)
+DIALECTS = ("prusaslicer", "bambu")
+CONFIG = "Metadata/Slic3r_PE_model.config"
 
 
 @dataclass(frozen=True)
@@ -127,6 +133,40 @@ def bambu(path: Path, objects: Sequence[Object], rng: np.random.Generator, furth
     config_xml = f'<?xml version="1.0"?><config>{"".join(config)}</config>'
     model = threemf_model(written, "".join(items)).replace("<model ", '<model requiredextensions="p" ')
     return _package(path, model, {**parts, "Metadata/model_settings.config": config_xml, **(further or {})})
+
+
+def written(path: Path, dialect: str, objects: Sequence[Object], seed: int = 0, further: Mapping[str, str] | None = None) -> Path:
+    if dialect == "bambu":
+        return bambu(path, objects, np.random.default_rng(seed), further)
+    return prusaslicer(path, objects, further)
+
+
+def check(mesh: Mesh, expected: m3.Manifold) -> None:
+    box = np.array(expected.bounding_box()).reshape(2, 3)
+    assert mesh.volume_mm3 == pytest.approx(expected.volume(), rel=1e-6)
+    np.testing.assert_allclose(np.ptp(mesh.bounds_mm, axis=0), np.ptp(box, axis=0), rtol=1e-6)
+
+
+def change(path: Path, part: str, old: str, new: str) -> None:
+    """Write a part of a package otherwise."""
+    with zipfile.ZipFile(path) as archive:
+        texts = {name: archive.read(name).decode() for name in archive.namelist()}
+    assert old in texts[part]
+    texts[part] = texts[part].replace(old, new)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in texts.items():
+            archive.writestr(name, text)
+
+
+def paint(path: Path, rows: Sequence[int], attributes: str) -> None:
+    """Give some triangles of the model part attributes."""
+    part = "3D/3dmodel.model"
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read(part).decode()
+    pieces = text.split("<triangle ")
+    change(
+        path, part, text, "<triangle ".join(f"{attributes} {piece}" if k - 1 in rows else piece for k, piece in enumerate(pieces))
+    )
 
 
 def affine(rng: np.random.Generator) -> Floats:

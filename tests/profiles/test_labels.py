@@ -4,7 +4,8 @@ from collections import Counter
 
 import pytest
 
-from machine.workbench.bench.settings import USUAL, settings_list
+from machine.workbench.bench.bench import USUAL
+from machine.workbench.bench.settings import settings_list
 from profiles.frozen import TITLES, unit_of
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys

@@ -7,7 +7,7 @@ import pytest
 
 from machine.cli.cli import main
 from profiles.errors import ProfileError
-from profiles.places import known, own, own_folder, shipped
+from profiles.places import known, own, own_folder, shipped, shipped_base
 from profiles.profile import check_file, load, load_one
 
 
@@ -55,6 +55,16 @@ def test_an_own_material_and_process_inherit_from_shipped_and_own_ones() -> None
     keep("material", "shop_red", 'inherits = "shop"\n[material]\nnozzle_c = 231\n')
     material = load(material="shop_red").material
     assert (material.flow, material.nozzle_c, material.name) == (0.97, 231.0, load(material="petg").material.name)
+
+
+def test_the_shipped_profile_below_another_is_found_by_way_of_own_ones() -> None:
+    keep("material", "shop", 'inherits = "petg"\n[material]\nflow = 0.97\n')
+    keep("material", "shop_red", 'inherits = "shop"\n[material]\nnozzle_c = 231\n')
+    keep("material", "alone", "[material]\nnozzle_c = 231\n")
+    keep("material", "abs", 'inherits = "abs"\n[material]\nflow = 0.95\n')
+    keep("material", "shop_abs", 'inherits = "abs"\n[material]\nnozzle_c = 250\n')
+    names = ("petg", "shop", "shop_red", "alone", "abs", "shop_abs")
+    assert [shipped_base("material", name) for name in names] == ["petg", "petg", "petg", None, None, None]
 
 
 def test_own_profiles_that_inherit_each_other_are_refused() -> None:

@@ -11,9 +11,9 @@ from machine.link.shutdown import Heaters
 from machine.link.stream import print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
-from machine.simulator.virtual import PATH, EndlessError, VirtualPrinter
 from profiles.errors import PortError
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, EndlessError, VirtualPrinter
 from tools import fault_campaign
 from tools.fault_campaign import PROFILE, judged, order, program, reasons, table, trial, wanted
 

@@ -2,6 +2,7 @@
 
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from machine.cli.terminal.requests import EditRequest
@@ -9,7 +10,7 @@ from machine.notices import say, show
 from machine.pipeline.project import is_project
 from machine.pipeline.requests import GCODE_SUFFIXES
 from machine.view.serving.browser import lead_browser
-from machine.workbench.access.lan import Lan, open_lan
+from machine.workbench.access.network import Lan, open_lan
 from machine.workbench.session.session import Session
 from machine.workbench.web.serve import serve_workbench
 from machine.workbench.work.worker_pool import WorkerPools
@@ -42,7 +43,7 @@ def edit(request: EditRequest) -> int:
 
     def begin(session: Session) -> None:
         if opened is not None:
-            session.start(_open(session, opened))
+            session.command(partial(_open, session, opened))
 
     def announce(address: str, *of_lan: str) -> None:
         show("".join(f"{each}\n" for each in (address, *of_lan)))

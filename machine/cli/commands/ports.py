@@ -3,7 +3,7 @@
 import json
 from threading import Event
 
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.notices import say, show
 from machine.printing.ports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from machine.cli.terminal.report import agreement_line, print_price, print_table
 from machine.dryrun.dryrun import summary
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.notices import show
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import check_outputs, write_bytes, write_json

@@ -8,13 +8,12 @@ from machine.cli.terminal.interrupts import stopping
 from machine.cli.terminal.options import machine_profile
 from machine.cli.terminal.requests import SimulatorRequest
 from machine.firmware import dialect_of, dialects
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.notices import say, show
 from machine.printing.ports import announced
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.contact.surface import TrueBall
+from machine.simulator.contact import ProbedTable, TrueBall
 from machine.simulator.faults import FaultScript, read_script
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter

@@ -10,9 +10,9 @@ from machine.pipeline.output import check_writable, write_bytes
 from machine.pipeline.programs import load_program
 from machine.pipeline.requests import ModelRequest
 from machine.program import Program
-from machine.view.findings import relevant_findings
 from machine.view.page import DATA, print_page
 from machine.view.paths import MOST_ROWS
+from machine.view.scene import relevant_findings
 from profiles.errors import GcodeError, OutputError, ProfileError
 
 

@@ -26,7 +26,6 @@ NEAR = 1.5  # heights of a bead: what lies farther below its tip it does not tou
 LEAST_TOLD, MOST_TOLD, LEAST_TOLD_MM2 = 0.75, 1.4, 10.0  # of all of it: steps of slanted layers leave a tenth open or taken
 LEAST, MOST = 0.9, 1.1  # plastic over room of a square millimetre that is as it should be
 LEAN, RICH = 0.1, 1.1  # the leanest tenth of a layer's beads; what has so much more makes up for what oozed
-SAMPLE_MM, FAR_MM, AROUND_MM = 0.1, 1.5, 0.05  # of looks along outer walls, and across them
 REACH_MM = 2.0  # from the plane of the tip, of plastic that can matter
 
 
@@ -206,35 +205,3 @@ def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
             sides.append(np.hstack([bars.begin[way, :2], bars.end[way, :2]]))
             sides.append(np.hstack([bars.end[way[-1], :2], bars.begin[way[0], :2]])[None])
     return np.concatenate(sides) if sides else np.zeros((0, 4))
-
-
-def wall_edges(face: Interface) -> tuple[Mask, Floats]:
-    """At places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to them near their
-    middle, and (n,) how far inside their outer edge it ends, mm; inf where it is farther than FAR_MM.
-    """
-    walls, side = face.walls, face.walls.end[:, :2] - face.walls.begin[:, :2]
-    length = np.hypot(*side.T)
-    counts = np.ceil(length / SAMPLE_MM).astype(np.int64)
-    which = np.repeat(np.arange(len(length)), counts)
-    share = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[which]
-    middle = walls.begin[which, :2] + share[:, None] * side[which]
-    across = np.column_stack([-side[:, 1], side[:, 0]])[which] / length[which, None]
-    steps = np.arange(-FAR_MM, AROUND_MM, 0.5 * face.lattice.cell)
-    held, ends = [], []
-    for outward in (across, -across):
-        edge = middle + walls.half[which, None] * outward
-        outer = ~_at(face.section, edge + 2.0 * AROUND_MM * outward, face.lattice)
-        way = edge[outer, None] + steps[:, None] * outward[outer, None]
-        there = _at(face.touching, way, face.lattice)
-        last = len(steps) - 1 - there[:, ::-1].argmax(axis=1)
-        beside = middle[outer, None] + np.array([-2.0 * AROUND_MM, 0.0, 2.0 * AROUND_MM])[:, None] * outward[outer, None]
-        held.append(_at(face.touching, beside, face.lattice).any(axis=1))
-        ends.append(np.where(there.any(axis=1), np.maximum(-steps[last], 0.0), np.inf))
-    return np.concatenate(held), np.concatenate(ends)
-
-
-def _at(mask: Mask, points: Floats, lattice: Lattice) -> Mask:
-    """Whether the columns of (..., 2) points are marked."""
-    i, j = np.moveaxis(((points - lattice.origin) / lattice.cell).astype(np.int64), -1, 0)
-    found: Mask = mask[i.clip(0, lattice.shape[0] - 1), j.clip(0, lattice.shape[1] - 1)]
-    return found

@@ -11,7 +11,7 @@ from machine.gcode.arcs import arc_centre, chord_count, chords, sweep_rad
 from machine.gcode.modes import COMMANDS, E_AXIS
 from machine.gcode.reader.state import Reader, Words
 from machine.gcode.words import quote, read_number, read_values
-from machine.kinematics.coordinates import axis_positions, followed_places
+from machine.kinematics.table import axis_positions, followed_places
 from mdp.pose import Pose
 from profiles.errors import GcodeError
 

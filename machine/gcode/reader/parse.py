@@ -17,7 +17,7 @@ from machine.gcode.reader.plain_moves import read_plain_moves
 from machine.gcode.reader.state import Reader, reader_of
 from machine.gcode.settings import PART_TOTALS, read_totals
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, Word, quote, read_words
-from machine.kinematics.coordinates import axis_positions
+from machine.kinematics.table import axis_positions
 from mdp.mesh import Floats, Indices
 from profiles.errors import GcodeError
 from profiles.machine import Machine

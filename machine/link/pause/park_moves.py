@@ -11,7 +11,7 @@ import numpy as np
 from machine.firmware import dialect_of
 from machine.gcode.modes import ModalState
 from machine.gcode.pen import number
-from machine.kinematics.coordinates import axis_positions, followed_places
+from machine.kinematics.table import axis_positions, followed_places
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.planning.stand import Park, find_park_position
 from mdp.mesh import Floats

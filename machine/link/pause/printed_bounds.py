@@ -9,8 +9,7 @@ from machine.gcode.arcs import arc_box, arc_centre
 from machine.gcode.modes import Coordinates, ModalState
 from machine.gcode.words import read_words, split_command
 from machine.kinematics.collision import Printed
-from machine.kinematics.coordinates import origin_mm
-from machine.kinematics.table import workpiece_points
+from machine.kinematics.table import origin_mm, workpiece_points
 from mdp.pose import Pose
 from profiles.machine import Machine
 

@@ -26,13 +26,10 @@ Bytes become events (decoder), an event or the passing of time amounts to a sign
 from machine.firmware import Firmware
 from machine.firmware.marlin import MARLIN
 from machine.link.protocol import events, verdict
-from machine.link.protocol.acknowledgement import Acknowledgement
+from machine.link.protocol.answers import ASKED_LIMIT, QUESTION, QUESTIONS_MOST, Acknowledgement, FlowControl, Questions, Resends
 from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.flow_control import FlowControl
 from machine.link.protocol.framing import LINE_LIMIT, frame
 from machine.link.protocol.greeting import GREETING, PLAIN_QUESTION, Greeting
-from machine.link.protocol.questions import QUESTION, QUESTIONS_MOST, Questions
-from machine.link.protocol.resends import ASKED_LIMIT, Resends
 from machine.link.protocol.states import TABLE, Signal, State
 from machine.link.protocol.timeout import Timeouts, Timing
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, GREETING_LINES, Window

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from machine.firmware import dialects
-from machine.firmware.line import FRAME_CHARACTERS
+from machine.firmware.firmware import FRAME_CHARACTERS
 from machine.firmware.marlin import DIALECT
 from machine.gcode.commands import command_in
 from machine.gcode.line_text import is_plain_move, read_line, to_ascii

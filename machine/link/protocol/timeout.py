@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from math import inf
 
-from machine.firmware.line import LineRules
-from machine.link.protocol.questions import QUESTION, QUESTIONS_MOST
+from machine.firmware.firmware import LineRules
+from machine.link.protocol.answers import QUESTION, QUESTIONS_MOST
 from machine.link.protocol.states import Signal, State
 from machine.link.protocol.window import LineInFlight, Window
 

@@ -1,6 +1,6 @@
 """Verdicts: the sentences with which a connection ends, one function for each reason."""
 
-from machine.firmware.line import BAUDS
+from machine.firmware.firmware import BAUDS
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.window import GREETING_LINES
 from profiles.errors import FirmwareError, PrinterError, SilenceError

@@ -3,9 +3,9 @@
 from collections import deque
 from typing import NamedTuple
 
-from machine.firmware.line import FRAME_BYTES, LineRules
+from machine.firmware.firmware import FRAME_BYTES, LineRules
+from machine.gcode.commands import command_in
 from machine.link.protocol.framing import LINE_LIMIT, frame
-from machine.link.protocol.slow_commands import slow_timeout_s
 
 GREETING_LINES = 2  # M115 and M105 are lines 1 and 2; a later Resend for one of them means that the printer restarted
 HISTORY = 512  # lines kept for a repeat: far more than any printer's buffers hold
@@ -77,7 +77,7 @@ class Window:
             return True
         if len(flight) >= lines or flight[-1].slow_timeout_s or not self.fits_buffer(command):
             return False
-        return not slow_timeout_s(command)
+        return not _slow_timeout_s(command)
 
     @property
     def at_slow_command(self) -> bool:
@@ -100,7 +100,7 @@ class Window:
     def repeat(self, number: int, now_s: float = 0.0) -> bytes:
         """The bytes of an earlier line, in flight again."""
         framed = self._history[number]
-        self._add_in_flight(number, framed, command_in(framed), now_s)
+        self._add_in_flight(number, framed, _unframed(framed), now_s)
         return framed
 
     def acknowledge(self, number: int | None) -> int:
@@ -128,13 +128,20 @@ class Window:
     def command(self, number: int) -> str:
         """The command of a line that is still kept, else ""."""
         framed = self._history.get(number)
-        return "" if framed is None else command_in(framed)
+        return "" if framed is None else _unframed(framed)
 
     def _add_in_flight(self, number: int, framed: bytes, command: str, now_s: float) -> None:
-        self.flight.append(LineInFlight(number, len(framed), command == "M105", slow_timeout_s(command), now_s))
+        self.flight.append(LineInFlight(number, len(framed), command == "M105", _slow_timeout_s(command), now_s))
         self._bytes += len(framed)
 
 
-def command_in(framed: bytes) -> str:
+def _unframed(framed: bytes) -> str:
     """The command of a framed line."""
     return framed[framed.index(b" ") + 1 : framed.rindex(b"*")].decode("ascii")
+
+
+def _slow_timeout_s(command: str) -> float:
+    """How long the answer to a slow command may take, 0 for a quick one. A slow command travels alone."""
+    if command[0] == "G" and command[1:2] in ("0", "1"):  # most lines of a program; none of these is slow
+        return 0.0
+    return command_in(command).answer_s

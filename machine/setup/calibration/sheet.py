@@ -3,18 +3,16 @@
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, isnan
+from math import isnan
 from pathlib import Path
 from typing import Any
 
-import tomlkit
-
 from machine.setup.calibration.fit import Touch
 from machine.setup.calibration.program import TouchPlan
+from machine.setup.sheet_file import check_row, number, quoted, read_document, rows_of
 from mdp.pose import Pose
 from profiles.errors import ProfileError, reason
 from profiles.machine import Machine
-from profiles.places import parse
 
 COLUMNS = ("tilt_deg", "turn_deg", "x_mm", "y_mm", "z_mm", "on")
 KEYS = ("machine", "mark_height_mm", "mark_angle_deg", "touch")
@@ -33,11 +31,10 @@ class Sheet:
 
 def sheet_text(name: str, machine: Machine, touches: TouchPlan) -> str:
     """An empty sheet for the touches of a calibration program; name: of the machine's profile."""
-    quoted = tomlkit.string(name, literal=name.isprintable() and "'" not in name)
     lines = [
         f"# Calibration of {machine.name}: what the machine shows while the tip touches the mark, instead of each nan.",
         "# A touch that is left at nan is not used.",
-        f"machine = {quoted.as_string()}",
+        f"machine = {quoted(name)}",
         "# Height of the mark over the plate's surface, measured with a caliper.",
         f"mark_height_mm = {touches.mark_mm[2]:g}",
         "# Where the mark is seen from the middle, counted from the workpiece's +X towards +Y: turn.zero_deg is then found too.",
@@ -60,33 +57,21 @@ def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
 
     mark_height_mm goes before what the file says. Raises ProfileError naming the file and the touch.
     """
-    document = _csv(path) if path.suffix.lower() == ".csv" else parse(path, "sheet")
-    unknown = [key for key in document if key not in KEYS]
-    if unknown:
-        raise ProfileError(f"{path}: {', '.join(unknown)} is not a key of a calibration sheet: allowed are {', '.join(KEYS)}")
-    rows = document.get("touch", [])
-    if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
-        raise ProfileError(f"{path}: touch must be a list of tables, [[touch]]")
-    touches = [_touch(path, index, row) for index, row in enumerate(rows, start=1)]
-    height = (
-        mark_height_mm if mark_height_mm is not None else _number(path, "mark_height_mm", document.get("mark_height_mm", 0.0))
-    )
-    angle = document.get("mark_angle_deg")
-    name = document.get("machine")
+    document = _csv(path) if path.suffix.lower() == ".csv" else read_document(path, KEYS, "a calibration")
+    touches = [_touch(path, f"touch {index}", row) for index, row in enumerate(rows_of(path, document, "touch"), start=1)]
+    height = document.get("mark_height_mm", 0.0) if mark_height_mm is None else mark_height_mm
+    angle, name = document.get("mark_angle_deg"), document.get("machine")
     return Sheet(
         tuple(touch for touch in touches if touch is not None),
-        _number(path, "mark_height_mm", height),
-        None if angle is None else _number(path, "mark_angle_deg", angle),
+        number(path, "mark_height_mm", height),
+        None if angle is None else number(path, "mark_angle_deg", angle),
         None if name is None else str(name),
     )
 
 
-def _touch(path: Path, index: int, row: Mapping[str, Any]) -> Touch | None:
+def _touch(path: Path, label: str, row: Mapping[str, Any]) -> Touch | None:
     """One touch; None when it has not been filled in."""
-    label = f"touch {index}"
-    unknown = [key for key in row if key not in ("tilt_deg", "turn_deg", "xyz_mm", "on")]
-    if unknown:
-        raise ProfileError(f"{path}: {label}: {unknown[0]} is not known: allowed are tilt_deg, turn_deg, xyz_mm and on")
+    check_row(path, label, row, ("tilt_deg", "turn_deg", "xyz_mm", "on"))
     where = row.get("on", "mark")
     if where not in WHERE:
         raise ProfileError(f"{path}: {label}: on is {where!r}: it must be one of {', '.join(WHERE)}")
@@ -95,15 +80,9 @@ def _touch(path: Path, index: int, row: Mapping[str, Any]) -> Touch | None:
         raise ProfileError(f"{path}: {label}: xyz_mm is {at!r}: it must be a list of three numbers")
     if any(isnan(x) for x in at):
         return None
-    tilt, turn = (_number(path, f"{label}: {key}", row.get(key)) for key in ("tilt_deg", "turn_deg"))
-    x, y, z = (_number(path, f"{label}: xyz_mm", value) for value in at)
+    tilt, turn = (number(path, f"{label}: {key}", row.get(key)) for key in ("tilt_deg", "turn_deg"))
+    x, y, z = (number(path, f"{label}: xyz_mm", value) for value in at)
     return Touch(Pose(tilt, turn), (x, y, z), where == "plate")
-
-
-def _number(path: Path, key: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise ProfileError(f"{path}: {key} is {value!r}: it must be a number")
-    return float(value)
 
 
 def _csv(path: Path) -> dict[str, Any]:

@@ -1,11 +1,18 @@
-"""Report: what a coupon says, in words and as a Markdown table that others can compare with."""
+"""Report: what a coupon says, in words, as a Markdown table that others can compare with, and as tables of the material's and
+the process's profile.
+"""
 
 from collections.abc import Sequence
+from datetime import date
 from math import isnan
+from typing import Any
+
+import tomlkit
 
 from machine.setup.coupon.bars import Shape
 from machine.setup.coupon.fit import BY_CHANCE, Effect, Outcome
 from machine.setup.coupon.sheet import Sheet, settings_in_words
+from profiles.material import Material
 
 
 def outcome_text(outcome: Outcome) -> str:
@@ -87,3 +94,25 @@ def _verdict(effect: Effect) -> str:
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     written = [[cell.replace("|", "\\|") for cell in row] for row in rows]
     return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *written)]
+
+
+def material_tables(outcome: Outcome, before: Material, day: date) -> dict[str, Any]:
+    """What the material bears across layers, by the bars in one piece, and which share of it a joint with what won does; a joint
+    that bears more counts as one piece. before: whose strength stays where no such bar was broken."""
+    measured = outcome.upright_mpa is not None
+    upright = round(outcome.upright_mpa, 2) if outcome.upright_mpa is not None else before.interlayer_strength_mpa
+    factor = round(min(1.0, outcome.best_joint_mpa / upright), 3)
+    values = {"interlayer_strength_mpa": upright} if measured else {}
+    return {
+        "material": {key: _with_source(value, outcome, day) for key, value in (values | {"cold_weld_factor": factor}).items()}
+    }
+
+
+def process_tables(outcome: Outcome, day: date) -> dict[str, Any]:
+    """The settings that won; empty where none did."""
+    return {"process": {key: _with_source(value, outcome, day) for key, value in outcome.won.items()}} if outcome.won else {}
+
+
+def _with_source(value: Any, outcome: Outcome, day: date) -> Any:
+    source = f"tiltprint coupon, {day.isoformat()}, {outcome.loads} loads, scatter {100 * outcome.scatter:.0f} %"
+    return tomlkit.item(value).comment(source)

@@ -10,8 +10,8 @@ import tomlkit
 
 from machine.setup.coupon.bars import SHAPES, Shape
 from machine.setup.coupon.design import JOINTS, KINDS, MOST_FACTORS, Factor, signs
+from machine.setup.sheet_file import check_row, quoted, read_document, rows_of
 from profiles.errors import ProfileError
-from profiles.places import parse
 
 KEYS = ("coupon", "machine", "material", "process", "bar", "factor")
 MOST_MPA = 300.0  # no filament bears more; a larger number is misread
@@ -58,7 +58,7 @@ def sheet_text(sheet: Sheet) -> str:
     ]
     for key in ("coupon", "machine", "material", "process"):
         value = sheet.shape.name if key == "coupon" else getattr(sheet, key)
-        lines.append(f"{key} = {tomlkit.string(value, literal=value.isprintable() and chr(39) not in value).as_string()}")
+        lines.append(f"{key} = {quoted(value)}")
     for factor in sheet.factors:
         lines += ["", "[[factor]]", f'key = "{factor.key}"', f"own = {_value(factor.own)}", f"other = {_value(factor.other)}"]
     for bar, loads in enumerate(sheet.loads_n, start=1):
@@ -73,17 +73,14 @@ def _value(value: Any) -> str:
 
 def read_sheet(path: Path) -> Sheet:
     """The sheet in a file. Raises ProfileError naming the file, and the bar at fault."""
-    document = parse(path, "sheet")
-    unknown = [key for key in document if key not in KEYS]
-    if unknown:
-        raise ProfileError(f"{path}: {unknown[0]} is not a key of a coupon's sheet: allowed are {', '.join(KEYS)}")
+    document = read_document(path, KEYS, "a coupon's")
     shape = SHAPES.get(str(document.get("coupon")))
     if shape is None:
         raise ProfileError(f"{path}: coupon is {document.get('coupon')!r}: it must be one of {', '.join(SHAPES)}")
     machine, material, process = (_name(path, document, key) for key in ("machine", "material", "process"))
-    factors = tuple(_factor(path, row) for row in _rows(path, document, "factor"))
+    factors = tuple(_factor(path, row) for row in rows_of(path, document, "factor"))
     loads: dict[int, tuple[float, ...]] = {}
-    for row in _rows(path, document, "bar"):
+    for row in rows_of(path, document, "bar"):
         number, told = _loads(path, shape, row)
         if number in loads:
             raise ProfileError(f"{path}: bar {number} is told twice: a plate printed again has one more load in its list")
@@ -101,13 +98,6 @@ def _name(path: Path, document: Mapping[str, Any], key: str) -> str:
     return name
 
 
-def _rows(path: Path, document: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
-    rows = document.get(key, [])
-    if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
-        raise ProfileError(f"{path}: {key} must be a list of tables, [[{key}]]")
-    return rows
-
-
 def _factor(path: Path, row: Mapping[str, Any]) -> Factor:
     if set(row) != {"key", "own", "other"} or not isinstance(row["key"], str):
         raise ProfileError(f"{path}: a [[factor]] has {', '.join(row) or 'nothing'}: key, own and other are expected")
@@ -118,9 +108,7 @@ def _loads(path: Path, shape: Shape, row: Mapping[str, Any]) -> tuple[int, tuple
     number, loads = row.get("number"), row.get("loads_n")
     if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= len(KINDS):
         raise ProfileError(f"{path}: there is no bar {number!r}: the bars are 1 to {len(KINDS)}")
-    unknown = [key for key in row if key not in ("number", "loads_n")]
-    if unknown:
-        raise ProfileError(f"{path}: bar {number}: {unknown[0]} is not known: allowed are number and loads_n")
+    check_row(path, f"bar {number}", row, ("number", "loads_n"))
     if not isinstance(loads, list) or not all(isinstance(load, int | float) and not isinstance(load, bool) for load in loads):
         raise ProfileError(f"{path}: bar {number}: loads_n is {loads!r}: it must be a list of numbers")
     for load in loads:

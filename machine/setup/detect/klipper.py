@@ -23,10 +23,11 @@ from machine.setup.detect.found import (
     ConfigText,
     Found,
     Reading,
+    Sections,
     has_box,
     limits,
+    read_sections,
 )
-from machine.setup.detect.sections import Sections, read_sections
 from profiles.errors import ProfileError
 
 SIGNS = re.compile(r"^\[(?:printer|include [^\]]+|stepper_x|mcu)\]", re.MULTILINE)

@@ -19,10 +19,11 @@ from machine.setup.detect.found import (
     ConfigText,
     Found,
     Reading,
+    Sections,
     is_limit,
     limits,
+    read_sections,
 )
-from machine.setup.detect.sections import Sections, read_sections
 from profiles.errors import ProfileError
 
 SIGNS = re.compile(r"^(?:\[(?:EMC|EMCMOT|TRAJ|KINS)\]|#INCLUDE\s+\S)", re.MULTILINE)

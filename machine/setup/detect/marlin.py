@@ -14,6 +14,7 @@ from machine.link.protocol.events import AREA, NAME, REACH
 from machine.setup.detect.found import (
     ABC,
     ACCELERATION,
+    EXTRUDER,
     LIMITS,
     PRINTING,
     SPEED,
@@ -34,7 +35,6 @@ SOFT_LIMITS = re.compile(r"Min:(.*?)Max:(.*)")
 PLACE = re.compile(rf"([A-Z])[: ]*({NUMBER})")
 CAPABILITY = re.compile(r"Cap:(\w+):1")
 KEYS = {"M203": SPEED, "M201": ACCELERATION}
-OF_FILAMENT = {"extruder_speed_mm_s": SPEED, "extruder_acceleration_mm_s2": ACCELERATION}
 
 
 def recognise(text: str) -> bool:
@@ -53,7 +53,7 @@ def read(config: ConfigText) -> Found:
         remarks.append("the printer counts filament in mm3 (M200 S1): its speed is left as it is")
     else:
         filament = axes.get("E", {})
-        settings |= {key: filament[word] for key, word in OF_FILAMENT.items() if word in filament}
+        settings |= {key: filament[word] for key, word in EXTRUDER.items() if word in filament}
     if "ARCS" in capabilities:
         settings["arcs"] = Reading(True, "Cap:ARCS of M115")
     others = [letter for letter in axes if letter not in (*PRINTING, "E")]

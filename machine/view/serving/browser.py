@@ -26,21 +26,6 @@ PAGE = """<!doctype html>
 """
 
 
-def lead_browser(address: str, until_end: ExitStack) -> None:
-    """Open a browser beside all else, by a file that is there until the program ends."""
-    try:
-        file = until_end.enter_context(redirecting(address))
-    except OSError as error:
-        say(f"no browser is opened, for no file can be written that leads it: {error.strerror}; open the address in one")
-        return
-    Thread(target=_show_in_browser, args=(file.as_uri(),), name="browser", daemon=True).start()
-
-
-def _show_in_browser(address: str) -> None:
-    if not webbrowser.open(address):
-        say("no browser could be opened: open the address in one")
-
-
 @contextmanager
 def redirecting(address: str) -> Iterator[Path]:
     """A file that this user alone can read, as long as the program goes on. Raises OSError where none can be written."""
@@ -61,3 +46,18 @@ def _remove_old(folder: Path) -> None:
         with suppress(OSError):
             if time.time() - file.stat().st_mtime > OLD_S:
                 file.unlink()
+
+
+def lead_browser(address: str, until_end: ExitStack) -> None:
+    """Open a browser beside all else, by a file that is there until the program ends."""
+    try:
+        file = until_end.enter_context(redirecting(address))
+    except OSError as error:
+        say(f"no browser is opened, for no file can be written that leads it: {error.strerror}; open the address in one")
+        return
+    Thread(target=_show_in_browser, args=(file.as_uri(),), name="browser", daemon=True).start()
+
+
+def _show_in_browser(address: str) -> None:
+    if not webbrowser.open(address):
+        say("no browser could be opened: open the address in one")

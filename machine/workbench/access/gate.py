@@ -10,12 +10,9 @@ from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from machine.view.serving.guard import HEADERS, LONG_NUMBER, SAFE, is_foreign, method_of, refuse, values_of, with_headers
-from machine.workbench.access.devices import Device
-from machine.workbench.access.door import Door
-from machine.workbench.access.lan import Lan
 from machine.workbench.access.limits import DEVICE
-from machine.workbench.access.pairing import Verdict
-from machine.workbench.access.pairing_page import pairing_page
+from machine.workbench.access.network import Lan
+from machine.workbench.access.pairing import Device, Door, Verdict, pairing_page
 
 PAIRED = "/paired/"  # below it stands what this computer's page has below its token
 UNPAIRED_CODE = 4403  # of a websocket whose device is let go

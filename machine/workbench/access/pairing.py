@@ -1,16 +1,71 @@
-"""Pairing: a code that is typed on a device, judged: from one state to the next, with the time given from outside.
+"""Pairing: a code that is typed on a device is judged, the device gets a cookie, and the door keeps the devices of one run.
 
 Wrong codes are counted over all devices: an address can be forged, and shared. At most 20 of 31 ** 8 codes are ever tried.
 """
 
+import asyncio
 import secrets
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from hashlib import sha256
+from html import escape
+from time import monotonic, time
+from typing import Any
+
+from starlette.responses import HTMLResponse
+
+from machine.view.page import hash_source
+from machine.workbench.work.observable import Observable
+from profiles.errors import PlanError
 
 LETTERS = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"  # without I, L, O, 0 and 1, which look alike
 CODE_LENGTH = 8
 WRONG_OF_A_CODE, WRONG_IN_ALL = 5, 20
 FIRST_WAIT_S = 30.0  # after the first code that was used up by wrong ones; doubled after every further one
+# What a user agent has -> the word for it; the first that fits, for Android names Linux, too, and most browsers Safari.
+SYSTEMS = (
+    *(("iPhone", "iPhone"), ("iPad", "iPad"), ("Android", "Android"), ("Windows", "Windows"), ("CrOS", "Chromebook")),
+    *(("Mac OS X", "Mac"), ("Linux", "Linux")),
+)
+BROWSERS = (
+    *(("Edg", "Edge"), ("OPR/", "Opera"), ("SamsungBrowser", "Samsung Internet"), ("Firefox", "Firefox"), ("FxiOS", "Firefox")),
+    *(("Chrom", "Chrome"), ("CriOS", "Chrome"), ("Safari", "Safari")),
+)
+COOKIE_BYTES = 24
+STYLE = """
+:root { color-scheme: light dark; --back: #eef0f3; --panel: #fff; --text: #1d232b; --soft: #5c6672; --line: #6c7783; --accent: #0067a8; --on: #fff; --error: #c01822; }
+@media (prefers-color-scheme: dark) { :root { --back: #14171b; --panel: #191c21; --text: #e6e9ed; --soft: #9aa4b0; --line: #8a95a1; --accent: #56b4e9; --on: #0b1117; --error: #ff7b7f; } }
+* { box-sizing: border-box; }
+body { margin: 0; padding: 24px 16px; background: var(--back); color: var(--text); font: 17px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif; }
+main { max-width: 26rem; margin: 0 auto; padding: 20px; background: var(--panel); border-radius: 12px; }
+h1 { margin: 0 0 8px; font-size: 22px; }
+p { margin: 0 0 14px; }
+label { display: block; font-weight: 600; }
+input, button { display: block; width: 100%; margin: 6px 0 14px; padding: 12px; border-radius: 8px; font: inherit; }
+input { border: 1px solid var(--line); background: var(--back); color: inherit; font-size: 24px; letter-spacing: 0.12em; text-transform: uppercase; }
+button { border: 0; background: var(--accent); color: var(--on); font-weight: 600; }
+:is(input, button):focus-visible { outline: 3px solid var(--accent); outline-offset: 2px; }
+.error { color: var(--error); }
+.soft { color: var(--soft); font-size: 15px; }
+"""  # noqa: E501 - a rule a line
+ICON = "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 16 16'%3E%3Crect x='4' y='7' width='8' height='3' rx='1.2' fill='%23e69f00'/%3E%3C/svg%3E"  # noqa: E501
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Pair with tiltprint</title><link rel="icon" href="{icon}"><style>{style}</style></head>
+<body><main><h1>Pair with tiltprint</h1>
+{told}{form}{open_network}</main></body></html>
+"""
+FORM = """<form method="post" action="/pair">
+<label for="code">Code</label>
+<input id="code" name="code" required autofocus maxlength="20" autocomplete="off" autocapitalize="characters" autocorrect="off"
+ spellcheck="false" enterkeyhint="go" aria-describedby="{described}"{invalid}>
+<p class="soft" id="hint">{length} letters and digits, in the terminal in which <kbd>tiltprint edit</kbd> runs.</p>
+<button>Pair this device</button></form>
+"""
+OPEN_NETWORK = """<p class="soft">This line is not encrypted: whoever is in this network can read along.
+Use it in a network of your own only.</p>
+"""
 
 
 class Verdict(StrEnum):
@@ -70,3 +125,143 @@ def judge(pairing: Pairing, typed: str, now_s: float, fresh: str) -> tuple[Pairi
 def _plain(typed: str) -> bytes:
     """What a person has typed, without the strokes and spaces between and in capitals."""
     return "".join(letter for letter in typed.upper() if letter.isalnum()).encode()
+
+
+@dataclass(frozen=True)
+class Device:
+    """number: from 1 on, not given again; paired_s: since the epoch; digest: of its cookie; gone: set when it is let go."""
+
+    number: int
+    name: str
+    paired_s: float
+    digest: bytes = field(repr=False)
+    gone: asyncio.Event = field(default_factory=asyncio.Event, repr=False)
+
+
+def device_name(user_agent: str) -> str:
+    """In words of our own alone, for everybody can send any text: 'iPhone, Safari'."""
+    found = [next((word for sign, word in table if sign in user_agent), "") for table in (SYSTEMS, BROWSERS)]
+    return ", ".join(filter(None, found)) or "a device"
+
+
+def digest_of(cookie: str) -> bytes:
+    """What is kept of a cookie."""
+    return sha256(cookie.encode()).digest()
+
+
+class Door(Observable):
+    """All from the event loop of the server. say: tells the person at the terminal, who alone learns the code; addresses: those
+    that a device is to open; encrypted: by https; clock: seconds, as `time.monotonic`."""
+
+    def __init__(
+        self, say: Callable[[str], None], addresses: tuple[str, ...], encrypted: bool, clock: Callable[[], float] = monotonic
+    ) -> None:
+        super().__init__()
+        self.pairing, self.devices = Pairing(fresh_code()), list[Device]()
+        self.encrypted = encrypted
+        self._say, self._addresses, self._clock = say, addresses, clock
+        self._last = 0  # number that was given
+
+    @property
+    def wait_s(self) -> float:
+        """How long codes are still refused."""
+        return max(0.0, self.pairing.waits_until_s - self._clock())
+
+    def announce(self) -> None:
+        """Say what to do."""
+        self._say(f"open to the network, too: a device that opens {' or '.join(self._addresses)} asks for a code: {self._code}")
+        if not self.encrypted:
+            self._say("whoever is in this network can read along: use --lan in a network of your own only, or with --certificate")
+
+    def attempt(self, typed: str, user_agent: str) -> tuple[Verdict, str]:
+        """Judge a code that was typed on a device; its cookie where it is paired now, else ""."""
+        self.pairing, verdict = judge(before := self.pairing, typed, self._clock(), fresh_code())
+        if verdict == Verdict.PAIRED:
+            return verdict, self._admit(device_name(user_agent))
+        if verdict == Verdict.SPENT:
+            self._say(
+                f"{before.wrong + 1} wrong codes were typed: for {self.wait_s:.0f} s none is taken, then a new one: {self._code}"
+            )
+        elif verdict == Verdict.CLOSED and not before.closed:
+            wrong = f"{self.pairing.wrong_in_all} wrong codes were typed: no device is paired any more"
+            self._say(f"{wrong} until the page on this computer lets them, or tiltprint edit is started again")
+        if self.pairing != before:
+            self.notify()
+        return verdict, ""
+
+    def device_of(self, cookie: str) -> Device | None:
+        """The paired device that has this cookie; all are compared, in the same time for every cookie."""
+        digest = digest_of(cookie)
+        same = [device for device in self.devices if secrets.compare_digest(device.digest, digest)]
+        return same[0] if same else None
+
+    def unpair(self, number: object) -> None:
+        """Let a device go: its lines end now. Raises PlanError where it is not there."""
+        device = next((device for device in self.devices if device.number == number), None)
+        if device is None:
+            raise PlanError("this device is not paired any more")
+        self.devices.remove(device)
+        device.gone.set()
+        self._say(f"{device.name} is not paired any more")
+        self.notify()
+
+    def reopen(self) -> None:
+        """Begin anew with the counting of wrong codes, and with another code."""
+        self.pairing = Pairing(fresh_code())
+        self._say(f"devices can pair again; the code: {self._code}")
+        self.notify()
+
+    def snapshot(self) -> dict[str, Any]:
+        """What the page of this computer is told; never the code."""
+        return {
+            "version": self.version,
+            "addresses": self._addresses,
+            "encrypted": self.encrypted,
+            "closed": self.pairing.closed,
+            "waits_until_s": time() + self.wait_s if self.wait_s else 0.0,  # since the epoch: a page may hear of it later
+            "devices": [{"number": each.number, "name": each.name, "paired_s": each.paired_s} for each in self.devices],
+        }
+
+    @property
+    def _code(self) -> str:
+        return grouped(self.pairing.code)
+
+    def _admit(self, name: str) -> str:
+        cookie = secrets.token_urlsafe(COOKIE_BYTES)
+        self._last += 1
+        self.devices.append(Device(self._last, name, time(), digest_of(cookie)))
+        self._say(f"{name} is paired; the code for the next device: {self._code}")
+        self.notify()
+        return cookie
+
+
+STATUS = {Verdict.WRONG: 403, Verdict.SPENT: 403, Verdict.WAITS: 429, Verdict.CLOSED: 403}
+
+
+def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
+    """The page. verdict: on the code that this device has typed, None where it has typed none."""
+    told, wait_s = _told(door, verdict), door.wait_s
+    error = f'<p class="error" id="told" role="alert">{escape(told)}</p>\n' if told else ""
+    described, invalid = ("told hint", ' aria-invalid="true"') if told else ("hint", "")
+    form = "" if door.pairing.closed else FORM.format(described=described, invalid=invalid, length=CODE_LENGTH)
+    body = PAGE.format(icon=ICON, style=STYLE, told=error, form=form, open_network="" if door.encrypted else OPEN_NETWORK)
+    headers = {
+        "content-security-policy": _policy(),
+        "referrer-policy": "same-origin",  # else the form would be sent without its origin
+        **({"retry-after": f"{wait_s:.0f}"} if wait_s else {}),
+    }
+    return HTMLResponse(body, 200 if verdict is None else STATUS[verdict], headers)
+
+
+def _told(door: Door, verdict: Verdict | None) -> str:
+    """What keeps this device from being paired, "" where nothing does."""
+    if door.pairing.closed:
+        return "Too many wrong codes were typed: no device is paired any more. The page on the computer can let them again."
+    if door.wait_s:
+        return f"Too many wrong codes were typed. Wait {door.wait_s:.0f} seconds; the terminal shows a new code."
+    return "This is not the code that the terminal shows now." if verdict == Verdict.WRONG else ""
+
+
+def _policy() -> str:
+    rest = "img-src data:; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+    return f"default-src 'none'; style-src {hash_source(STYLE)}; {rest}"

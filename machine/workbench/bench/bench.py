@@ -9,12 +9,8 @@ import numpy as np
 from machine.pipeline.project import STANDING
 from machine.pipeline.requests import Given
 from machine.planning.stops import Stop
-from machine.workbench.bench.effect import Effect, effect_of_change
-from machine.workbench.bench.model import Model
-from machine.workbench.bench.part_settings import option, renumbered
-from machine.workbench.bench.placing import Placing, moved_part, moved_zones
-from machine.workbench.bench.renumbering import gone_in_words, number_after, renumbered_stops
-from machine.workbench.bench.settings import USUAL
+from machine.workbench.bench.model import Model, Placing, moved_part, moved_zones
+from machine.workbench.bench.part_settings import gone_in_words, number_after, option, renumbered, renumbered_stops
 from machine.workbench.bench.values import vector_of
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
@@ -22,10 +18,12 @@ from mdp.overhang import UP
 from mdp.search.front import Weights, choose, pays
 from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
-from profiles.frozen import Vector
+from profiles.effect import effect_of_change
+from profiles.frozen import Effect, Vector
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile
 
+USUAL = Given()
 MOST_STEPS = 200  # that can be undone
 MOST_KEPT_FACES = 5_000_000  # of the models of these steps together, some 25 bytes each: every other scale is a model of its own
 

@@ -1,12 +1,13 @@
 """Marks: boxes and faces on which a person wants no cut, no seam, no support or support: the zones of the plan."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from machine.workbench.bench.bench import Bench
-from machine.workbench.bench.values import MOST_MM, Asked, number, rotation_rows, vector, whole
+from machine.workbench.bench.values import Command, Point, Rotation, check_number
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
@@ -21,48 +22,89 @@ WORDS = {
     "no_support": "mark: no support here",
     "support": "mark: support here",
 }
+Kind = Literal["keep", "no_seam", "no_support", "support"]
 
 
-def mark(bench: Bench, asked: Asked) -> tuple[str, Zones]:
-    """A word for a further zone of `kind`, and the zones with it: a box `min_mm`, `max_mm`, along `axes` where it leans, or the
-    faces around `point_mm` as far as `angle_deg`; in place of the zone `number`, if one is given. Raises PlanError."""
-    kind, zones = _zones(bench, asked)
-    index = whole(asked, "number", 1, len(zones)) - 1 if "number" in asked else len(zones)
-    if index >= MOST_ZONES:
-        raise PlanError(f"there are {index} zones of {kind}: {MOST_ZONES} are allowed")
-    return WORDS[kind], _with(bench.zones, kind, (*zones[:index], _zone(asked, bench), *zones[index + 1 :]))
+class Marking(Command):
+    """A command that gives other zones; it is run in a process, for it may read the model's mesh."""
+
+    kind: Kind
+
+    @property
+    def step(self) -> str:
+        """The word for its step in the history."""
+        raise NotImplementedError
+
+    def zones(self, bench: Bench) -> Zones:
+        """The zones after it. Raises PlanError."""
+        raise NotImplementedError
 
 
-def unmark(bench: Bench, asked: Asked) -> tuple[str, Zones]:
-    """The same without the zone `number` of `kind`. Raises PlanError."""
-    kind, zones = _zones(bench, asked)
-    index = whole(asked, "number", 1, len(zones)) - 1
-    return "take a mark away", _with(bench.zones, kind, (*zones[:index], *zones[index + 1 :]))
+class Mark(Marking):
+    """A further zone: a box, along `axes` where it leans, or the faces around a point as far as an angle; in place of the zone
+    `number`, if one is given."""
+
+    do: Literal["mark"] = "mark"
+    number: int | None = None
+    min_mm: Point | None = None
+    max_mm: Point | None = None
+    axes: Rotation | None = None
+    point_mm: Point | None = None
+    angle_deg: Annotated[float, Field(ge=0, le=MOST_GROWN_DEG)] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        needed = ("min_mm", "max_mm") if self.point_mm is None else ("angle_deg",)
+        for key in needed:
+            if getattr(self, key) is None:
+                raise ValueError(f"{key} is missing")
+        if self.min_mm and self.max_mm and not all(low < high for low, high in zip(self.min_mm, self.max_mm, strict=True)):
+            raise ValueError(f"min_mm is {list(self.min_mm)} and max_mm {list(self.max_mm)}: each number of min_mm must be less")
+        return self
+
+    @property
+    def step(self) -> str:
+        return WORDS[self.kind]
+
+    def zones(self, bench: Bench) -> Zones:
+        zones: tuple[AnyZone, ...] = getattr(bench.zones, self.kind)
+        index = len(zones) if self.number is None else check_number("number", self.number, 1, len(zones)) - 1
+        if index >= MOST_ZONES:
+            raise PlanError(f"there are {index} zones of {self.kind}: {MOST_ZONES} are allowed")
+        return _with(bench.zones, self.kind, (*zones[:index], self._zone(bench), *zones[index + 1 :]))
+
+    def _zone(self, bench: Bench) -> AnyZone:
+        if self.min_mm is not None and self.max_mm is not None and self.point_mm is None:
+            return Zone(self.min_mm, self.max_mm, self.axes)
+        assert self.point_mm is not None
+        assert self.angle_deg is not None
+        zone = Grown(self.point_mm, self.angle_deg)
+        if (away_mm := zone.away_mm(workpiece_mesh(bench))) > FARTHEST_MM:
+            raise PlanError(
+                f"point_mm is {list(self.point_mm)}, {away_mm:.3g} mm from the model: up to {FARTHEST_MM:g} is allowed"
+            )
+        return zone
+
+
+class Unmark(Marking):
+    """Without the zone `number` of a kind."""
+
+    do: Literal["unmark"] = "unmark"
+    number: int
+
+    @property
+    def step(self) -> str:
+        return "take a mark away"
+
+    def zones(self, bench: Bench) -> Zones:
+        zones: tuple[AnyZone, ...] = getattr(bench.zones, self.kind)
+        index = check_number("number", self.number, 1, len(zones)) - 1
+        return _with(bench.zones, self.kind, (*zones[:index], *zones[index + 1 :]))
 
 
 def _with(zones: Zones, kind: str, several: tuple[AnyZone, ...]) -> Zones:
     changed: dict[str, Any] = {kind: several}
     return replace(zones, **changed)
-
-
-def _zones(bench: Bench, asked: Asked) -> tuple[str, tuple[AnyZone, ...]]:
-    kind = asked.get("kind")
-    if kind not in ZONE_KINDS:
-        raise PlanError(f"kind is {kind!r}: {', '.join(ZONE_KINDS)} are allowed")
-    return kind, getattr(bench.zones, kind)
-
-
-def _zone(asked: Asked, bench: Bench) -> AnyZone:
-    if "point_mm" not in asked:
-        low, high = vector(asked, "min_mm", MOST_MM), vector(asked, "max_mm", MOST_MM)
-        if not all(least < most for least, most in zip(low, high, strict=True)):
-            raise PlanError(f"min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
-        return Zone(low, high, None if asked.get("axes") is None else rotation_rows(asked, "axes"))
-    point = vector(asked, "point_mm", MOST_MM)
-    zone, mesh = Grown(point, number(asked, "angle_deg", 0.0, MOST_GROWN_DEG)), workpiece_mesh(bench)
-    if (away_mm := zone.away_mm(mesh)) > FARTHEST_MM:
-        raise PlanError(f"point_mm is {list(point)}, {away_mm:.3g} mm from the model: up to {FARTHEST_MM:g} is allowed")
-    return zone
 
 
 def workpiece_mesh(bench: Bench) -> Mesh:

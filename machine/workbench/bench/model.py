@@ -1,20 +1,26 @@
-"""Model: a model as it is read. Its triangles are in a file, so that they go through no pipe and lie in no memory for longer than
-they are worked with."""
+"""Model: a model as it is read, its triangles in a file, so that they go through no pipe and lie in no memory for longer than
+they are worked with; planes and zones go along when it is turned, scaled or lifted."""
 
 import pickle
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from secrets import token_hex
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.workbench.bench.values import vector_of
-from mdp.mesh import Mesh
+from mdp.mesh import Floats, Mesh
 from mdp.read import ReadModel
-from mdp.zone import NO_ZONES, Zones
+from mdp.search.plan_file import MOST_MM, ZONE_KINDS, PlannedPart
+from mdp.zone import NO_ZONES, AnyZone, Grown, MeshVolume, Modifier, Zone, Zones
+from profiles.errors import PlanError
 from profiles.frozen import Vector
+
+POINT_DIGITS, BOX_DIGITS = 3, 9  # of the mm of a mark's place and of a box's sides
+LEVEL = 1e-9  # of a cosine: a box turned by quarters is along the platform's axes again
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,3 +102,106 @@ def mesh_blocks(mesh: Mesh) -> Iterator[memoryview]:
     if mesh.colours is not None:
         blocks.append(mesh.colours.astype("<i4", copy=False))
     return (block.data.cast("B") for block in blocks)
+
+
+@dataclass(frozen=True, eq=False)
+class Placing:
+    """How a model as it is read is put on the platform: turned (3, 3), scaled, shifted by mm."""
+
+    turn: Floats
+    factor: float
+    shift_mm: Floats
+
+    @classmethod
+    def of(cls, mesh: Mesh, turned: Floats | None, lift_mm: float, factor: float = 1.0) -> "Placing":
+        """A mesh set on the platform, or on a pedestal. turned: None, it stands as it is read; factor: by how much it was scaled
+        when it was read."""
+        lift = np.array([0.0, 0.0, lift_mm])
+        if turned is None:
+            return cls(np.eye(3), factor, lift)
+        places = mesh.vertices @ turned.T
+        low, high = places.min(axis=0), places.max(axis=0)
+        return cls(turned, factor, lift - (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]))
+
+    def after(self, before: "Placing") -> "Placing":
+        """What brings places of the same model from where they were before to where they are now."""
+        turn, factor = _between(before.turn, self.turn), self.factor / before.factor
+        return Placing(turn, factor, self.shift_mm - factor * turn @ before.shift_mm)
+
+
+def _between(before: Floats, after: Floats) -> Floats:
+    """The rotation from one turn to another, which a person may have rounded; it is not rounded, so that errors do not add up."""
+    if np.array_equal(before, after):
+        return np.eye(3)
+    left, _, right = np.linalg.svd(after @ before.T)
+    turn: Floats = left @ right
+    return turn
+
+
+def moved_zones(zones: Zones, move: Placing) -> Zones:
+    """The zones on the same places of the model. Raises PlanError for a box that a plan could not have there, and for a mesh."""
+    kinds: dict[str, Any] = {
+        kind: tuple(_moved(zone, move, f"{kind} {number}") for number, zone in enumerate(getattr(zones, kind), start=1))
+        for kind in ZONE_KINDS
+    }
+    modifiers = tuple(_moved_modifier(own, move, f"modifier {number}") for number, own in enumerate(zones.modifiers, start=1))
+    return Zones(**kinds, modifiers=modifiers)
+
+
+def moved_part(part: PlannedPart, move: Placing) -> PlannedPart:
+    """A part whose plane, where it is given whole, goes through the same places of the model."""
+    if part.normal is None or part.offset_mm is None:
+        return part
+    normal = move.turn @ np.array(part.normal)
+    limbs_mm = tuple(vector_of(move.factor * move.turn @ np.array(point) + move.shift_mm) for point in part.limbs_mm)
+    offset_mm = move.factor * part.offset_mm + float(normal @ move.shift_mm)
+    return replace(part, normal=vector_of(normal), offset_mm=offset_mm, limbs_mm=limbs_mm)
+
+
+def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:
+    if isinstance(zone, Zone):
+        return _moved_box(zone, move, label)
+    if isinstance(zone, Grown):
+        point_mm = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
+        return replace(zone, point_mm=vector_of(np.round(point_mm, POINT_DIGITS)))
+    if isinstance(zone, MeshVolume):
+        raise PlanError(_immovable(zone, label))
+    return zone
+
+
+def _moved_modifier(modifier: Modifier, move: Placing, label: str) -> Modifier:
+    if isinstance(modifier.volume, Zone):
+        return replace(modifier, volume=_moved_box(modifier.volume, move, label))
+    raise PlanError(_immovable(modifier.volume, label))
+
+
+def _immovable(volume: MeshVolume, label: str) -> str:
+    return f"{label}: its mesh lies where {volume.file.name} has it and cannot be moved with the model"
+
+
+def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
+    room = None if box.room is None else _moved_box(box.room, move, label)
+    axes = box.along(move.turn).T  # the box's own, which go along, as rows
+    low, high = (move.factor * np.array(corner) + axes @ move.shift_mm for corner in (box.min_mm, box.max_mm))
+    level = np.round(axes)
+    if np.abs(axes - level).max() > LEVEL:
+        x, y, z = (vector_of(row) for row in axes)
+        return Zone(*_sides(low, high, label), (x, y, z), room)
+    low, high = level.T @ low, level.T @ high
+    return Zone(*_sides(np.minimum(low, high), np.maximum(low, high), label), room=room)
+
+
+def _sides(low: Floats, high: Floats, label: str) -> tuple[Vector, Vector]:
+    """The corners as a plan may have them, which end a box that reaches farther. Raises PlanError where nothing is left of it."""
+    least, most = (_side(corner) for corner in (low, high))
+    if not all(x < y for x, y in zip(least, most, strict=True)):
+        corners = " and ".join(f"{key} [{', '.join(f'{x:g}' for x in at)}]" for key, at in (("min_mm", low), ("max_mm", high)))
+        raise PlanError(
+            f"{label}: its box would have {corners}: {-MOST_MM:g} to {MOST_MM:g} is allowed, and it must have a volume"
+        )
+    return least, most
+
+
+def _side(values: Floats) -> Vector:
+    values = np.clip(values, -MOST_MM, MOST_MM)
+    return vector_of(np.round(values, BOX_DIGITS) + 0.0)

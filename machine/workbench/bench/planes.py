@@ -1,14 +1,13 @@
-"""Planes: cuts that a person moves, adds, takes away and puts into another order; whether they can be cut, a trial says.
+"""Planes: the commands that move, add, take away and reorder cuts; whether the cuts can be made, a trial says.
 
-The edits take the bench, on which a model lies, and what is asked, and give the cuts. They raise PlanError for what makes no
-sense.
+All are given the bench, on which a model lies, and give the cuts. They raise PlanError for what makes no sense.
 """
 
 from dataclasses import replace
+from typing import Any, ClassVar, Literal
 
 from machine.workbench.bench.bench import Bench
-from machine.workbench.bench.values import MOST_MM, Asked, number, unit_vector, vector, whole
-from mdp.plane import Plane
+from machine.workbench.bench.values import Command, Direction, Mm, Point, check_number
 from mdp.search.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
@@ -16,78 +15,144 @@ from profiles.part_settings import MOST_PARTS
 Cuts = tuple[PlannedPart, ...]
 
 
-def add_plane(bench: Bench, asked: Asked) -> Cuts:
-    """The plane `normal`, `offset_mm` for a new part printed after part `after`, without that as the last one."""
-    cuts = bench.cuts or ()
-    index = added_part(bench, asked) - 2
-    if len(cuts) + 2 > MOST_PARTS:
-        raise PlanError(f"there are {len(cuts) + 1} parts: {MOST_PARTS} are allowed")
-    return *cuts[:index], _plane(asked), *cuts[index:]
+class Edit(Command):
+    """A command that gives other cuts, which are tried first."""
+
+    near: bool = False  # whether the nearest place will do, of a plane that is put somewhere
+
+    @property
+    def instead(self) -> str:
+        """How the reason begins why that cannot be done, where the planes alone do not say it."""
+        return ""
+
+    @property
+    def nearer(self) -> dict[str, Any] | None:
+        """The command that puts the plane at the nearest place; None: it puts none anywhere."""
+        return None
+
+    def cuts(self, bench: Bench) -> Cuts:
+        """The cuts after it."""
+        return self.orders(bench)[0][0]
+
+    def orders(self, bench: Bench) -> list[tuple[Cuts, int]]:
+        """The cuts with the plane that is put somewhere, each time with the number of its part, in the print orders that will do,
+        the wanted one first."""
+        raise NotImplementedError
 
 
-def added_part(bench: Bench, asked: Asked) -> int:
-    """The number that the new part has."""
-    most = len(bench.cuts or ()) + 1
-    return whole({"after": most, **asked}, "after", 1, most) + 1
+class PlacedPlane(Edit):
+    """One that puts a plane somewhere."""
+
+    normal: Direction
+    offset_mm: Mm
+
+    @property
+    def nearer(self) -> dict[str, Any] | None:
+        return self.model_copy(update={"near": True}).model_dump(mode="json", exclude_none=True)
+
+    @property
+    def plane(self) -> PlannedPart:
+        """The plane."""
+        return PlannedPart(self.normal, self.offset_mm)
 
 
-def added_anywhere(bench: Bench, asked: Asked) -> list[tuple[Cuts, int]]:
-    """The planes with the new one in every place of the print order, the one asked for first, each with its part's number."""
-    wanted = added_part(bench, asked)
-    numbers = sorted(range(2, len(bench.cuts or ()) + 3), key=lambda number: abs(number - wanted))
-    return [(add_plane(bench, {**asked, "after": number - 1}), number) for number in numbers]
+class Add(PlacedPlane):
+    """A plane for a new part printed after the part `after`, without that as the last one."""
+
+    do: Literal["add"] = "add"
+    word: ClassVar = "add a plane"
+    after: int | None = None
+
+    def orders(self, bench: Bench) -> list[tuple[Cuts, int]]:
+        cuts = bench.cuts or ()
+        most = len(cuts) + 1
+        wanted = most + 1 if self.after is None else check_number("after", self.after, 1, most) + 1
+        if len(cuts) + 2 > MOST_PARTS:
+            raise PlanError(f"there are {len(cuts) + 1} parts: {MOST_PARTS} are allowed")
+        numbers = sorted(range(2, len(cuts) + 3), key=lambda number: abs(number - wanted))
+        return [((*cuts[: number - 2], self.plane, *cuts[number - 2 :]), number) for number in numbers]
 
 
-def moved_alone(bench: Bench, asked: Asked) -> list[tuple[Cuts, int]]:
-    """The planes with that of `part` moved, and its number."""
-    return [(move_plane(bench, asked), check_unlocked(bench, asked))]
+class Move(PlacedPlane):
+    """The plane of a part becomes another one; its limbs stay."""
+
+    do: Literal["move"] = "move"
+    word: ClassVar = "move a plane"
+    part: int
+
+    def orders(self, bench: Bench) -> list[tuple[Cuts, int]]:
+        limbs_mm = planned_part(bench, self.part).limbs_mm
+        return [(_replaced(bench, self.part, replace(self.plane, limbs_mm=limbs_mm)), self.part)]
 
 
-def move_plane(bench: Bench, asked: Asked) -> Cuts:
-    """The plane of `part` becomes `normal`, `offset_mm`; its limbs stay."""
-    return _replaced(bench, asked, replace(_plane(asked), limbs_mm=planned_part(bench, asked).limbs_mm))
+class Snap(Move):
+    """The plane of a part moved to the neck that was found near it."""
+
+    word: ClassVar = "snap to the neck"
+
+    @property
+    def instead(self) -> str:
+        return f"the neck near the plane of part {self.part} is no place for a cut: "
+
+    def orders(self, bench: Bench) -> list[tuple[Cuts, int]]:
+        return [(_replaced(bench, self.part, self.plane), self.part)]
 
 
-def choose_limb(bench: Bench, asked: Asked) -> Cuts:
-    """`part` becomes the piece above its plane at `point_mm` alone, or without a point all that lies above."""
-    limbs_mm = () if asked.get("point_mm") is None else (vector(asked, "point_mm", MOST_MM),)
-    return _replaced(bench, asked, replace(planned_part(bench, asked), limbs_mm=limbs_mm))
+class Limb(Edit):
+    """A part becomes the piece above its plane at a point alone, or without a point all that lies above."""
+
+    do: Literal["limb"] = "limb"
+    word: ClassVar = "choose a limb"
+    part: int
+    point_mm: Point | None = None
+
+    def cuts(self, bench: Bench) -> Cuts:
+        limbs_mm = () if self.point_mm is None else (self.point_mm,)
+        return _replaced(bench, self.part, replace(planned_part(bench, self.part), limbs_mm=limbs_mm))
 
 
-def remove_plane(bench: Bench, asked: Asked) -> Cuts:
-    """Without the plane of `part`."""
-    return _replaced(bench, asked)
+class Remove(Edit):
+    """Without the plane of a part."""
+
+    do: Literal["remove"] = "remove"
+    word: ClassVar = "remove a plane"
+    part: int
+
+    def cuts(self, bench: Bench) -> Cuts:
+        return _replaced(bench, self.part)
 
 
-def reorder(bench: Bench, asked: Asked) -> Cuts:
-    """`part` is printed as number `to`."""
-    moved = planned_part(bench, asked)
-    others = [part for part in bench.cuts or () if part is not moved]
-    others.insert(whole(asked, "to", 2, bench.parts) - 2, moved)
-    return tuple(others)
+class Reorder(Edit):
+    """A part is printed as number `to`."""
+
+    do: Literal["reorder"] = "reorder"
+    word: ClassVar = "print a part at another time"
+    part: int
+    to: int
+
+    @property
+    def instead(self) -> str:
+        return f"part {self.part} cannot be printed as number {self.to}, for then "
+
+    def cuts(self, bench: Bench) -> Cuts:
+        moved = planned_part(bench, self.part)
+        others = [part for part in bench.cuts or () if part is not moved]
+        others.insert(check_number("to", self.to, 2, bench.parts) - 2, moved)
+        return tuple(others)
 
 
-def snap(bench: Bench, asked: Asked, plane: Plane) -> Cuts:
-    """The plane of `part` becomes another one."""
-    return _replaced(bench, asked, PlannedPart.of(plane))
+def planned_part(bench: Bench, part: int) -> PlannedPart:
+    """The part of a number, which has a plane. Raises PlanError."""
+    return (bench.cuts or ())[check_number("part", part, 2, bench.parts) - 2]
 
 
-def planned_part(bench: Bench, asked: Asked) -> PlannedPart:
-    """The `part`, which has a plane. Raises PlanError."""
-    return (bench.cuts or ())[whole(asked, "part", 2, bench.parts) - 2]
+def check_unlocked(bench: Bench, part: int) -> int:
+    """The number of a part, whose plane must not be locked. Raises PlanError."""
+    if planned_part(bench, part) in bench.locked:
+        raise PlanError(f"the plane of part {part} is locked: unlock it first")
+    return part
 
 
-def check_unlocked(bench: Bench, asked: Asked) -> int:
-    """The number of the `part`, whose plane must not be locked. Raises PlanError."""
-    if planned_part(bench, asked) in bench.locked:
-        raise PlanError(f"the plane of part {asked['part']} is locked: unlock it first")
-    return int(asked["part"])
-
-
-def _replaced(bench: Bench, asked: Asked, *instead: PlannedPart) -> Cuts:
-    index, cuts = check_unlocked(bench, asked) - 2, bench.cuts or ()
+def _replaced(bench: Bench, part: int, *instead: PlannedPart) -> Cuts:
+    index, cuts = check_unlocked(bench, part) - 2, bench.cuts or ()
     return *cuts[:index], *instead, *cuts[index + 1 :]
-
-
-def _plane(asked: Asked) -> PlannedPart:
-    return PlannedPart(unit_vector(asked, "normal"), number(asked, "offset_mm", -MOST_MM, MOST_MM))

@@ -1,27 +1,31 @@
-"""Settings: the profile as a page shows it, by the meanings and ranges of its own models, and what a person changes."""
+"""Settings: the profile as a page shows it, what a person changes of it, and the command that does what lies on the bench."""
 
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from shlex import join
 from typing import Any
 
+import numpy as np
+
 from machine.gcode.blocks import block_problems, block_values
+from machine.pipeline.output import plain_name
 from machine.pipeline.requests import Given
-from machine.workbench.bench.part_settings import own_values
+from machine.workbench.bench.bench import Bench
+from machine.workbench.bench.part_settings import option, own_values
+from mdp.pose import turned_further
 from profiles.errors import ProfileError
 from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
 from profiles.machine import GCODE
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
 from profiles.places import KINDS, OF_KIND, known
-from profiles.profile import SECTIONS, Profile, load, with_part_settings
+from profiles.profile import DEFAULTS, SECTIONS, Profile, load, with_part_settings
 from profiles.toml_text import read_value, rows_text, value_text
 
 BLOCKS_OF = "machine.gcode."
 ORDER = ("process", "material", "search", "machine")  # what is changed most comes first
 BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
-
-
-USUAL = Given()
 
 
 def with_setting(given: Given, key: str, value: str | None) -> Given:
@@ -159,7 +163,8 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
         yield {
             "key": f"{prefix}.{name}",
             "label": field.title,
-            **field.json_schema_extra,
+            "level": field.json_schema_extra["level"],
+            "synonyms": field.json_schema_extra["synonyms"],
             "unit": unit_of(name),
             "group": group or own,
             "title": TITLES[group or own],
@@ -201,3 +206,41 @@ def _placeholders(key: str, profile: Profile) -> list[str]:
 def _sentence(model: type[Frozen]) -> str:
     """The first sentence of what a table says of itself."""
     return (model.__doc__ or "").strip().partition("\n\n")[0].replace("\n    ", " ").rstrip(".")
+
+
+def file_stem(bench: Bench) -> str:
+    """The model's name for that of a file."""
+    name = "" if bench.model is None else Path(bench.model.name.removeprefix("demo:")).stem
+    return plain_name(name) or "model"
+
+
+def export_command(bench: Bench) -> str:
+    """The line for a shell; "" without a model. A plan, as the workbench saves it, holds how the model is cut and turned, what is
+    marked on it, and what single parts have of their own."""
+    if bench.model is None:
+        return ""
+    given, stem = bench.given, file_stem(bench)
+    named = [(kind, getattr(given, kind)) for kind in DEFAULTS if getattr(given, kind) != DEFAULTS[kind]]
+    words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
+    settings = list(given.settings)
+    if not bench.planned and bench.turned is not None:
+        settings = [setting for setting in settings if setting.partition("=")[0].strip() != "process.rotate_deg"]
+        settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.12g}' for angle in turns_deg(bench))}]")
+    words += [word for setting in settings for word in ("--set", setting)]
+    if bench.model.plate is not None:
+        words += ["--plate", str(bench.model.plate)]
+    if bench.planned:
+        words += ["--plan", f"{stem}-plan.toml"]
+    else:
+        words += ["--parts", "1", "--as-is"]
+        for own in bench.profile.parts:
+            words += ["--part", option(own)]
+    if bench.copies != 1:
+        words += ["--copies", str(bench.copies)]
+    words += [word for stop in bench.stops for word in stop.option.split()]
+    return join([*words, "-o", f"{stem}.gcode"])
+
+
+def turns_deg(bench: Bench) -> tuple[float, float, float]:
+    """The turns about x, then y, then z that `process.rotate_deg` needs for the model to stand as it does on the bench."""
+    return turned_further(bench.profile.process.rotate_deg, np.array(bench.rotation))

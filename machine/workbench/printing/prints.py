@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Event as Flag
 from typing import Any
 
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.link.port import stable_name
 from machine.pipeline.output import write_bytes
 from machine.pipeline.requests import BAUD

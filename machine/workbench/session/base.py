@@ -1,18 +1,19 @@
-"""Session base: what all work of a session stands on: the history, the processes, and the pages that wait for changes."""
+"""Session base: what all work of a session stands on: the history, the processes, the pages that wait for changes, and values
+that follow from the bench."""
 
 import asyncio
 import sys
 from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench, History, Step
+from machine.workbench.work.folders import Received
 from machine.workbench.work.observable import Observable
-from machine.workbench.work.received import Received
 from machine.workbench.work.worker_pool import TaskQueue, WorkerPools
 from profiles.errors import UserError
 
@@ -21,6 +22,7 @@ LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it like
 LONGEST_ASK = 80  # letters of the name of a command
 MOST_ANSWERS = 20  # named commands whose outcome is kept and sent to the pages
 MOST_PROBLEMS = 20  # pages for which the last refusal is kept
+Value = TypeVar("Value")
 asking: ContextVar[str] = ContextVar("asking", default="")  # the page that is obeyed, or worked for; "": it has no name
 
 
@@ -30,7 +32,8 @@ def hear_from(page: object) -> None:
 
 
 class SessionBase(Observable):
-    """All from the event loop; the pages wait for `changed`.
+    """All from the event loop; the pages wait for `changed`. Whatever changes the bench does so in its `turn`: one command is
+    executed at a time, and nothing else changes the bench meanwhile.
 
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
     gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; stopped: what became
@@ -46,6 +49,7 @@ class SessionBase(Observable):
         self.busy = self.stopped = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
+        self.turn = asyncio.Lock()  # first come, first served
         self.received = Received()
         self._files = count(1)
         self._tasks: set[asyncio.Task[None]] = set()
@@ -81,6 +85,17 @@ class SessionBase(Observable):
         task.add_done_callback(self._tasks.discard)
         task.add_done_callback(lambda _: work.close())  # of one that was cancelled before it began
         return task
+
+    def command(self, act: Callable[[], Coroutine[Any, Any, None] | None], ask: object = None) -> None:
+        """Have a command done when those before it are; act: gives the work that it still is. ask: its name."""
+
+        async def in_turn() -> None:
+            async with self.turn:
+                work = act()
+                if work is not None:
+                    await work
+
+        self.start(in_turn(), ask)
 
     def refuse(self, error: Exception) -> str:
         """Tell the page that wanted it what could not be done, a bug with the log that it got; the sentence."""
@@ -125,11 +140,6 @@ class SessionBase(Observable):
         self.problems.pop(page, None)  # the newest is the last
         self.problems = dict([*self.problems.items(), (page, sentence)][-MOST_PROBLEMS:])
 
-    def amend(self, bench: Bench, better: Bench) -> None:
-        """What lies on the bench, if it is still this, known better; no step of its own."""
-        if self.bench is bench:
-            self.history = self.history.amended(better)
-
     def become(self, history: History) -> None:
         """Go on with another history."""
         self.history = history
@@ -147,3 +157,155 @@ class SessionBase(Observable):
         finally:
             self.busy = ""
             self.notify()
+
+
+class Derived(Generic[Value]):
+    """A value that follows from the bench, worked out by a task beside the pages.
+
+    key: what of a bench decides it, None: there is nothing to work out. task: works it out for a bench, and may tell() how far it
+    is. by_itself: as soon as the key changes, else when it is begun. interrupts: a change of the key cancels the task at once,
+    else it may end and is begun anew then; in both cases its answer is dropped. accept: changes the bench by the answer. start:
+    starts the task, which is one of the session's otherwise.
+
+    progress: what the task has told last, None: none is under way; bench: of the task under way; done: the last answer, of
+    one that is begun whatever the bench is now.
+    """
+
+    def __init__(
+        self,
+        session: SessionBase,
+        key: Callable[[Bench], object],
+        task: Callable[[Bench], Coroutine[Any, Any, Value]],
+        *,
+        by_itself: bool = True,
+        interrupts: bool = False,
+        accept: Callable[[Value], None] | None = None,
+        start: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None,
+    ) -> None:
+        self.progress: Any = None
+        self.bench = session.bench
+        self.done: Value | None = None
+        self.number = 0  # of the task under way, or the last one
+        self._session, self._key_of, self._work, self._accept = session, key, task, accept
+        self._by_itself, self._interrupts, self._start = by_itself, interrupts, start or session.start
+        self._begun: object = None  # key of the task under way, or the last one
+        self._of: object = None  # key of the last answer
+        self._error: Exception | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+        session.followers.append(self.follow)
+
+    @property
+    def result(self) -> Value | None:
+        """The answer for the bench as it is now."""
+        return self.done if self._of is not None and self._of == self._key_of(self._session.bench) else None
+
+    @property
+    def stale(self) -> bool:
+        """Whether the task under way works for a bench that is another one now."""
+        return self._begun != self._key_of(self._session.bench)
+
+    def begin(self, progress: Any = None) -> None:
+        """Begin to work it out, if no task is under way."""
+        if self._task is None:
+            self.number += 1
+            self.progress, self._error = progress, None
+            self.bench = self._session.bench
+            self._begun = self._key_of(self.bench)
+            self._task = self._start(self._run())
+
+    def tell(self, progress: Any) -> None:
+        """Have the pages know how far the task under way is."""
+        self.progress = progress
+        self._session.notify()
+
+    def teller(self) -> Callable[[Any], None]:
+        """tell() for the task under way, which is not heard any more when that is stopped."""
+        number = self.number
+        return lambda progress: self.tell(progress) if self._task is not None and self.number == number else None
+
+    def stop(self) -> None:
+        """Cancel the task under way."""
+        if self._task is not None:
+            self._task.cancel()
+            self._task = self.progress = self._begun = None
+
+    def interrupted(self) -> None:
+        """Called after a change of the bench has cancelled the task."""
+
+    def follow(self) -> None:
+        """Heed a change of the bench."""
+        key = self._key_of(self._session.bench)
+        if self._task is not None and key != self._begun:
+            self._changed.set()
+            if self._interrupts:
+                self.stop()
+                self.interrupted()
+        if self._task is None:
+            self._forget(key)
+            if self._by_itself and key is not None and key != self._begun:
+                self.begin()
+
+    def _forget(self, key: object) -> None:
+        """Hold nothing of a bench that is another one now: models are large."""
+        self.bench = self._session.bench
+        if key != self._begun:
+            self._begun = None
+        if key != self._of:
+            self._of = None
+            self.done = None if self._by_itself else self.done
+
+    async def rests(self, wait_s: float) -> bool:
+        """Wait, but not beyond a change of the bench; whether the task is still for the bench as it is."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(wait_s):
+                await self._changed.wait()
+        return not self.stale
+
+    async def wait(self) -> None:
+        """Return when no task is under way any more."""
+        while self._task is not None:
+            await asyncio.wait((self._task,))
+
+    async def get(self) -> Value:
+        """The answer for the bench as it is now, worked out once for all that ask. Raises what the task raises."""
+        while (result := self.result) is None:
+            self.begin()
+            await self.wait()
+            if self._error is not None:
+                raise self._error
+        return result
+
+    async def _run(self) -> None:
+        task = asyncio.current_task()
+        self._changed.clear()
+        if not self._interrupts:  # the bench may have changed since
+            self.bench = self._session.bench
+            self._begun = self._key_of(self.bench)
+        try:
+            answer = await self._work(self.bench)
+            if self._accept is None:
+                self._take(answer)
+            else:
+                async with self._session.turn:
+                    self._take(answer)
+        except Exception as error:
+            if self._task is task:
+                self._error = error
+                self._end()
+            raise
+
+    def _take(self, answer: Value) -> None:
+        stale = self.stale
+        if stale:
+            self._begun = None
+        else:
+            self.done, self._of = answer, self._begun
+        self._end()
+        if self._accept is not None and not stale:
+            self._accept(answer)
+
+    def _end(self) -> None:
+        self._task = self.progress = None
+        if not self._session.closed:
+            self.follow()

@@ -1,19 +1,30 @@
-"""Commands: all that a page may ask of its bench, by name: what each needs to lie there, and what does it."""
+"""Commands: all that a page may ask of its bench: which there are, what each needs to lie there, and what does it."""
 
-from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
+from collections.abc import Coroutine
 from enum import StrEnum
-from typing import Any
+from functools import partial
+from typing import Any, Literal, get_args
 
-from machine.workbench.bench.bench import Bench
-from machine.workbench.bench.changes import lay, lock, reset_part, set_part, stand, take, turn
-from machine.workbench.bench.planes import Cuts, added_anywhere, choose_limb, move_plane, moved_alone, remove_plane, reorder
+from machine.workbench.bench.changes import (
+    AddStop,
+    Change,
+    Copies,
+    Lay,
+    Lock,
+    RemoveStop,
+    ResetPart,
+    SetPart,
+    Stand,
+    Take,
+    Turn,
+)
+from machine.workbench.bench.marks import Mark, Marking, Unmark
+from machine.workbench.bench.planes import Add, Edit, Limb, Move, Remove, Reorder
 from machine.workbench.bench.settings import with_name, with_typed, without_settings
-from machine.workbench.bench.stops import add_stop, remove_stop, set_copies
-from machine.workbench.bench.values import Asked, text_or_none
-from machine.workbench.session.finding import search_way
+from machine.workbench.bench.values import Asked, Command
 from machine.workbench.session.session import Session
-from machine.workbench.session.trials import Place
+from machine.workbench.work.cutting import SearchWay
+from mdp.ranking.ranker import CLASSIC
 from profiles.errors import PlanError
 
 
@@ -41,121 +52,146 @@ def check_need(session: Session, need: Need) -> None:
         raise PlanError(sentence)
 
 
-Work = Coroutine[Any, Any, None]
+class Plain(Command):
+    """A command that says no more than its name."""
+
+    do: Literal["dismiss", "undo", "redo", "file_settings", "stop", "slice", "compare"]
 
 
-@dataclass(frozen=True)
-class Command:
-    """act: given what is asked; it gives the work that is still to be done. Raises UserError for what cannot be done."""
+class Demo(Command):
+    """Put a model that ships with the program on the bench."""
 
-    need: Need
-    act: Callable[[Session, Asked], Work | None]
-
-
-def _change(word: str, change: Callable[[Bench, Asked], Bench]) -> Command:
-    return Command(Need.MODEL, lambda session, asked: session.do(word, change(session.bench, asked)))
+    do: Literal["demo"]
+    name: str
 
 
-def _planes(word: str, edit: Callable[[Bench, Asked], Cuts], instead: Callable[[Asked], str] = lambda asked: "") -> Command:
-    """instead: how the reason begins why that cannot be done, where the planes alone do not say it."""
-    return Command(Need.MODEL, lambda session, asked: session.trials.take(word, lambda bench: edit(bench, asked), instead(asked)))
+class Unit(Command):
+    """What the coordinates of the model are in that waits for that."""
+
+    do: Literal["unit"]
+    unit: str
 
 
-def _place(word: str, orders: Callable[[Bench, Asked], list[tuple[Cuts, int]]]) -> Command:
-    """orders: the planes with that which is put somewhere, in the print orders that will do, the wanted one first."""
+class Plate(Command):
+    """Another plate of the slicer file."""
 
-    def act(session: Session, asked: Asked) -> Work:
-        place = Place(asked, lambda bench: orders(bench, asked))
-        return session.trials.take(word, lambda bench: place.orders(bench)[0][0], place=place)
-
-    return Command(Need.MODEL, act)
+    do: Literal["plate"]
+    plate: int
 
 
-def _lock(session: Session, asked: Asked) -> Work:
-    return session.trials.after_edits(lambda: session.do("lock a plane", lock(session.bench, asked)))
+class Set(Command):
+    """Another value for a key of the profile, as --set has it; null: as the profile has it."""
+
+    do: Literal["set"]
+    key: str
+    value: str | None = None
 
 
-def _marks(task: str) -> Command:
-    return Command(Need.MODEL, lambda session, asked: session.marking.take(task, asked))
+class Reset(Command):
+    """Take back what is set for a machine, a material or a process; null: for all."""
+
+    do: Literal["reset"]
+    kind: str | None = None
 
 
-def _set(session: Session, asked: Asked) -> Work:
-    key, value = str(asked.get("key")), text_or_none(asked, "value")
-    return session.take_given(f"set {key}", lambda given: with_typed(given, key, value, session.bench.profile), key)
+class TakeProfile(Command):
+    """Another machine, material or process."""
+
+    do: Literal["profile"]
+    kind: str
+    name: str
 
 
-def _take_profile(session: Session, asked: Asked) -> Work:
-    kind, name = str(asked.get("kind")), str(asked.get("name"))
-    return session.take_given(f"take {name}", lambda given: with_name(given, kind, name))
+class Search(Command):
+    """Find the parts; see SearchWay."""
+
+    do: Literal["search"]
+    orient: bool = True
+    ranker: str = CLASSIC
 
 
-def _reset(session: Session, asked: Asked) -> Work:
-    kind = asked.get("kind")
-    whose = "all changes" if kind is None else f"changes of the {kind}"
-    return session.take_given(f"take {whose} back", lambda given: without_settings(given, kind))
+class Try(Move):
+    """A plane in a person's hand."""
+
+    do: Literal["try"]  # type: ignore[assignment]
 
 
-def _stop(session: Session, asked: Asked) -> None:
-    told = session.finding.stop(), session.slicing.stop(), session.comparing.stop()
-    session.stopped = " ".join(filter(None, told))
+class Neck(Command):
+    """Move the plane of a part to the neck near it."""
+
+    do: Literal["neck"]
+    part: int
 
 
-def _too_early(asked: Asked) -> str:
-    return f"part {asked.get('part')} cannot be printed as number {asked.get('to')}, for then "
-
-
-COMMANDS: dict[str, Command] = {
-    "demo": Command(Need.NOTHING, lambda session, asked: session.open_demo(str(asked.get("name")))),
-    "unit": Command(Need.NOTHING, lambda session, asked: session.open_in_unit(asked.get("unit"))),
-    "plate": Command(Need.MODEL, lambda session, asked: session.open_plate(asked.get("plate"))),
-    "file_settings": Command(Need.MODEL, lambda session, asked: session.take_settings_inside()),
-    "dismiss": Command(Need.NOTHING, lambda session, asked: None),
-    "undo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.undo())),
-    "redo": Command(Need.NOTHING, lambda session, asked: session.advance(session.history.redo())),
-    "set": Command(Need.NOTHING, _set),
-    "reset": Command(Need.NOTHING, _reset),
-    "profile": Command(Need.NOTHING, _take_profile),
-    "set_part": _change("set a part", set_part),
-    "reset_part": _change("take a part's changes back", reset_part),
-    "turn": _change("turn the model", turn),
-    "stand": _change("lay the model down", stand),
-    "lay": _change("lay a face down", lay),
-    "search": Command(Need.MODEL, lambda session, asked: session.finding.begin(search_way(asked))),
-    "stop": Command(Need.NOTHING, _stop),
-    "take": _change("take another number of parts", take),
-    "try": Command(Need.MODEL, lambda session, asked: session.trials.move(move_plane(session.bench, asked))),
-    "add": _place("add a plane", added_anywhere),
-    "move": _place("move a plane", moved_alone),
-    "remove": _planes("remove a plane", remove_plane),
-    "reorder": _planes("print a part at another time", reorder, _too_early),
-    "limb": _planes("choose a limb", choose_limb),
-    "neck": Command(Need.MODEL, lambda session, asked: session.trials.take_neck(asked)),
-    "lock": Command(Need.MODEL, _lock),
-    "mark": _marks("mark"),
-    "unmark": _marks("unmark"),
-    "add_stop": _change("add a pause", add_stop),
-    "remove_stop": _change("take a pause away", remove_stop),
-    "copies": _change("print another number of copies", set_copies),
-    "slice": Command(Need.MODEL, lambda session, asked: session.slice()),
-    "compare": Command(Need.SLICES, lambda session, asked: session.comparing.begin()),
-}
+KINDS: tuple[type[Command], ...] = (
+    *(Plain, Demo, Unit, Plate, Set, Reset, TakeProfile, SetPart, ResetPart, Turn, Stand, Lay, Search, Take, Try, Add, Move),
+    *(Remove, Reorder, Limb, Neck, Lock, Mark, Unmark, AddStop, RemoveStop, Copies),
+)
+COMMANDS = {name: kind for kind in KINDS for name in get_args(kind.model_fields["do"].annotation)}
+NEEDS = {"compare": Need.SLICES} | dict.fromkeys(
+    ("demo", "unit", "dismiss", "undo", "redo", "set", "reset", "profile", "stop"), Need.NOTHING
+)  # what lies on the bench for all others is a model
 
 
 def obey(session: Session, asked: Asked) -> None:
-    """Do what a page asks for, `{"do": NAME, ...}`, or begin with it. Raises UserError for what cannot be done."""
+    """Have done what a page asks for, `{"do": NAME, ...}`, after all that was asked for before. Raises PlanError for what is no
+    command; why it cannot be done the page is told later, by the name `ask` of its command."""
     session.forget_problem()
     session.stopped = ""
-    name, ask = asked.get("do"), asked.get("ask")
     for named in (asked.get("name"), asked.get("ranker")):
         if isinstance(named, str):
             session.hear_name(named)
-    command = COMMANDS.get(name) if isinstance(name, str) else None
-    if command is None:
+    name = asked.get("do")
+    kind = COMMANDS.get(name) if isinstance(name, str) else None
+    if kind is None:
         raise PlanError(f"{name!r} is no command of the workbench: docs/workbench.md lists them")
-    check_need(session, command.need)
-    work = command.act(session, asked)
-    if work is None:
-        session.answer(ask)
-    else:
-        session.start(work, ask)
-        session.notify()
+    command = kind.of(asked)
+    # What is to be stopped ends at once, whatever its bench is busy with.
+    act = session.stop() if command.do == "stop" else partial(perform, session, command)
+    session.command(act, asked.get("ask"))
+
+
+def perform(session: Session, command: Command) -> Coroutine[Any, Any, None] | None:
+    """Do what a command says; gives the work that it still is. Raises UserError for what cannot be done, as that does."""
+    check_need(session, NEEDS.get(command.do, Need.MODEL))
+    match command:
+        case Change():
+            session.do(command.word, command.change(session.bench))
+        case Try():
+            session.trials.hold(command.cuts(session.bench))
+        case Edit():
+            return session.trials.take(command)
+        case Neck():
+            return session.trials.take_neck(command.part)
+        case Marking():
+            return session.trials.mark(command)
+        case Plain(do="undo"):
+            session.advance(session.history.undo())
+        case Plain(do="redo"):
+            session.advance(session.history.redo())
+        case Search():
+            session.finding.search(SearchWay(command.orient, command.ranker.strip() or CLASSIC))
+        case Plain(do="slice"):
+            session.slicing.slice()
+        case Plain(do="compare"):
+            session.comparing.compare()
+        case Set():
+            return session.take_given(
+                f"set {command.key}",
+                lambda given: with_typed(given, command.key, command.value, session.bench.profile),
+                command.key,
+            )
+        case Reset():
+            whose = "all changes" if command.kind is None else f"changes of the {command.kind}"
+            return session.take_given(f"take {whose} back", lambda given: without_settings(given, command.kind))
+        case TakeProfile():
+            return session.take_given(f"take {command.name}", lambda given: with_name(given, command.kind, command.name))
+        case Plain(do="file_settings"):
+            return session.take_settings_inside()
+        case Demo():
+            return session.open_demo(command.name)
+        case Unit():
+            return session.open_in_unit(command.unit)
+        case Plate():
+            return session.open_plate(command.plate)
+    return None

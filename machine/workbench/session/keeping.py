@@ -3,14 +3,15 @@
 import asyncio
 import os
 import sys
+import weakref
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench
-from machine.workbench.session.base import SessionBase
-from machine.workbench.work.kept_work import new_folder, write_work
+from machine.workbench.session.base import Derived, SessionBase
+from machine.workbench.work.folders import new_folder, write_work
 from profiles.errors import PlanError, UserError, reason
 from profiles.files import lock_folder
 
@@ -25,20 +26,22 @@ class Keeping:
         self._session = session
         self._folder: Path | None = None
         self._lock: int | None = None
-        self._kept: Bench | None = None
-        self._later: asyncio.TimerHandle | None = None
+        self._kept: weakref.ref[Bench] | None = None
         self._write_under_way: asyncio.Task[None] | None = None
-        self._writing = asyncio.Lock()
         self._path: Path | None = None  # of the model that is kept
         self._opening = False
         self._trouble = ""
         self._reported: tuple[str, Path | None] = "", None  # trouble, and the model that it was reported for
-        session.followers.append(self._follow)
+        self._saved = Derived(session, self._unsaved, self._save, start=asyncio.create_task)  # the end of a session waits for it
 
     @property
     def behind(self) -> bool:
         """Whether a change has not been written, or tried to be, yet."""
-        return self._session.bench is not self._kept and self._session.bench.model is not None
+        kept = None if self._kept is None else self._kept()
+        return self._session.bench is not kept and self._session.bench.model is not None
+
+    def _unsaved(self, bench: Bench) -> weakref.ref[Bench] | None:
+        return weakref.ref(bench) if self.behind and not self._opening and not self._session.closed else None
 
     @asynccontextmanager
     async def opening(self, folder: Path) -> AsyncIterator[None]:
@@ -50,15 +53,15 @@ class Keeping:
         self._opening = True
         try:
             yield
-            async with self._writing:
-                self._release()
-                self._folder, self._lock, lock = folder, lock, None
-                self._path = None if self._session.bench.model is None else self._session.bench.model.path
+            await self._written()
+            self._release()
+            self._folder, self._lock, lock = folder, lock, None
+            self._path = None if self._session.bench.model is None else self._session.bench.model.path
         finally:
             if lock is not None:
                 os.close(lock)
             self._opening = False
-            self._follow()
+            self._saved.follow()
 
     async def finish(self) -> str:
         """Wait for the write under way, and write what is newer; why the last change is not kept, "" where it is.
@@ -66,13 +69,10 @@ class Keeping:
         The session has ended, so that nothing changes any more. Work that was still being opened stays as it was kept.
         """
         was_opening = self._opening
-        if self._later is not None:
-            self._later.cancel()
-        async with self._writing:
-            if self._trouble:  # tried once more
-                self._kept = None
-            if not was_opening:
-                await self._write_newest()
+        self._saved.stop()
+        await self._written()
+        if not was_opening and self._session.bench.model is not None and (self.behind or self._trouble):  # tried once more
+            await self._write_newest()
         self._release()
         return self._trouble
 
@@ -82,28 +82,28 @@ class Keeping:
             os.close(self._lock)
         self._folder, self._lock = None, None
 
-    def _follow(self) -> None:
-        if self.behind and self._later is None and not self._opening and not self._session.closed:
-            self._later = asyncio.get_running_loop().call_later(AFTER_S, self._begin)
+    async def _save(self, bench: Bench) -> None:
+        await asyncio.sleep(AFTER_S)
+        await self._written()
+        if self.behind and not self._opening:
+            await self._write_newest()
 
-    def _begin(self) -> None:
-        self._later = None
-        self._write_under_way = asyncio.create_task(self._keep())  # not a task of the session, which cancels those at its end
+    async def _written(self) -> None:
+        """Return when no write is under way."""
+        if self._write_under_way is not None:
+            await asyncio.wait((self._write_under_way,))
 
-    async def _keep(self) -> None:
-        async with self._writing:
-            if not self._opening:
-                await self._write_newest()
+    async def _write_newest(self) -> None:
+        async def write(bench: Bench) -> None:
+            self._trouble = await asyncio.to_thread(self._write, bench)
+            self._kept = weakref.ref(bench)
             reported, self._reported = self._reported, (self._trouble, self._path)
             if self._trouble and reported != self._reported:  # once a model, not with every change
                 self._session.add_problem(f"this work cannot be kept for after a crash: {self._trouble}; Save > Project keeps it")
                 self._session.notify()
 
-    async def _write_newest(self) -> None:
-        bench = self._session.bench
-        if self.behind:
-            self._trouble = await asyncio.to_thread(self._write, bench)
-            self._kept = bench
+        self._write_under_way = asyncio.create_task(write(self._session.bench))  # it outlives who waits for it
+        await self._written()
 
     def _write(self, bench: Bench) -> str:
         """Why it could not be written, "" where it is."""

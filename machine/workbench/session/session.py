@@ -1,8 +1,8 @@
-"""Session: one bench, and the work under way for it."""
+"""Session: one bench, and the work under way for it; the workbench: the sessions of one run of the program."""
 
 import asyncio
 import shutil
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,9 @@ from machine.pipeline.project import Project, unpack
 from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import (
     Bench,
+    History,
+    Step,
+    emptied,
     with_cuts,
     with_model,
     with_model_turned_as_read,
@@ -23,22 +26,16 @@ from machine.workbench.bench.bench import (
     with_rows,
     with_scaled_model,
 )
-from machine.workbench.bench.effect import Effect, effect_of_change
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.settings import check_block, profile_as_given, with_given, with_typed
-from machine.workbench.session.base import LONGEST_SENTENCE, SessionBase, asking
-from machine.workbench.session.comparing import Comparing
-from machine.workbench.session.finding import Finding
+from machine.workbench.session.base import LONGEST_SENTENCE, Derived, SessionBase, asking
+from machine.workbench.session.finding import Finding, prices_of
 from machine.workbench.session.keeping import Keeping
-from machine.workbench.session.marking import Marking
-from machine.workbench.session.pricing import Pricing
-from machine.workbench.session.readiness import Readiness
-from machine.workbench.session.slicing import Slicing
-from machine.workbench.session.standing import StandingModel
-from machine.workbench.session.trials import PlaneTrials
-from machine.workbench.work.kept_work import new_folder
-from machine.workbench.work.models import Resting, Unscaled
-from machine.workbench.work.received import NAMES_KEPT, files_in
+from machine.workbench.session.placement import Readiness, resting_of, standing_of
+from machine.workbench.session.planes import PlaneTrials
+from machine.workbench.session.slicing import Comparing, Slicing
+from machine.workbench.work.folders import NAMES_KEPT, files_in, new_folder
+from machine.workbench.work.models import Unscaled
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import locate, plan_beside
 from mdp.pose import turned_by
@@ -46,9 +43,12 @@ from mdp.read import MANY_FACES
 from mdp.search.plan_file import PlanFile, planned_parts
 from mdp.search.plan_reading import read_plan
 from mdp.zone import NO_ZONES
+from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
+from profiles.frozen import Effect
 from profiles.profile import Profile
 
+MOST_SESSIONS = 20
 READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a model is read
 
 
@@ -83,23 +83,18 @@ class _UnscaledError(MeshError):
 
 
 class Session(SessionBase):
-    """A bench with all work on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
-    this one too; unscaled: the model that waits for its unit; settings_note: key of a model, and the note on those taken from
-    its file."""
+    """A bench with all work on it. benches: all that are open, this one too; unscaled: the model that waits for its unit;
+    settings_note: key of a model, and the note on those taken from its file."""
 
     def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
         super().__init__(Bench(profile, given=given), pools)
         self.slicing, self.readiness = Slicing(self), Readiness(self)
+        self.standing, self.resting = standing_of(self), resting_of(self, self.readiness)
         self.trials = PlaneTrials(self, self.readiness)
-        self.finding = Finding(self)
+        self.finding, self._prices = Finding(self), prices_of(self)
         self.comparing = Comparing(self, self.slicing)
-        self._pricing, self.standing = Pricing(self), StandingModel(self)
-        self._settling, self._drawing = asyncio.Lock(), asyncio.Lock()
-        self._pieces: tuple[Bench, Path] | None = None  # drawn last
-        self.marking = Marking(self, self.trials)
+        self.pieces = Derived(self, lambda bench: bench.shaped, self._draw_pieces, by_itself=False)
         self.keeping = Keeping(self)
-        self._ranking: asyncio.Task[None] | None = None
-        self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
         self.unscaled: OfUnknownUnit | None = None
         self.settings_note = ("", "")
@@ -151,22 +146,16 @@ class Session(SessionBase):
         self.hear_name(name)
         self.hear_name(str(path))
         self.readiness.load()
-        if self._ranking is not None and self.bench.model is not None and self.bench.model.faces > MANY_FACES:
-            self._ranking.cancel()  # it would be waited for
+        if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
+            self.resting.stop()  # it would be waited for
         with self.waiting(f"reading {name}"):
-            gone, model = self._set_for_another(name) if anew else frozenset[str](), None
-            bench = self._bench_without(gone)
-            read_for: tuple[object, ...] = ()
-            while model is None or _reads(bench.profile) != read_for:  # another scale may be set meanwhile
-                read_for = _reads(bench.profile)
-                try:
-                    model = await self._read(path, name, bench.profile, plate)
-                except _UnscaledError as error:
-                    self.unscaled = OfUnknownUnit(asking.get(), path, name, error.unscaled.units)
-                    raise MeshError(error.unscaled.question if asking.get() else error.unscaled.sentence) from None
-                bench = self._bench_without(gone)
-            self.do(f"open {name}", with_model(bench, model))
-        self._begin_ranking(model)
+            bench = self._bench_without(self._set_for_another(name) if anew else frozenset())
+            try:
+                model = await self._read(path, name, bench.profile, plate)
+            except _UnscaledError as error:
+                self.unscaled = OfUnknownUnit(asking.get(), path, name, error.unscaled.units)
+                raise MeshError(error.unscaled.question if asking.get() else error.unscaled.sentence) from None
+        self.do(f"open {name}", with_model(bench, model))
 
     def _set_for_another(self, name: str) -> frozenset[str]:
         """What is set for the reading of a model on the bench that has another name."""
@@ -183,10 +172,10 @@ class Session(SessionBase):
         given = replace(bench.given, settings=tuple(setting for setting in bench.given.settings if setting not in gone))
         return with_profile(bench, given, profile_as_given(given, bench.profile))
 
-    async def open_in_unit(self, unit: object) -> None:
+    async def open_in_unit(self, unit: str) -> None:
         """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
-        waits, bench = self.unscaled, self.bench
-        if waits is None or not isinstance(unit, str) or unit not in waits.units:
+        waits = self.unscaled
+        if waits is None or unit not in waits.units:
             raise PlanError(
                 f"unit is {unit!r}: {', '.join(waits.units) if waits else 'nothing, for no model waits for one,'} is allowed"
             )
@@ -195,19 +184,16 @@ class Session(SessionBase):
         scaled = with_profile(unscaled, given, profile_as_given(given, unscaled.profile))
         with self.waiting(f"reading {waits.name}"):
             model = await self._read(waits.path, waits.name, scaled.profile)
-        if self.bench is not bench:
-            raise PlanError(f"open {waits.name}: what lies on the workbench has changed meanwhile, so it was not done")
         self.unscaled = None
         self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
-        self._begin_ranking(model)
 
-    async def open_plate(self, plate: object) -> None:
+    async def open_plate(self, plate: int) -> None:
         """Put another plate of the slicer file on the bench there. Raises UserError."""
         model = self.bench.model
-        numbers = [] if model is None else list(model.plates)
-        if model is None or not isinstance(plate, int) or isinstance(plate, bool) or plate not in numbers:
-            allowed = f"one of {', '.join(map(str, numbers))} is expected" if numbers else "the model has no plates"
-            raise PlanError(f"plate is {plate!r}: {allowed}")
+        if model is None or plate not in model.plates:
+            numbers = [] if model is None else map(str, model.plates)
+            allowed = f"one of {', '.join(numbers)} is expected" if numbers else "the model has no plates"
+            raise PlanError(f"plate is {plate}: {allowed}")
         await self.open_model(model.path, model.name, anew=False, plate=plate)
 
     async def take_settings_inside(self) -> None:
@@ -247,10 +233,7 @@ class Session(SessionBase):
         Raises UserError; the folder stays as it is then.
         """
         async with self.keeping.opening(folder):
-            bench = await self._bench_of(project)
-            self.do(word, bench)
-        if bench.model is not None:
-            self._begin_ranking(bench.model)
+            self.do(word, await self._bench_of(project))
 
     async def _bench_of(self, project: Project) -> Bench:
         """A bench with a project on it. Raises UserError."""
@@ -284,61 +267,56 @@ class Session(SessionBase):
         """The same for a plan that is read already."""
         self.hear_name(plan.name)
         self.hear_name(plan.model)
+        bench = self.bench
+        if bench.model is None:
+            wanted = plan.model or "its model"
+            raise PlanError(f"plan {plan.name}: there is no model on the workbench to cut by it: open {wanted} first")
         with self.waiting(f"cutting by {plan.name}"):
-            bench = None
-            while bench is not self.bench:  # another model or setting may be there meanwhile
-                bench = self.bench
-                if bench.model is None:
-                    wanted = plan.model or "its model"
-                    raise PlanError(f"plan {plan.name}: there is no model on the workbench to cut by it: open {wanted} first")
-                profile = with_plan_settings(bench.profile.of_all_parts, plan)
-                rows = await self.quick.run("measure_plan", bench, plan)
-            self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
+            profile = with_plan_settings(bench.profile.of_all_parts, plan)
+            rows = await self.quick.run("measure_plan", bench, plan)
+        self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
     async def make(self, word: str, task: str, *given: Any) -> Any:
         """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
         with self.waiting(word):
             return await self.quick.run(task, self.bench, *given)
 
-    async def pieces(self) -> Path:
-        """The parts as bodies of their own, as `work.pieces` packs them, cut once for all that ask. Raises UserError where they
-        cannot be cut."""
-        bench = self.bench
-        async with self._drawing:
-            if self._pieces is None or self._pieces[0].shaped != bench.shaped:
-                out = self.new_file()
-                await self.quick.run("draw_pieces", bench, out)
-                if self._pieces is not None:
-                    self._pieces[1].unlink(missing_ok=True)
-                self._pieces = bench, out
-            return self._pieces[1]
+    async def _draw_pieces(self, bench: Bench) -> Path:
+        """The parts as bodies of their own, as `work.pieces` packs them. Raises UserError where they cannot be cut."""
+        out, before = self.new_file(), self.pieces.done
+        await self.quick.run("draw_pieces", bench, out)
+        if before is not None:
+            before.unlink(missing_ok=True)
+        return out
 
-    def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> Coroutine[Any, Any, None]:
-        """The work of taking other names and settings; those of the bench by then, for several may be asked for at once. key: the
-        one that is set. Raises ProfileError."""
-        check_block(profile_as_given(change(self.bench.given), self.bench.profile), key)  # refused at once
-        return self._settle(word, change)
+    async def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> None:
+        """Take other names and settings. key: the one that is set. Raises UserError."""
+        before = self.bench
+        given = change(before.given)
+        check_block(profile_as_given(given, before.profile), key)
+        bench, refused = await self._with_profile(word, before, given)
+        if given != before.given:
+            self.do(word, bench, refused)
 
-    def slice(self) -> Coroutine[Any, Any, None] | None:
-        """Slice what lies on the bench, with the settings that were asked for before, which may still be settled."""
-        if self._settling.locked():
-            return self._slice_settled()
-        self.slicing.begin()
-        return None
+    def stop(self) -> Callable[[], None]:
+        """End all work at once. Gives what is to be done in a turn: take the best of the search, tell what became of all."""
+        search, bench = self.finding.progress, self.finding.bench
+        words = []
+        if self.slicing.progress is not None:
+            left = "the slices from before stay" if self.slicing.latest() else "there are no slices"
+            words.append(f"Slicing was stopped: {left}.")
+        if self.comparing.progress is not None:
+            words.append("The comparison was stopped: nothing of it is kept.")
+        for work in (self.finding, self.slicing, self.comparing):
+            work.stop()
+        if search is not None:
+            self.start(self.long.warm())
 
-    async def _slice_settled(self) -> None:
-        async with self._settling:
-            self.slicing.begin()
+        def tell() -> None:
+            found = [] if search is None else [self.finding.take_best(bench, search)]
+            self.stopped = " ".join([*found, *words])
 
-    async def _settle(self, word: str, change: Callable[[Given], Given]) -> None:
-        async with self._settling:
-            before = None
-            while before is not self.bench:
-                before = self.bench
-                given = change(before.given)
-                bench, refused = await self._with_profile(word, before, given)
-            if given != before.given:
-                self.do(word, bench, refused)
+        return tell
 
     async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
         """A bench with another profile; planes that it forbids go, with the reason, so do rows of the front that cannot be cut at
@@ -348,7 +326,6 @@ class Session(SessionBase):
         if model is not None and _reads(bench.profile) != _reads(before.profile):
             with self.waiting(f"reading {model.name}"):
                 model = await self._read(model.path, model.name, bench.profile, model.plate)
-            self._begin_ranking(model)
             if new.rotate_deg != old.rotate_deg:
                 turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
                 return with_model_turned_as_read(bench, model, turn, new.scale / old.scale), ""
@@ -372,15 +349,6 @@ class Session(SessionBase):
         finalize(model, _remove_files, model.mesh_file, model.shapes_file)
         return model
 
-    def _begin_ranking(self, model: Model) -> None:
-        """Rank the ways in which a model rests."""
-        self._ranking = self.start(self._rank(model))
-
-    async def _rank(self, model: Model) -> None:
-        await self.readiness.wait()
-        resting = await self.quick.run("rank_resting", model, self.bench.profile.of_all_parts)
-        self.resting = model.key, resting
-
 
 def _remove_files(*files: Path | None) -> None:
     """Remove the files of a model that is not used any more."""
@@ -399,3 +367,63 @@ def _read_plan(path: Path) -> PlanFile:
 def _reads(profile: Profile) -> tuple[object, ...]:
     """The settings of a profile that decide how a model is read."""
     return profile.process.scale, profile.process.rotate_deg
+
+
+class Workbench:
+    """sessions: by number, from 1 on; a number is not given again. Each is told what the others are, as soon as that changes.
+    pools: of the processes that they share."""
+
+    def __init__(self, make: Callable[[WorkerPools], Session]) -> None:
+        self.sessions: dict[int, Session] = {}
+        self.pools = WorkerPools()
+        self._make = make
+        self._closing: dict[int, asyncio.Task[str]] = {}
+        self._last = 0
+
+    def open(self, like: Session | None = None) -> int:
+        """The number of a new session with an empty bench, its machine and settings those of another. Raises PlanError where
+        there are too many."""
+        if len(self.sessions) >= MOST_SESSIONS:
+            raise PlanError(f"{MOST_SESSIONS} benches are open, which is the most: close one first")
+        self._last += 1
+        self.sessions[self._last] = session = self._make(self.pools)
+        if like is not None:
+            session.history = History(Step("", emptied(like.bench)))
+        session.listeners.append(self._list_again)
+        session.warm()
+        self._list_again()
+        return self._last
+
+    async def close(self, number: int) -> str:
+        """End a session and its work; a sentence where its last change could not be kept, else "". To cancel the waiting does not
+        cancel the keeping."""
+        self._begin_to_close(number)
+        return await asyncio.shield(self._closing[number]) if number in self._closing else ""
+
+    async def close_all(self) -> list[str]:
+        """End all of them, and all processes; a sentence for each whose last change could not be kept."""
+        for number in list(self.sessions):
+            self._begin_to_close(number)
+        await asyncio.sleep(0)  # all of them have ended their work
+        self.pools.end()
+        return [trouble for trouble in await asyncio.gather(*self._closing.values()) if trouble]
+
+    def _begin_to_close(self, number: int) -> None:
+        session = self.sessions.pop(number, None)
+        if session is not None:
+            self._closing[number] = closing = asyncio.create_task(session.close())
+            closing.add_done_callback(lambda _: self._closing.pop(number))
+            self._list_again()
+
+    def _list_again(self) -> None:
+        benches = tuple(_described(number, session) for number, session in self.sessions.items())
+        for session in self.sessions.values():
+            if session.benches != benches:
+                session.benches = benches
+                session.notify()
+
+
+def _described(number: int, session: Session) -> OpenBench:
+    bench = session.bench
+    work = session.busy or ("finding parts" if session.finding.progress else "slicing" if session.slicing.progress else "")
+    return OpenBench(number, "" if bench.model is None else bench.model.name, bench.parts, work)

@@ -1,11 +1,12 @@
-"""Slicing: the slices that a session has or makes, and whether they are of what lies on the bench now."""
+"""Slicing: the slices that a session has or makes, whether they are of what lies on the bench now, and what they cost beside the
+same model in one piece."""
 
-import asyncio
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from machine.program import Alternative
 from machine.workbench.bench.bench import Bench
-from machine.workbench.session.base import WAITING, SessionBase
+from machine.workbench.session.base import WAITING, Derived, SessionBase
 from machine.workbench.work.slices import Sliced, SlicesSoFar
 from profiles.errors import PlanError
 
@@ -33,16 +34,11 @@ class Slices:
     walls: Mapping[int, bytes]
 
 
-class Slicing:
-    """under_way: what is sliced now; done: the last slices."""
+class Slicing(Derived[Slices]):
+    """progress: a SlicingUnderWay; done: the last slices."""
 
     def __init__(self, session: SessionBase) -> None:
-        self.under_way: SlicingUnderWay | None = None
-        self.done: Slices | None = None
-        self._session = session
-        self._count = 0
-        self._task: asyncio.Task[None] | None = None
-        session.followers.append(self._follow)
+        super().__init__(session, lambda bench: bench.printed, self._slice, by_itself=False, interrupts=True)
 
     def latest(self) -> Slices | None:
         """The last slices of the model on the bench, though it may have been turned, cut or set otherwise since."""
@@ -68,50 +64,56 @@ class Slicing:
 
     def walls_of(self, number: int, part: int) -> bytes | None:
         """What is seen of a part of the slices of a number; None where it is not there, or not there yet."""
-        for slices in (self.under_way, self.done):
+        for slices in (self.progress, self.done):
             if slices is not None and slices.number == number:
-                return slices.walls.get(part)
+                drawn: bytes | None = slices.walls.get(part)
+                return drawn
         return None
 
-    def begin(self) -> None:
+    def slice(self) -> None:
         """Slice the model on the bench, if nothing is being sliced."""
-        bench = self._session.bench
-        if self.under_way is None:
-            self._count += 1
-            begins = WAITING if self._session.long.pool.full else "cutting the parts"
-            self.under_way = SlicingUnderWay(bench, self._count, begins)
-            self._task = self._session.start(self._slice(self.under_way))
+        begins = WAITING if self._session.long.pool.full else "cutting the parts"
+        self.begin(SlicingUnderWay(self._session.bench, self.number + 1, begins))
 
-    def stop(self) -> str:
-        """End the slicing. What became of it, as a sentence; "" where nothing was sliced."""
-        under_way, self.under_way = self.under_way, None
-        if under_way is None or self._task is None:
-            return ""
-        self._task.cancel()
-        return "Slicing was stopped: " + ("the slices from before stay." if self.latest() else "there are no slices.")
+    def interrupted(self) -> None:
+        """Tell the pages."""
+        self._session.add_problem(ENDED)
 
-    async def _slice(self, begun: SlicingUnderWay) -> None:
+    async def _slice(self, bench: Bench) -> Slices:
         walls: dict[int, bytes] = {}
+        number, tell = self.number, self.teller()
 
         def follow(so_far: SlicesSoFar) -> None:
             walls.update(so_far.walls)
-            if self.under_way is None or self.under_way.number != begun.number:
-                return
-            self.under_way = SlicingUnderWay(begun.bench, begun.number, so_far.text, so_far.shares, walls)
-            self._session.notify()
+            tell(SlicingUnderWay(bench, number, so_far.text, so_far.shares, walls))
 
-        try:
-            files = self._session.new_file(), self._session.new_file()
-            sliced: Sliced = await self._session.long.run("slice_bench", begun.bench, *files, tell=follow)
-            if self.done is not None:
-                self.done.sliced.page.unlink(missing_ok=True)
-                self.done.sliced.gcode.unlink(missing_ok=True)
-            self.done = Slices(begun.bench, begun.number, sliced, walls)
-        finally:
-            if self.under_way is not None and self.under_way.number == begun.number:
-                self.under_way = None
+        files = self._session.new_file(), self._session.new_file()
+        sliced: Sliced = await self._session.long.run("slice_bench", bench, *files, tell=follow)
+        if self.done is not None:
+            self.done.sliced.page.unlink(missing_ok=True)
+            self.done.sliced.gcode.unlink(missing_ok=True)
+        return Slices(bench, number, sliced, walls)
 
-    def _follow(self) -> None:
-        if self.under_way is not None and self.under_way.bench.printed != self._session.bench.printed:
-            self.stop()
-            self._session.add_problem(ENDED)
+
+class Comparing(Derived[tuple[Alternative, ...]]):
+    """The slices of the bench beside their model in one piece; progress: how far that is, in words."""
+
+    def __init__(self, session: SessionBase, slicing: Slicing) -> None:
+        self._slicing = slicing
+        super().__init__(
+            session,
+            lambda bench: None if (slices := slicing.latest()) is None else slices.bench.printed,
+            lambda bench: session.long.run("compare_bench", bench, tell=self.teller()),
+            by_itself=False,
+            interrupts=True,
+        )
+
+    def rows(self) -> tuple[Alternative, ...]:
+        """The last slices, then their model in one piece; none where these slices have not been compared."""
+        slices, others = self._slicing.latest(), self.result
+        return () if slices is None or others is None else (slices.sliced.cost, *others)
+
+    def compare(self) -> None:
+        """Compare what is sliced, if that is not done yet."""
+        if not self.rows():
+            self.begin(WAITING if self._session.long.pool.full else "comparing")

@@ -9,8 +9,7 @@ from starlette.responses import FileResponse, Response
 
 from machine.pipeline.output import plain_name
 from machine.pipeline.profile_file import profile_text
-from machine.workbench.bench.command_line import file_stem
-from machine.workbench.bench.settings import settings_of
+from machine.workbench.bench.settings import file_stem, settings_of
 from machine.workbench.session.session import Session
 from machine.workbench.session.slicing import Slices
 from profiles.errors import PlanError

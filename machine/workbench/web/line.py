@@ -1,26 +1,33 @@
-"""Line: the websocket between a session and a page: state out, commands in."""
+"""Lines: the websockets of a page: to its session, state out and commands in; on this computer one to the network's door."""
 
 import asyncio
 import json
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 from weakref import WeakKeyDictionary
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from machine.workbench.access.limits import DEVICE, check_bench_command
+from machine.workbench.access.pairing import Door
+from machine.workbench.bench.values import Asked
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
 from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work.observable import Observable
-from profiles.errors import PlanError
+from profiles.errors import PlanError, UserError
 
 MOST_COMMAND = 100_000  # characters
 _states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
 CLOSED = "this bench is not open any more"
 CLOSED_CODE = 4404  # of a websocket that is closed for that
 GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
+MOST_OF_DEVICES = 1_000  # characters
+DEVICE_COMMANDS: dict[str, Callable[[Door, Asked], None]] = {
+    "unpair": lambda door, asked: door.unpair(asked.get("device")),
+    "reopen": lambda door, asked: door.reopen(),
+}
 
 
 async def talk(session: Session, socket: WebSocket) -> None:
@@ -99,3 +106,30 @@ def parsed(text: str, most: int) -> dict[str, Any]:
     if not isinstance(asked, dict):
         raise PlanError("what the page has sent is no command of the workbench")
     return asked
+
+
+def devices_line(door: Door) -> Callable[[WebSocket], Awaitable[None]]:
+    """What answers the websocket of a page of this computer; no address of the network leads to it."""
+
+    async def talk(socket: WebSocket) -> None:
+        await socket.accept()
+        await until_either_ends(tell(door, door.snapshot, socket), _hear_devices(door, socket))
+
+    return talk
+
+
+async def _hear_devices(door: Door, socket: WebSocket) -> None:
+    while True:
+        text = await receive(socket)
+        try:
+            _obey_door(door, parsed(text, MOST_OF_DEVICES))
+        except UserError as error:
+            await send(socket, json.dumps({"problem": str(error)}))
+
+
+def _obey_door(door: Door, asked: Asked) -> None:
+    name = asked.get("do")
+    command = DEVICE_COMMANDS.get(name) if isinstance(name, str) else None
+    if command is None:
+        raise PlanError("what the page has sent is no command of the paired devices")
+    command(door, asked)

@@ -20,7 +20,7 @@ from machine.workbench.bench.page_words import page_words, with_page_words
 from machine.workbench.bench.values import Asked
 from machine.workbench.printing.commands import PageOfPrints, Work, obey
 from machine.workbench.printing.prints import Prints
-from machine.workbench.session.workbench import Workbench
+from machine.workbench.session.session import Workbench
 from machine.workbench.web.line import parsed, receive, refuse_closed, send, tell, until_either_ends
 from machine.workbench.web.sessions_thread import SessionsThread
 from profiles.errors import PrinterError, ServerError, UserError

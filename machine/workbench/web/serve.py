@@ -15,16 +15,14 @@ from machine.cli.terminal.interrupts import calling
 from machine.notices import say
 from machine.pipeline.requests import UPLOAD_MIB
 from machine.view.serving.guard import HOST
-from machine.workbench.access.door import Door
-from machine.workbench.access.lan import Lan
-from machine.workbench.access.listening import listen_at_all
+from machine.workbench.access.network import Lan, listen_at_all
+from machine.workbench.access.pairing import Door
 from machine.workbench.printing.prints import Prints
-from machine.workbench.session.session import Session
-from machine.workbench.session.workbench import Workbench
+from machine.workbench.session.session import Session, Workbench
 from machine.workbench.web.server import Served, application, lan_application
 from machine.workbench.web.sessions_thread import SessionsThread
 from machine.workbench.web.uploads import Uploads
-from machine.workbench.work.received import files_in, tidy_left
+from machine.workbench.work.folders import files_in, tidy_left
 from machine.workbench.work.worker_pool import WorkerPools
 
 GRACE_S = 1  # for answers under way when it ends, and for its processes

@@ -1,30 +1,31 @@
-"""Server: the addresses of the workbench: its page, its sessions' models, files and lines."""
+"""Server: the page, and the addresses of the workbench: its sessions' models, files and lines; benches opened and closed."""
 
-from collections.abc import Awaitable, Callable, Sequence
+import re
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from machine.notices import say
+from machine.view.page import TEMPLATE, bundle, hash_source
 from machine.view.serving.guard import NAMES, Guard
-from machine.workbench.access.door import Door
 from machine.workbench.access.gate import Gate
-from machine.workbench.access.lan import Lan
-from machine.workbench.bench.command_line import export_command
+from machine.workbench.access.network import Lan
+from machine.workbench.access.pairing import Door
 from machine.workbench.bench.page_words import page_words
-from machine.workbench.bench.settings import settings_list
+from machine.workbench.bench.settings import export_command, settings_list
 from machine.workbench.bench.values import is_small_number
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import Need, check_need
-from machine.workbench.session.session import Session
-from machine.workbench.session.workbench import Workbench
-from machine.workbench.web.benches import bench_routes
-from machine.workbench.web.devices_line import devices_line
+from machine.workbench.session.placement import pedestal_key
+from machine.workbench.session.session import Session, Workbench
 from machine.workbench.web.downloads import (
     folder,
     gcode,
@@ -37,17 +38,64 @@ from machine.workbench.web.downloads import (
     project,
     shared_page,
 )
-from machine.workbench.web.line import CLOSED, refuse_closed, talk
-from machine.workbench.web.page import workbench_page
+from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
 from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
-from machine.workbench.web.profile_files import ProfileFiles
 from machine.workbench.web.sessions_thread import SessionsThread
 from machine.workbench.web.snapshot import marks_key
-from machine.workbench.web.uploads import Uploads
+from machine.workbench.web.uploads import ProfileFiles, Uploads
+from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
+OWN = Path(__file__).parent / "page"
+MARKER = re.compile(r"/\*(?:STYLE|SCRIPT|NETWORK)\*/")
 Act = Callable[[Session, Request], Awaitable[Response]]
 BELOW = "/{token}/{session:int}/"
+
+
+def workbench_page(lines: Iterable[str], network: str = "") -> tuple[bytes, str]:
+    """The page and its content security policy. lines: origins of websockets of the server, to which alone the page may talk;
+    network: "open" for this computer's own page where others are let in, "paired" for that of a device that is."""
+    style, script = "".join((folder / "style.css").read_text("utf-8") for folder in (TEMPLATE, OWN)), bundle(OWN / "main.js")
+    put = {"/*STYLE*/": style, "/*SCRIPT*/": script, "/*NETWORK*/": network}
+    body = MARKER.sub(lambda match: put[match[0]], (OWN / "page.html").read_text("utf-8"))
+    return body.encode(), policy(style, script, lines)
+
+
+def policy(style: str, script: str, lines: Iterable[str]) -> str:
+    """What the page may do: its own script and style, pictures that it has made itself, and talk to its server."""
+    server = " ".join(("'self'", *lines))
+    own = f"script-src {hash_source(script)}; style-src {hash_source(style)}; connect-src {server}"
+    rest = "frame-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    return f"default-src 'none'; {own}; {rest}"
+
+
+def bench_routes(workbench: Workbench) -> list[Route]:
+    """What is not of one bench: `benches` (POST: one more, with the settings of that `like`), `benches/N` (DELETE),
+    and the address without a number, which leads to the first."""
+
+    async def first(request: Request) -> Response:
+        number = min(workbench.sessions, default=0) or workbench.open()
+        return RedirectResponse(f"{number}/")
+
+    async def opened(request: Request) -> Response:
+        like = request.query_params.get("like", "")
+        try:
+            number = workbench.open(workbench.sessions.get(int(like)) if is_small_number(like) else None)
+        except PlanError as error:
+            return JSONResponse({"problem": page_words(str(error))}, status_code=422)
+        return JSONResponse({"number": number})
+
+    async def closed(request: Request) -> Response:
+        trouble = await workbench.close(request.path_params["number"])
+        if trouble:  # its page is gone
+            say(trouble)
+        return JSONResponse({})
+
+    return [
+        Route("/{token}/", first),
+        Route("/{token}/benches", opened, methods=["POST"]),
+        Route("/{token}/benches/{number:int}", closed, methods=["DELETE"]),
+    ]
 
 
 @dataclass(frozen=True)
@@ -165,8 +213,8 @@ async def _model(session: Session, request: Request) -> Response:
 
 
 async def _pedestal(session: Session, request: Request) -> Response:
-    standing = session.standing.now
-    if standing is None or session.standing.pedestal_key != request.path_params["key"]:
+    standing = session.standing.result
+    if standing is None or pedestal_key(session.bench, standing) != request.path_params["key"]:
         return Response(status_code=204)
     return Response(standing.pedestal, media_type="application/octet-stream")
 
@@ -179,7 +227,7 @@ async def _facets(session: Session, request: Request) -> Response:
 
 
 async def _pieces(session: Session, request: Request) -> Response:
-    return FileResponse(await session.pieces(), media_type="application/octet-stream")
+    return FileResponse(await session.pieces.get(), media_type="application/octet-stream")
 
 
 async def _marks(session: Session, request: Request) -> Response:

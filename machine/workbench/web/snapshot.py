@@ -1,24 +1,31 @@
-"""Snapshot: what a page is told of the session, as JSON."""
+"""Snapshot: what a page is told of the session, as JSON: the bench, the slices and whether they can be printed."""
 
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from hashlib import sha256
-from typing import Any
+from typing import Any, Literal
 
-from machine.view.front import front_record
-from machine.view.parts import page_colours
+from machine.dryrun.findings import Finding
+from machine.program import Alternative
+from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
+from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.page_words import in_page_words, page_words, with_page_words
 from machine.workbench.bench.planes import Cuts
 from machine.workbench.session.commands import Need, lacking
+from machine.workbench.session.placement import pedestal_key
 from machine.workbench.session.session import Session
-from machine.workbench.web.slices import slices_state
+from mdp.joint import Joint
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import AnyZone, MeshVolume, Modifier, Zone
+from profiles.material import Material
+from profiles.profile import Profile
 
+MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # that a page draws
 # The keys of the state that hold sentences.
 SENTENCES = (
@@ -27,16 +34,147 @@ SENTENCES = (
 )
 
 
+@dataclass(frozen=True)
+class Remedy:
+    """What a button says, and the command of the workbench that it gives."""
+
+    text: str
+    command: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """finding: place in the list of the one that the text is about, -1: none; remedy: what a button does about it."""
+
+    kind: Literal["ready", "problem", "stale"]
+    text: str
+    finding: int = -1
+    remedy: Remedy | None = None
+
+
+SLICE_AGAIN = Remedy("Slice again", {"do": "slice"})
+
+
+def _without_purge(profile: Profile) -> Remedy | None:
+    return Remedy("Print no purge line", _set("machine.purge_mm", "0")) if profile.machine.purge_mm > 0.0 else None
+
+
+def _set(key: str, value: str) -> dict[str, object]:
+    return {"do": "set", "key": key, "value": value}
+
+
+SUPPORT_ON = Remedy("Switch support on", _set("process.support", "auto"))
+# By the code of a finding: what a setting can do about it.
+REMEDIES: dict[str, Callable[[Profile], Remedy | None]] = {"purge": _without_purge}
+
+
+def verdict_of(findings: Sequence[Finding], profile: Profile, hanging_mm2: float, *, out_of_date: bool) -> Verdict:
+    """Whether slices with these findings, made with this profile, can be printed. hanging_mm2: of faces that need support;
+    out_of_date: the bench was changed since."""
+    if out_of_date:
+        return Verdict("stale", "Out of date: the workbench was changed since it was sliced", remedy=SLICE_AGAIN)
+    errors = [k for k, finding in enumerate(findings) if finding.severity == "error"]
+    if errors:
+        count = "1 problem" if len(errors) == 1 else f"{len(errors)} problems, the first"
+        return Verdict("problem", f"{count}: {findings[errors[0]].message}", errors[0], _remedy(findings[errors[0]], profile))
+    process = profile.process
+    if process.support == "none" and not process.spiral_vase and hanging_mm2 > process.support_least_mm2:
+        return Verdict("ready", f"Ready to print, but {hanging_mm2:.0f} mm2 hang over without support", remedy=SUPPORT_ON)
+    warnings = f"; {len(findings)} warning{'s' * (len(findings) > 1)} below" if findings else ""
+    return Verdict("ready", f"Ready to print{warnings}")
+
+
+def _remedy(finding: Finding, profile: Profile) -> Remedy | None:
+    find = REMEDIES.get(finding.code)
+    return None if find is None else find(profile)
+
+
+def slices_state(session: Session) -> dict[str, Any]:
+    """The keys `slicing`, `sliced`, `comparing` and `compared` of the state."""
+    return {
+        "slicing": _under_way(session),
+        "sliced": _sliced(session),
+        "comparing": session.comparing.progress or "",
+        "compared": [
+            {
+                "name": alternative.name,
+                "note": "; ".join(filter(None, (alternative.orientation, alternative.message))),
+                "figures": _figures(alternative, session.bench.profile.material),
+            }
+            for alternative in session.comparing.rows()
+        ],
+    }
+
+
+def _figures(alternative: Alternative, material: Material) -> list[tuple[str, str]]:
+    """Names and texts of what an alternative costs; dashes where it cannot be printed. Without a price none is told."""
+    mm, support_mm3 = alternative.filament_mm or 0.0, alternative.support_mm3 or 0.0
+    figures = {
+        "time": about(alternative.time_s or 0.0),
+        "plastic": f"{filament_g(mm, material):.1f} g",
+        "costs": price_in_words(mm, material),
+        "of it support": f"{support_mm3 / 1000.0:.2f} cm³",
+        "scars of support": _mm2(alternative.risky_mm2),
+        "seams between parts": f"{alternative.seam_mm:.0f} mm",
+        "stairs": _mm2(alternative.stairs_mm2),
+        "findings": f"{alternative.findings}",
+    }
+    return [(name, text if alternative.time_s is not None else "–") for name, text in figures.items() if text]
+
+
+def _joint(joint: Joint) -> tuple[str, ...]:
+    """Part, area, contact, plastic, seam and load of a joint, as texts."""
+    contact, plastic = (
+        "–" if share is None else f"{percent(share, digits)} %"
+        for share, digits in ((joint.contact_share, 1), (joint.plastic_over_room, 0))
+    )
+    return f"{joint.part}", _mm2(joint.area_mm2), contact, plastic, f"{joint.seam_mm:.0f} mm", f"{newtons(joint.load_n)} N"
+
+
+def _mm2(area: float) -> str:
+    return f"{max(area, 0.0):.1f} mm²"
+
+
+def _under_way(session: Session) -> dict[str, Any] | None:
+    slicing = session.slicing.progress
+    if slicing is None:
+        return None
+    return {"text": slicing.text, "number": slicing.number, "shares": slicing.shares, "ready": sorted(slicing.walls)}
+
+
+def _sliced(session: Session) -> dict[str, Any] | None:
+    slices = session.slicing.latest()
+    if slices is None:
+        return None
+    sliced, profile = slices.sliced, slices.bench.profile
+    costs = price_in_words(sliced.filament_mm, profile.material)
+    return {
+        "key": sliced.key,
+        "number": slices.number,
+        "stale": session.slicing.out_of_date,
+        "ready": sorted(slices.walls),
+        "told": [
+            ("takes", duration(sliced.time_s)),
+            ("filament", f"{sliced.filament_mm / 1000.0:.2f} m, {filament_g(sliced.filament_mm, profile.material):.1f} g"),
+            *([("costs", costs)] if costs else []),
+        ],
+        "verdict": asdict(verdict_of(sliced.findings, profile, sliced.cost.risky_mm2, out_of_date=session.slicing.out_of_date)),
+        "joints": [_joint(joint) for joint in sliced.cost.joints],
+        "findings": [asdict(finding) for finding in sliced.findings[:MOST_FINDINGS]],
+        "more_findings": max(len(sliced.findings) - MOST_FINDINGS, 0),
+        "errors": [error.message for error in sliced.errors[:MOST_FINDINGS]],
+    }
+
+
 def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles, in the page's own words; small enough to be told whole whenever anything changes."""
     return with_page_words(_state(session), SENTENCES, session.names)
 
 
 def _state(session: Session) -> dict[str, Any]:
-    bench, history, search = session.bench, session.history, session.finding.search
-    standing = session.standing.now
-    resting = session.resting[1] if bench.model is not None and session.resting[0] == bench.model.key else ()
-    best = None if search is None else search.searched.best
+    bench, history, search = session.bench, session.history, session.finding.progress
+    standing = session.standing.result
+    best = None if search is None else search.best
     planes = [] if best is None else [plane_values(plane) for plane in reversed(best.planes)]
     return {
         "version": session.version,
@@ -45,7 +183,7 @@ def _state(session: Session) -> dict[str, Any]:
         "answers": session.answers,
         "busy": session.busy,
         "stopped": session.stopped,
-        "preparing": session.readiness.preparing > 0,
+        "preparing": bool(session.readiness.progress),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": history.now.word if history.before else "",
         "redo": history.undone[-1].word if history.undone else "",
@@ -55,11 +193,11 @@ def _state(session: Session) -> dict[str, Any]:
         "standing": standing and {"size_mm": standing.size_mm, "problem": standing.problem},
         "overhang_mm2": standing and standing.overhang_mm2,
         "pedestal_mm": bench.profile.search.pedestal_mm,
-        "pedestal": session.standing.pedestal_key,
+        "pedestal": pedestal_key(bench, standing),
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATFORM_TOLERANCE_MM,
-        "resting": [asdict(rest) for rest in resting],
-        "search": None if search is None else {"text": search.searched.text, "planes": planes},
+        "resting": [asdict(rest) for rest in session.resting.result or ()],
+        "search": None if search is None else {"text": search.text, "planes": planes},
         **slices_state(session),
         "front": [front_record(row) for row in bench.rows],
         "parts": bench.parts,
@@ -92,7 +230,7 @@ def _state(session: Session) -> dict[str, Any]:
 
 def _copies_told(session: Session) -> str:
     """How many copies stand on the plate, or why they cannot."""
-    standing, count = session.standing.now, session.bench.copies
+    standing, count = session.standing.result, session.bench.copies
     if standing is None or count == 1:
         return ""
     return standing.copies_problem or f"All {count} stand on the plate."

@@ -1,7 +1,8 @@
-"""Uploads: a model, a plan or a profile that a page sends, kept as long as it lies on its bench, and those that a workbench which
-was killed has left, to be opened again."""
+"""Uploads: a model, a plan or a profile that a page sends, kept as long as it lies on its bench (profiles as long as the program
+runs, for benches may share them), and those that a workbench which was killed has left, to be opened again."""
 
 import asyncio
+import os
 import shutil
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
@@ -13,15 +14,52 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from machine.pipeline.project import Project, is_project, read_folder
+from machine.pipeline.requests import Given
 from machine.workbench.access.limits import DEVICE, check_model_name, check_profile
+from machine.workbench.bench.settings import named
 from machine.workbench.session.session import Session
-from machine.workbench.web.profile_files import ProfileFiles
-from machine.workbench.work.kept_work import folders_kept
-from machine.workbench.work.received import remove_file
-from profiles.errors import PlanError, reason
+from machine.workbench.work.folders import Received, folders_kept, remove_file
+from profiles.errors import PlanError, ProfileError, reason
+from profiles.places import KINDS, kind_in
 
 TEXT_SUFFIX = ".toml"  # of plans and profiles
 MIB = 2**20
+
+
+class ProfileFiles:
+    """A folder of them."""
+
+    def __init__(self) -> None:
+        self._received = Received()
+
+    async def take(self, path: Path, session: Session) -> bool:
+        """Whether a file that a page has sent is a profile, which is then taken in place of the bench's machine, material or
+        process. Raises ProfileError for one that is not valid."""
+        try:
+            kind = kind_in(path)
+        except ProfileError:
+            return False
+        copy = str(shutil.copy(path, self._received.new_file(path.name)))
+        try:
+            await session.take_given(f"take {path.name}", lambda given: named(given, kind, copy))
+        except ProfileError as error:
+            remove_file(Path(copy))
+            raise ProfileError(str(error).replace(f"{Path(copy).parent}{os.sep}", "")) from None
+        return True
+
+    def copied(self, given: Given, own_names: dict[str, str]) -> Given:
+        """The same with copies of the profiles that are files, which have these names. Raises OSError."""
+        for kind, name in own_names.items():
+            given = named(given, kind, str(shutil.copy(getattr(given, kind), self._received.new_file(name))))
+        return given
+
+    def as_shown(self, given: Given) -> Given:
+        """Names and settings for a person, who knows of a file that was sent by its own name alone."""
+        for kind in KINDS:
+            file = Path(getattr(given, kind))
+            if file.parent.parent == self._received.path:
+                given = named(given, kind, file.name)
+        return given
 
 
 class Uploads:
@@ -90,7 +128,8 @@ class Uploads:
         project = read_folder(folder)
         word = f"open the work of {strftime('%H:%M', localtime(project.written_s))}"
         try:
-            await session.open_folder(folder, self._with_copies(project), word)
+            async with session.turn:
+                await session.open_folder(folder, self._with_copies(project), word)
         except OSError as error:
             raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
         return JSONResponse({})
@@ -105,19 +144,20 @@ class Uploads:
         path, taken = session.received.new_file(name), False
         try:
             await fill(path)
-            if is_project(path):
 
-                def taken_over(project: Project) -> Project:
-                    if of_device:
-                        check_model_name(project.name)
-                    return self._with_copies(project)
+            def taken_over(project: Project) -> Project:
+                if of_device:
+                    check_model_name(project.name)
+                return self._with_copies(project)
 
-                await session.open_project(path, name, taken_over)
-            elif path.suffix.lower() != TEXT_SUFFIX:
-                await session.open_model(path, name)
-                taken = True
-            elif not self.profiles.take(path, session):
-                await session.open_plan(path)
+            async with session.turn:
+                if is_project(path):
+                    await session.open_project(path, name, taken_over)
+                elif path.suffix.lower() != TEXT_SUFFIX:
+                    await session.open_model(path, name)
+                    taken = True
+                elif not await self.profiles.take(path, session):
+                    await session.open_plan(path)
         finally:
             waits = session.unscaled is not None and session.unscaled.path == path
             if not taken and not waits:  # refused, or a text, of which nothing more is read

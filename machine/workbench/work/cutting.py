@@ -1,4 +1,4 @@
-"""Cutting: finding parts, cutting by planes and making the parts' files, as tasks of the workbench."""
+"""Cutting: finding parts, cutting by planes, and making the files and pictures of the parts, as tasks of the workbench."""
 
 import zipfile
 from collections.abc import Callable, Sequence
@@ -12,15 +12,19 @@ import numpy as np
 from machine.pipeline import compilers
 from machine.pipeline.given_plan import lies_freely, with_file_marks
 from machine.pipeline.orientation import orientation_in_words, standing_in_words
-from machine.pipeline.pictures import parts_together, png_bytes
+from machine.pipeline.pictures import contact_sheet, front_picture, parts_picture, parts_together, png_bytes
 from machine.pipeline.pricing import pricing
 from machine.pipeline.project import PICTURE_PX, project_bytes, with_meshes_beside
+from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
+from machine.view.encoding import pack
+from machine.view.parts import page_colours
+from machine.view.scene import solids, surfaces
 from machine.workbench.bench.bench import Bench, locked_plan, plan_of_bench
-from machine.workbench.work.kept_work import work_of
-from mdp.decomposition import Decomposition, FrontRow
+from machine.workbench.work.folders import work_of
+from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import standing_still
-from mdp.joint import is_sound
+from mdp.joint import is_sound, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
 from mdp.ranking.ranker import CLASSIC, ranker_named
@@ -30,7 +34,8 @@ from mdp.search.plan_file import PlanFile, plan_of, planned_parts
 from mdp.search.plan_writing import plan_text
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
-from profiles.errors import PlanError
+from profiles.errors import MoveError, PlanError
+from profiles.profile import Profile
 
 PLAN_NAME = "plan.toml"
 AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # the page's own words
@@ -190,3 +195,38 @@ def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
 
 def _name(bench: Bench) -> str:
     return "" if bench.model is None else bench.model.name
+
+
+def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:
+    """The parts as the bench has them, for the page to draw apart."""
+    out.write_bytes(pieces_block(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.profile))
+
+
+def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
+    """Surfaces and figures of all parts in print order, and as `fit` what the machine does not reach of them, in the sentence of
+    `export`."""
+    colours = page_colours(len(decomposition.parts))
+    records = solids(decomposition, profile, joints_of(decomposition.parts, profile))
+    parts = [part | {"colour": colour} for part, colour in zip(records, colours, strict=True)]
+    return pack({"parts": parts, "fit": out_of_reach(decomposition.parts, profile)}, surfaces(decomposition, profile))
+
+
+def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
+    """What the machine does not reach of parts in their poses; "" where it reaches all."""
+    try:
+        check_parts(parts, profile)
+    except MoveError as error:
+        return str(error)
+    return ""
+
+
+def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
+    """A zip of what `--png`, `--sheet` and `--front` draw of the parts as the bench has them."""
+    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME), prices=True)
+    compilers.wait_for(compilers.PICTURES)
+    images = {
+        "parts.png": parts_picture(decomposition, bench.profile),
+        "order.png": contact_sheet(decomposition, bench.profile.machine),
+        "front.png": front_picture(decomposition, bench.profile),
+    }
+    write_zip(out, [(name, png_bytes(image)) for name, image in images.items()])

@@ -1,9 +1,11 @@
-"""Slices: what lies on the bench sliced, written and dry-run, and the same model in one piece, as tasks of the workbench."""
+"""Slices: what lies on the bench sliced, written and dry-run, what is seen of it, and the same model in one piece, as tasks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
+
+import numpy as np
 
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
@@ -16,11 +18,46 @@ from machine.program import Alternative
 from machine.view.page import print_page, with_comparison
 from machine.workbench.bench.bench import Bench, plan_of_bench
 from machine.workbench.work.cutting import PLAN_NAME, cut_bench
-from machine.workbench.work.walls import walls
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, Part
 from mdp.kernels.workers import Tell
+from mdp.mesh import Floats
 from profiles.profile import Profile
+from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import SlicingProgress
+
+SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN, Kind.BRIDGE, Kind.GAP, Kind.SUPPORT)
+BEHIND = (*SEEN, Kind.INNER_WALL)  # on shallow slopes inner walls are free, too; drawn where all are few enough
+MOST_PIECES = 60_000  # per part: with more, only every second layer is drawn, or every third, that many times as high
+
+
+def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
+    """The straight pieces of its outer paths: 3 float32, the direction of printing, then 7 a piece: where it begins and ends, mm
+    in the workpiece frame, in the middle of its height, and its height; all little-endian."""
+    kinds = BEHIND if _count(sliced, BEHIND) < most else SEEN
+    step = 1 + _count(sliced, kinds) // most
+    own = [
+        layer for layer in sliced.layers if layer.z_mm > 0.5 * layer.height_mm
+    ]  # not the raft: the model stands on the plate there
+    rows = [_pieces(layer, kinds, step) for layer in own[step - 1 :: step]]
+    flat = np.concatenate([np.zeros((0, 7)), *rows])
+    back = part.rotation
+    for ends in (slice(0, 3), slice(3, 6)):
+        flat[:, ends] = (flat[:, ends] + (0.0, 0.0, part.base.offset_mm)) @ back
+    return np.asarray(part.direction, "<f4").tobytes() + flat.astype("<f4").tobytes()
+
+
+def _count(sliced: SlicedPart, kinds: tuple[Kind, ...]) -> int:
+    return sum(int((np.diff(layer.starts) - 1)[layer.is_of(*kinds)].sum()) for layer in sliced.layers)
+
+
+def _pieces(layer: Layer, kinds: tuple[Kind, ...], step: int) -> Floats:
+    """(n, 7) in the part frame: two ends and the height, which is that of `step` layers."""
+    high = layer.height_mm * step
+    points = layer.points_mm - (0.0, 0.0, high / 2.0)
+    begins = np.repeat(layer.is_of(*kinds), np.diff(layer.starts))
+    begins[layer.starts[1:] - 1] = False  # nothing leads from a stroke's last point to the next stroke
+    at = np.flatnonzero(begins)
+    return np.column_stack([points[at], points[at + 1], np.full(len(at), high)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,18 @@ from collections.abc import Callable
 from typing import Any
 
 from machine.crash import bug_in_words
-from machine.workbench.bench.marks import mark, unmark
-from machine.workbench.work.cutting import find_parts, make_folder, make_plan, make_project, measure_plan, price_row
-from machine.workbench.work.models import mark_faces, rank_resting, read_model, rest_facets
-from machine.workbench.work.pieces import draw_pieces, make_pictures
+from machine.workbench.work.cutting import (
+    draw_pieces,
+    find_parts,
+    make_folder,
+    make_pictures,
+    make_plan,
+    make_project,
+    measure_plan,
+    price_row,
+)
+from machine.workbench.work.models import mark_faces, rank_resting, read_model, rest_facets, stand
 from machine.workbench.work.slices import compare_bench, share_page, slice_bench
-from machine.workbench.work.standing import stand
 from machine.workbench.work.trials import load_kernels, make_ready, near_neck, nearest, try_cuts
 from mdp.kernels.workers import tell
 from profiles.errors import UserError
@@ -41,7 +47,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         near_neck,
         nearest,
     )
-} | {"mark": lambda tell, *given: mark(*given), "unmark": lambda tell, *given: unmark(*given)}
+} | {"mark": lambda tell, bench, marking: marking.zones(bench)}
 
 
 def load() -> None:

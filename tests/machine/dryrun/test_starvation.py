@@ -11,8 +11,8 @@ from machine.link.stream import print_lines
 from machine.printing.destination import SerialPort, parse_destination
 from machine.simulator.board import BuildOptions
 from machine.simulator.record import Record
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 MACHINE = PROFILE.machine

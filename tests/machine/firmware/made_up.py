@@ -1,9 +1,7 @@
 """A firmware that exists only here: written as docs/gcode.md tells how to add one."""
 
-from machine.firmware.command import Command
-from machine.firmware.dialect import Dialect
-from machine.firmware.firmware import Firmware
-from machine.firmware.line import LineRules
+from machine.firmware.dialect import Command, Dialect
+from machine.firmware.firmware import Firmware, LineRules
 from machine.firmware.simulation import SimulationRules
 
 MADE_UP = Firmware(

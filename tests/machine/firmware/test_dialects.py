@@ -14,8 +14,7 @@ from machine.firmware import dialects
 from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.gcode.writer import write_gcode
-from machine.kinematics.coordinates import axis_positions, followed_places
-from machine.kinematics.table import workpiece_path
+from machine.kinematics.table import axis_positions, followed_places, workpiece_path
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, straight_moves
 from machine.planning.plan import plan
 from machine.planning.stops import parse_stops

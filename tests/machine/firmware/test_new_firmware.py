@@ -13,11 +13,11 @@ from machine.link.protocol.connection import Connection
 from machine.link.stream import print_lines
 from machine.setup.calibration.program import calibration_lines, plan_touches
 from machine.simulator.firmware import SimulatedFirmware
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.machine import FOLLOWS_TABLE
 from profiles.profile import Profile
 from tests.machine.firmware.made_up import MADE_UP
 from tests.machine.hand import printed, text
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 
 @pytest.fixture

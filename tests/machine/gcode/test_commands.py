@@ -13,7 +13,6 @@ from machine.link.protocol.framing import command_of
 from machine.printing.settings_queries import QUESTIONS
 from machine.setup.calibration.program import calibration_lines, calibration_pen, cold_start, plan_touches
 from machine.simulator.commands import COMMANDS as SIMULATED
-from machine.simulator.macros import MACROS as SIMULATED_MACROS
 from machine.workbench.printing.at_hand import homing_lines
 from profiles.errors import LocalProtocolError, MoveError
 from profiles.profile import Profile, load, shipped
@@ -160,7 +159,7 @@ def test_a_tool_is_selected_cold_when_its_temperature_has_been_set_to_nothing() 
 
 
 def test_whatever_the_reader_or_the_simulated_printer_does_has_a_row() -> None:
-    names = {*CODES, *MACROS, *MODES, *SIMULATED, *SIMULATED_MACROS}
+    names = {*CODES, *MACROS, *MODES, *SIMULATED}
     assert {name for name in names if command_named(name) is NOTHING_KNOWN} == set()
 
 

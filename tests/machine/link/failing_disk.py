@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.link.disk import incomplete_mark
+from machine.link import journal as journals
 from machine.link.journal import Checkpoint, Journal
 
 
@@ -101,8 +101,8 @@ class FailingDisk:
 
 def keep_notes_in(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Notes of incomplete journals are not those of the person who runs the tests."""
-    monkeypatch.setattr(incomplete_mark, "state_folders", lambda: (folder / "state",))
-    monkeypatch.setattr(incomplete_mark, "MEMORY", folder)
+    monkeypatch.setattr(journals, "state_folders", lambda: (folder / "state",))
+    monkeypatch.setattr(journals, "MEMORY", folder)
 
 
 def once_sent(monkeypatch: pytest.MonkeyPatch, line: int, act: Callable[[Path], object]) -> None:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.link import journal as journal_module
-from machine.link.disk import incomplete_mark
+from machine.link import journal as journals
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from profiles.errors import JournalError, OutputError
 from tests.machine.link.failing_disk import FailingDisk, full_disk, keep_notes_in, small_disk
@@ -144,8 +144,8 @@ def test_a_failing_disk_is_noticed_by_itself_and_at_once(tmp_path: Path, monkeyp
 
 def test_a_mark_that_can_be_placed_nowhere_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a file").write_text("")
-    monkeypatch.setattr(incomplete_mark, "state_folders", lambda: (tmp_path / "a file" / "state",))
-    monkeypatch.setattr(incomplete_mark, "MEMORY", tmp_path / "a file")
+    monkeypatch.setattr(journals, "state_folders", lambda: (tmp_path / "a file" / "state",))
+    monkeypatch.setattr(journals, "MEMORY", tmp_path / "a file")
     with Journal(tmp_path / "j", HEADING) as journal:
         FailingDisk(monkeypatch, journal.path, 0, errno.EIO)
         journal.write(at(16))

@@ -10,11 +10,11 @@ from machine.link.protocol.states import State
 from machine.link.stream import print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.cable import Cable
-from machine.simulator.faults import HEALED, random_script
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
+from tests.machine.virtual_printer import HEALED, random_script
 
 MACHINE = load().machine
 MOVES = [f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 E0.{1 + i:05d} F3000" for i in range(300)]

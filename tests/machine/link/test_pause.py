@@ -14,9 +14,9 @@ from machine.link.print_state import PrintStatus
 from machine.link.stream import Outcome, print_lines
 from machine.printing.serial_log import tap
 from machine.simulator.faults import Fault, FaultScript
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import FirmwareError, PortError, PrinterError
 from profiles.profile import Profile, load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 MACHINE = PROFILE.machine

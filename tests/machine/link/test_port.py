@@ -21,11 +21,11 @@ from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import VirtualPrinter
 from profiles.errors import PortError
 from profiles.profile import load
 from tests.machine.link.test_stream import HEAT, assert_executed, strokes
 from tests.machine.peers import PATIENCE_S, RATES, behind_rfc2217, on_socket, on_terminal
+from tests.machine.virtual_printer import VirtualPrinter
 
 MACHINE = load().machine
 PATIENT = Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)

@@ -29,10 +29,10 @@ from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import FirmwareError, JournalError, SilenceError
 from profiles.profile import Profile, load
 from tests.machine.peers import on_terminal
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 LIMIT = 95

@@ -23,10 +23,10 @@ from machine.link.medium import Wire
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
+from machine.link.protocol.answers import ASKED_LIMIT
 from machine.link.protocol.connection import Connection
 from machine.link.protocol.events import Position, Temperature, read_event
 from machine.link.protocol.framing import command_of, frame
-from machine.link.protocol.resends import ASKED_LIMIT
 from machine.link.stream import Outcome, print_lines
 from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions
@@ -34,7 +34,6 @@ from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import (
     FirmwareError,
     LocalProtocolError,
@@ -43,6 +42,7 @@ from profiles.errors import (
     SilenceError,
 )
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 PLAIN = BuildOptions(advanced_ok=False)

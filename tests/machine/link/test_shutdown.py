@@ -16,9 +16,9 @@ from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import FirmwareError, SilenceError
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 SLOW = load(settings=["machine.z.speed_mm_s=2"])
 HOMING = ["M104 S200", "M140 S60", "G1 Z60 F600", "G28 X Y Z", "G1 X10 F600", "M104 S0", "M140 S0"]

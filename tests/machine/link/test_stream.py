@@ -18,12 +18,13 @@ from machine.link.progress import Schedule
 from machine.link.protocol.timeout import Timing
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
-from machine.simulator.faults import HEALED, Fault, random_script
+from machine.simulator.faults import Fault
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, LocalProtocolError, PortError, PrinterError, SilenceError
 from profiles.profile import load
 from tests.machine.peers import PATIENCE_S
+from tests.machine.virtual_printer import HEALED, random_script
 
 MACHINE = load().machine
 QUICK = Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=1.0, drain_s=0.05, quiet_s=0.03)

@@ -11,9 +11,9 @@ from machine.link.watchdog import PrinterReports, Watchdog
 from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
 LAST_S = 598.0  # of the reports that watched() gives

@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 from machine.link.port import Port, open_port
 from machine.simulator.board import BuildOptions
 from machine.simulator.cable import Cable
-from machine.simulator.faults import KINDS, Fault, FaultScript, Kind, random_script, read_script
+from machine.simulator.faults import KINDS, Fault, FaultScript, Kind, read_script
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PortError, PrinterError
 from profiles.profile import load
+from tests.machine.virtual_printer import random_script
 
 MACHINE = load().machine
 PLAIN = BuildOptions(advanced_ok=False)

@@ -9,14 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.simulator.board import BuildOptions
-from machine.simulator.cable import Cable
-from machine.simulator.faults import random_script
+from machine.simulator.cable import Cable, Uart
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.motion import HARD_MM
 from machine.simulator.record import Record
-from machine.simulator.uart import Uart
 from profiles.machine import Machine
 from tests.machine.firmware.test_dialects import profile
+from tests.machine.virtual_printer import random_script
 
 MACHINES = [profile(dialect).machine for dialect in ("marlin", "klipper", "klipper_steppers", "reprapfirmware")]
 MACHINES.append(profile("marlin", "workpiece").machine)

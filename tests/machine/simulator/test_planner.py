@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from machine.firmware.marlin import FIRST_MOVE_DELAY_S, SIMULATED
 from machine.link.protocol.framing import frame
 from machine.simulator.board import BuildOptions
-from machine.simulator.cable import Cable
+from machine.simulator.cable import Cable, Uart
 from machine.simulator.firmware import SimulatedFirmware
-from machine.simulator.uart import Uart
 from profiles.profile import load
 from slicer.estimate.timing import move_times
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.contact.surface import TrueBall
+from machine.simulator.contact import ProbedTable, TrueBall
 from machine.simulator.firmware import SimulatedFirmware
 from tests.machine.setup.calibration.touches import machine_of
 

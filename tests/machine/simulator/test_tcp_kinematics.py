@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
-from machine.kinematics.coordinates import axis_positions
+from machine.kinematics.table import axis_positions
 from machine.link.protocol.framing import command_of
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware

@@ -8,11 +8,10 @@ import serial
 
 from machine.link.protocol.framing import frame
 from machine.simulator.board import BuildOptions
-from machine.simulator.cable import Cable
+from machine.simulator.cable import Cable, Uart
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
-from machine.simulator.uart import Uart
 from profiles.profile import load
 from tests.machine.peers import PATIENCE_S
 

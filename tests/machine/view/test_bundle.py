@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from machine.view.bundle import EXPORT, IMPORT, bundle
-from machine.view.page import TEMPLATE
-from machine.workbench.web.page import OWN
+from machine.view.page import EXPORT, IMPORT, TEMPLATE, bundle
+from machine.workbench.web.server import OWN
 
 SCRIPTS = sorted([*TEMPLATE.glob("*.js"), *OWN.glob("*.js")])
 NODE = shutil.which("node")

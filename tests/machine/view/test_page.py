@@ -207,7 +207,7 @@ def test_the_packed_report_tells_the_changed_settings_first(folder: Path) -> Non
 
 
 def test_another_machine_is_held_against_its_own_shipped_values() -> None:
-    from machine.view.settings import settings_tables
+    from machine.view.report import settings_tables
 
     profile = load(machine="fractal5pro", settings=["machine.clearance_mm=3"])
     assert [row[0] for row in settings_tables(profile)[0]["rows"]] == ["machine.clearance_mm"]

@@ -1,12 +1,12 @@
 """Models on a bench, their meshes in files as long as the tests run."""
 
 import tempfile
-from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Any
 
-from machine.workbench.bench.bench import Bench, History
+from machine.workbench.bench.bench import History
+from machine.workbench.bench.changes import Change
 from machine.workbench.bench.model import Model
 from mdp.mesh import Mesh
 from mdp.read import ReadModel
@@ -21,6 +21,6 @@ def model(name: str = "tee.stl", mesh: Mesh | None = None) -> Model:
     return Model.stored(name, Path(name), ReadModel(mesh or tee()), Path(_folder.name) / str(next(_numbers)))
 
 
-def changed(history: History, change: Callable[[Bench, dict[str, Any]], Bench], **asked: Any) -> History:
+def changed(history: History, change: type[Change], **asked: Any) -> History:
     """The history after what a page asks to be changed."""
-    return history.do(change.__name__, change(history.now.bench, asked))
+    return history.do(change.word, change.of(asked).change(history.now.bench))

@@ -10,12 +10,30 @@ import pytest
 
 from machine.workbench.bench.bench import Bench
 from machine.workbench.printing.commands import COMMANDS as OF_PRINTS
-from machine.workbench.session.commands import COMMANDS, obey
-from machine.workbench.web.devices_line import COMMANDS as OF_DEVICES
+from machine.workbench.session.commands import COMMANDS, obey, perform
+from machine.workbench.web.line import DEVICE_COMMANDS as OF_DEVICES
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.machine.workbench.models import model
 
+ANYTHING = {
+    "part": 2,
+    "to": 2,
+    "number": 1,
+    "count": 1,
+    "parts": 1,
+    "plate": 1,
+    "key": "",
+    "at": "",
+    "axis": "x",
+    "deg": 0,
+    "offset_mm": 0,
+    "normal": [0, 0, 1],
+    "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "kind": "pause",
+    "min_mm": [0, 0, 0],
+    "max_mm": [1, 1, 1],
+}
 WITHOUT_A_MODEL = {"demo", "undo", "redo", "set", "reset", "profile", "stop", "dismiss", "unit"}
 UNSLICED = "what is on the workbench is not sliced yet: slice it first"
 DOCS = Path(__file__).parents[3] / "docs" / "workbench.md"
@@ -32,12 +50,12 @@ def bare(bench: Bench) -> Any:
 @pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))
 def test_all_that_is_done_to_a_model_is_refused_without_one(name: str) -> None:
     with pytest.raises(PlanError, match="there is no model on the workbench yet: choose a file first"):
-        obey(bare(Bench(load())), {"do": name})
+        perform(bare(Bench(load())), COMMANDS[name].of({"do": name, **ANYTHING, **({"kind": "keep"} if "mark" in name else {})}))
 
 
 def test_only_what_is_sliced_is_compared() -> None:
     with pytest.raises(PlanError, match=UNSLICED):
-        obey(bare(Bench(load(), model())), {"do": "compare"})
+        perform(bare(Bench(load(), model())), COMMANDS["compare"].of({"do": "compare"}))
 
 
 @pytest.mark.parametrize("name", ["dance", ["turn"], None, "refuse"])

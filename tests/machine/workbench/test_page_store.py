@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.workbench.web.page import OWN
+from machine.workbench.web.server import OWN
 from tests.machine.fake_page import needs_node, on_fake_page
 
 HEARD = """

@@ -12,12 +12,10 @@ import pytest
 
 from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, plan_of_bench, with_front, with_plan
-from machine.workbench.bench.command_line import export_command
-from machine.workbench.bench.settings import named
+from machine.workbench.bench.settings import export_command, named
 from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
-from machine.workbench.work.models import read_model
-from machine.workbench.work.standing import Standing
+from machine.workbench.work.models import Standing, read_model
 from machine.workbench.work.tasks import TASKS
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
@@ -136,7 +134,7 @@ class Tried:
                 return Trial(())
             case "read_model":
                 return read_model(lambda report: None, *given)
-            case "mark" | "unmark":
+            case "mark":
                 return TASKS[task](lambda report: None, *given)
             case "stand":
                 return Standing((40.0, 8.0, 40.0), 0.0, "")
@@ -179,7 +177,7 @@ def said(bench: Bench) -> str:
 def test_after_any_commands_the_plan_is_read_again_as_it_is_and_undo_and_redo_lead_back(
     seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("machine.workbench.session.readiness.CHANGING_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.placement.CHANGING_S", 0.0)
     (tmp_path / "tee.stl").write_bytes(stl(tee()))
     (tmp_path / "mine.toml").write_text('inherits = "open5x_jubilee"\n[machine]\nname = "mine"\n')
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from machine.workbench.access.listening import listen
-from machine.workbench.work.kept_work import kept_folder
+from machine.workbench.access.network import listen
+from machine.workbench.work.folders import kept_folder
 from mdp.save import stl
 from profiles.errors import OutputError
 from tests.machine.browser import Browser

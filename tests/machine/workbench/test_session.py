@@ -16,10 +16,9 @@ from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, with_front, with_profile
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey
-from machine.workbench.session.finding import Search
 from machine.workbench.session.session import Session
-from machine.workbench.work.cutting import Found, Searched
-from machine.workbench.work.standing import Standing
+from machine.workbench.work.cutting import Found, Searched, SearchWay
+from machine.workbench.work.models import Standing
 from machine.workbench.work.tasks import TASKS
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
@@ -38,8 +37,8 @@ EDIT = st.fixed_dictionaries({
 
 @pytest.fixture(autouse=True)
 def _nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.workbench.session.readiness.CHANGING_S", 0.0)
-    monkeypatch.setattr("machine.workbench.session.trials.REST_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.placement.CHANGING_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.planes.REST_S", 0.0)
 
 
 def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
@@ -62,10 +61,9 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
     return asyncio.run(asyncio.wait_for(run(), 20.0))
 
 
-def under_way(session: Session) -> Search:
-    """The search that a session has under way."""
-    assert session.finding.search is not None
-    return session.finding.search
+def is_seeking(session: Session) -> bool:
+    """Whether a session has a search under way."""
+    return isinstance(session.finding.progress, Searched)
 
 
 async def settled(session: Session) -> None:
@@ -129,7 +127,7 @@ def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_
     assert tried == [(held, 0, 80.0), (newest, 1, 80.0), (newest, 0, 80.0)]
 
 
-def test_an_edit_whose_bench_is_another_one_meanwhile_is_not_done_and_says_so() -> None:
+def test_a_turn_that_is_asked_for_while_an_edit_is_tried_comes_after_it() -> None:
     async def work(session: Session) -> None:
         obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
         await asyncio.sleep(0)
@@ -137,7 +135,8 @@ def test_an_edit_whose_bench_is_another_one_meanwhile_is_not_done_and_says_so() 
 
     session = when_done(work)
     assert session.bench.cuts is None
-    assert session.problem == "add a plane: what lies on the workbench has changed meanwhile, so it was not done"
+    assert [step.word for step in (*session.history.before, session.history.now)][-2:] == ["add a plane", "turn the model"]
+    assert session.problem == ""
 
 
 @pytest.mark.parametrize("turns", range(4))  # of the loop between the two commands
@@ -165,16 +164,16 @@ def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
             profile: Profile = given[2]
             scales.append(profile.process.scale)
             if len(scales) == 1:
-                doubled = Given(settings=("process.scale=2.0",))
-                session.do("set process.scale", with_profile(session.bench, doubled, load(settings=doubled.settings)))
+                obey(session, {"do": "set", "key": "process.scale", "value": "2.0"})
             return model(f"{given[1]} at {profile.process.scale:g}")
 
         session.quick.run = read  # type: ignore[method-assign]
-        await session.open_model(Path("b"), "b")
+        session.command(lambda: session.open_model(Path("b"), "b"))
+        await settled(session)
 
     read = when_done(work).bench.model
     assert read is not None
-    assert read.name == "b at 2"
+    assert read.name.endswith(" at 2")
 
 
 def test_a_scale_that_was_set_for_a_model_is_not_that_of_the_next_one() -> None:
@@ -199,13 +198,13 @@ def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_tol
 
     async def work(session: Session) -> None:
         async def price(task: str, *given: Any, **more: Any) -> Any:
-            return (replace(best, time_s=60.0, chosen=True),) if task == "measure_plan" else await asyncio.sleep(9.0)
+            return replace(best, time_s=60.0) if task == "price_row" else await asyncio.sleep(9.0)
 
         session.long.run = price  # type: ignore[method-assign]
-        session.finding.begin()
+        session.finding.search(SearchWay())
         await asyncio.sleep(0)
-        session.finding.search = replace(under_way(session), searched=Searched("", best))
-        session.finding.stop()
+        session.finding.progress = Searched("", best)
+        session.stop()()
         assert (session.bench.cuts, session.bench.rows[0].time_s) == ((PlannedPart(UP, 5.0),), None)
 
     (row,) = when_done(work).bench.rows
@@ -221,6 +220,7 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
         obey(session, {"do": "turn", "axis": "x", "deg": 90})
+        await asyncio.sleep(0)
 
     session = when_done(work)
     assert [stop.option for stop in session.bench.stops] == ["--pause 1:3"]
@@ -234,10 +234,12 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
         obey(session, {"do": "turn", "axis": "x", "deg": 90})
+        await asyncio.sleep(0)
         assert session.problem.startswith("slicing has ended")
         obey(session, {"do": "slice"})
-        assert session.slicing.under_way is not None
-        assert session.slicing.under_way.bench is session.bench
+        await asyncio.sleep(0)
+        assert session.slicing.progress is not None
+        assert session.slicing.progress.bench is session.bench
 
     session = when_done(work)
     assert session.slicing.done is not None
@@ -255,7 +257,7 @@ def test_slices_wait_for_the_settings_that_were_asked_for_before() -> None:
         obey(session, {"do": "set", "key": "process.scale", "value": "2"})
         await asyncio.sleep(0)
         obey(session, {"do": "slice"})
-        assert session.slicing.under_way is None
+        assert session.slicing.progress is None
 
     session = when_done(work)
     assert session.slicing.done is not None
@@ -347,8 +349,9 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
         for best in (None, FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0)):
             obey(session, {"do": "search"})
             await asyncio.sleep(0)
-            session.finding.search = replace(under_way(session), searched=Searched("stage 1", best))
+            session.finding.progress = Searched("stage 1", best)
             obey(session, {"do": "stop"})
+            await asyncio.sleep(0)
             told.append(session.stopped)
             await settled(session)
         obey(session, {"do": "dismiss"})
@@ -379,7 +382,7 @@ def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on
         obey(session, {"do": "search"})
         for _ in range(3):  # the end of the one that was stopped comes meanwhile
             await asyncio.sleep(0)
-        assert session.finding.search is not None
+        assert is_seeking(session)
 
     session = when_done(work)
-    assert (session.bench.parts, session.finding.search) == (2, None)
+    assert (session.bench.parts, session.finding.progress) == (2, None)

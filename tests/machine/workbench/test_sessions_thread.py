@@ -18,9 +18,8 @@ from machine.workbench.printing.commands import PageOfPrints, obey
 from machine.workbench.printing.job_state import Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.running_print import RunningPrint
-from machine.workbench.session.session import Session
+from machine.workbench.session.session import Session, Workbench
 from machine.workbench.session.slicing import Slicing
-from machine.workbench.session.workbench import Workbench
 from machine.workbench.web.server import Served, application
 from machine.workbench.web.sessions_thread import SessionsThread
 from machine.workbench.web.uploads import Uploads

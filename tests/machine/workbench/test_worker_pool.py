@@ -182,9 +182,8 @@ def test_a_search_that_waits_for_the_processes_of_other_benches_says_so() -> Non
             async with AsyncExitStack() as stack:
                 if others:
                     await stack.enter_async_context(pools.long.worker(TaskQueue(pools.long)))
-                session.finding.begin()
-                assert session.finding.search is not None
-                texts.append(session.finding.search.searched.text)
+                session.finding.search(SearchWay())
+                texts.append(session.finding.progress.text)
                 await asyncio.sleep(0)
                 session.finding.stop()
         await asyncio.sleep(0)

@@ -1,4 +1,7 @@
-"""Where compiled kernels are cached: a program of two files, edited between runs of the interpreter."""
+"""Where compiled kernels are cached: a program of two files, edited between runs of the interpreter.
+
+What loading kernels from the cache does without, and kernels compiled on top of them.
+"""
 
 import subprocess
 import sys
@@ -7,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mdp.kernels import cache
-from tests.mdp.kernels.small_program import PART_FILE, result_and_compilations
+from tests.mdp.kernels.small_program import PART_FILE, output_of, result_and_compilations
 
 
 def test_a_kernel_is_compiled_once_and_again_when_a_part_or_a_constant_in_another_file_changes(program: Path) -> None:
@@ -69,3 +72,23 @@ def test_a_cache_that_is_no_folder_is_not_replaced_by_one_beside_the_source(
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
     assert result_and_compilations(program).startswith("21.0")
     assert list(program.rglob("*.nbi")) == []
+
+
+CALLER = (
+    "from mdp.kernels.kernel import kernel\nfrom mdp.near import near\n\n\n@kernel\ndef twice(x):\n    return 2.0 * near(x)\n"
+)
+COMPILED = (
+    "import sys; from mdp.near import near; from numba.core.runtime import rtsys\n"
+    "print(near(2.0), 'numba.np.linalg' in sys.modules, rtsys._init)"
+)
+
+
+def test_nothing_that_only_compiling_needs_is_imported_or_compiled_for_a_cached_kernel(program: Path) -> None:
+    assert [output_of(program, COMPILED), output_of(program, COMPILED)] == ["21.0 True True", "21.0 False False"]
+
+
+def test_a_kernel_can_be_compiled_with_one_that_comes_from_the_cache(program: Path) -> None:
+    (program / "caller.py").write_text(CALLER, encoding="utf-8")
+    output_of(program, COMPILED)
+    both = "from mdp.near import near; from mdp.caller import twice; print(near(2.0), twice(2.0), near.stats.cache_hits.total())"
+    assert output_of(program, both) == "21.0 42.0 1"

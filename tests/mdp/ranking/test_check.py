@@ -12,7 +12,7 @@ from mdp.directions.unit_vectors import spread
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
-from mdp.ranking.candidates import REASONS, Bounds, Reason, bounds_of, check, platform_disc, refusals, score_candidates
+from mdp.ranking.candidates import REASONS, Bounds, Reason, bounds_of, check, count_rejected, platform_disc, score_candidates
 from mdp.sweep.sweep import Remainder
 from profiles.profile import load
 from tests.mdp.solids import random_solid
@@ -69,13 +69,13 @@ def test_every_candidate_is_counted_under_one_reason_and_what_gains_too_little_i
     mesh = tee()
     limits, remainder = limits_for(mesh, 60), Remainder(mesh, risky_upright(mesh, 45.0))
     scored = score_candidates(remainder, limits, TERMS, 50.0)
-    counts = refusals(scored, 50.0, lambda _: False)
+    counts = count_rejected(scored, 50.0, lambda _: False)
     assert sum(counts.values()) == scored.evaluated
     assert set(counts) == {Reason.FEASIBLE, *REASONS}
     assert (scored.gain_mm2 >= 50.0).all()
     feasible = check(remainder, limits, 2.0, scored.direction, scored.offset_mm).reason == Reason.FEASIBLE
     assert counts[Reason.FEASIBLE] == feasible.sum() > 0
-    weak = refusals(scored, 50.0, lambda _: True)
+    weak = count_rejected(scored, 50.0, lambda _: True)
     assert (weak[Reason.FEASIBLE], weak[Reason.WEAK]) == (0, counts[Reason.FEASIBLE])
 
 

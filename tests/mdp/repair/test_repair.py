@@ -12,7 +12,7 @@ from mdp.formats import readers
 from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import locate
-from mdp.repair.repair import repair
+from mdp.repair.repair import repair, resolve_overlap
 from mdp.repair.shells import solid_of, surface_of, volume_of
 from profiles.errors import MeshError
 from tests.checks import assert_closed
@@ -259,3 +259,16 @@ def test_a_model_rounded_to_another_shape_is_refused_with_what_to_do() -> None:
     step_mm = np.ptp(fine.vertices, axis=0).max() / 18
     with pytest.raises(MeshError, match=r"enclose 7530.* kept of them 7655.*make it manifold in another program first"):
         repair([Surface(np.round(fine.vertices / step_mm) * step_mm, fine.faces)])
+
+
+def test_a_body_tangled_everywhere_is_given_up_before_its_union_fills_the_memory() -> None:
+    mesh = m3.Manifold.sphere(10.0, 48).to_mesh()
+    vertices = np.random.default_rng(0).permutation(np.array(mesh.vert_properties[:, :3], float))
+    assert resolve_overlap(m3.Manifold(m3.Mesh64(vertices, np.array(mesh.tri_verts, np.uint64)))) is None
+
+
+def test_a_body_that_does_not_pass_through_itself_stays() -> None:
+    block = m3.Manifold.cube((10.0, 20.0, 30.0))
+    resolved = resolve_overlap(block)
+    assert resolved is not None
+    assert (resolved.num_tri(), resolved.volume()) == (12, 6000.0)

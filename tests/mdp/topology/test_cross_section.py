@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats, Mesh
-from mdp.topology.cross_section import cross_sections
+from mdp.topology.cross_section import cross_sections, loop_edges
 from profiles.errors import SliceError
 from slicer.geometry.polygons import CLOSING_MM, area_mm2, clean, contours
 from slicer.sectioning import faces_by_layer
@@ -70,6 +70,18 @@ def test_an_edge_of_four_faces_keeps_both_solids() -> None:
     mesh = Mesh(np.array(vertices), np.concatenate([two.faces, np.array(renamed)[two.faces]]))
     assert len(vertices) == 14
     assert area(cross_sections(mesh, np.array([2.5]))[0]) == pytest.approx(50.0)
+
+
+def test_the_edges_of_loops_close_each_of_them() -> None:
+    triangle, sliver = np.array([(0.0, 0.0), (3.0, 0.0), (0.0, 4.0)]), np.array([(9.0, 9.0), (9.0, 8.0)])
+    assert loop_edges([triangle, sliver]).tolist() == [
+        [0.0, 0.0, 3.0, 0.0],
+        [3.0, 0.0, 0.0, 4.0],
+        [0.0, 4.0, 0.0, 0.0],
+        [9.0, 9.0, 9.0, 8.0],
+        [9.0, 8.0, 9.0, 9.0],
+    ]
+    assert loop_edges([]).shape == (0, 4)
 
 
 def test_an_open_mesh_is_refused_with_the_number_of_open_edges() -> None:

@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping
 import pytest
 
 from profiles.errors import ProfileError
-from profiles.foreign import orcaslicer, prusaslicer
+from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
-from profiles.foreign.imported import imported, stay, unused
+from profiles.foreign.imported import KINDS, Row, imported, stay, unused
 from profiles.foreign.rules import PROCESS_RULES
 from profiles.profile import load_one
 
@@ -172,3 +172,111 @@ def test_a_width_that_does_not_go_with_its_layers_is_left_with_the_reason() -> N
 def test_layers_that_are_too_high_for_all_lines_are_refused() -> None:
     with pytest.raises(ProfileError, match=r"process 'imported': .*at most 0.9 of line_width_mm"):
         imported(config(layer_height="0.4", perimeter_extrusion_width="0.4"), "process")
+
+
+def reported(theirs: Config, name: str) -> Row:
+    """The one row of a report on a setting, by its name there."""
+    (row,) = (row for kind in KINDS for row in imported(theirs, kind).rows if row.name == name)
+    return row
+
+
+@pytest.mark.parametrize(
+    ("made", "values", "row"),
+    [
+        (orcaslicer.of_values, {"seam_position": "back"}, ("seam_position", "back", '"rear"', "")),
+        (
+            orcaslicer.of_values,
+            {"inner_wall_line_width": "110%", "nozzle_diameter": "0.4"},
+            ("inner_wall_line_width", "110%", "0.44", "110 % of nozzle_diameter (0.4)"),
+        ),
+        (
+            prusaslicer.of_gcode,
+            {"extrusion_spacing": "", "bridge_flow_ratio": "85%"},
+            ("bridge_flow_ratio", "85%", "0.85", "percent as a share"),
+        ),
+        (cura.of_values, {"infill_sparse_density": "45"}, ("infill_sparse_density", "45", "0.45", "")),
+        (cura.of_values, {"z_seam_type": "shortest"}, ("z_seam_type", "shortest", '"nearest"', "")),
+        (cura.of_values, {"material_flow": "96"}, ("material_flow", "96", "0.96", "")),
+        (cura.of_values, {"support_angle": "55"}, ("support_angle", "55", "55.0", "from the vertical, as here")),
+        (
+            cura.of_values,
+            {"brim_width": "5", "adhesion_type": "none"},
+            ("brim_width", "5", "0.0", "adhesion_type is none"),
+        ),
+        (cura.of_values, {"adhesion_type": "raft"}, ("adhesion_type", "raft", "4", "1 + 1 + 2 layers")),
+        (
+            cura.of_values,
+            {"raft_airgap": "0.3", "layer_0_z_overlap": "0.1"},
+            ("raft_airgap", "0.3", "0.2", "0.3 less 0.1 (layer_0_z_overlap)"),
+        ),
+        (cura.of_values, {"speed_travel": "=100 + 20"}, ("speed_travel", "=100 + 20", "120.0", "that is 120")),
+        (
+            cura.of_values,
+            {"machine_nozzle_size": "0.5"},
+            ("wall_line_width_x", "0.5", "0.5", "Cura's own formula: wall_line_width"),
+        ),
+    ],
+)
+def test_a_report_has_the_words_of_the_file_and_what_was_made_of_them(
+    made: Callable[[Mapping[str, str]], Config], values: dict[str, str], row: tuple[str, str, str, str]
+) -> None:
+    found = reported(made(values), row[0])
+    assert (found.text, found.value, found.how) == row[1:]
+
+
+OF_NOZZLE = "a percentage of the nozzle, which the file does not tell"
+
+
+@pytest.mark.parametrize(
+    ("made", "values", "name", "text", "why"),
+    [
+        (
+            orcaslicer.of_values,
+            {"outer_wall_line_width": "110%", "line_width": "0.5"},
+            "outer_wall_line_width",
+            "110%",
+            OF_NOZZLE,
+        ),
+        (orcaslicer.of_values, {"initial_layer_line_width": "120%"}, "initial_layer_line_width", "120%", OF_NOZZLE),
+        (
+            orcaslicer.of_values,
+            {"inner_wall_line_width": "0", "line_width": "110%"},
+            "inner_wall_line_width",
+            "0",
+            f"0 is extrusion_width, {OF_NOZZLE}",
+        ),
+        (
+            prusaslicer.of_gcode,
+            {"extrusion_spacing": "", "max_layer_height": "75%,75%"},
+            "max_layer_height",
+            "75%,75%",
+            OF_NOZZLE,
+        ),
+        (
+            prusaslicer.of_gcode,
+            {"external_perimeter_extrusion_width": "180%", "extrusion_width": "0.5"},
+            "external_perimeter_extrusion_width",
+            "180%",
+            "a percentage of layer_height, which the file does not tell",
+        ),
+    ],
+)
+def test_a_width_in_percent_of_what_the_file_does_not_tell_is_left_with_the_reason(
+    made: Callable[[Mapping[str, str]], Config], values: dict[str, str], name: str, text: str, why: str
+) -> None:
+    row = reported(made(values), name)
+    assert (row.text, row.taken, row.how) == (text, False, why)
+
+
+@pytest.mark.parametrize(
+    ("made", "values", "rest"),
+    [
+        (orcaslicer.of_values, {"hot_plate_temp": "60", "cool_plate_temp": "35"}, ["cool_plate_temp"]),
+        (cura.of_values, {"support_angle": "55", "raft_airgap": "0.3", "prime_tower_size": "20"}, ["prime_tower_size"]),
+        (cura.of_values, {"retraction_hop": "0.2", "retraction_hop_enabled": "True"}, []),
+    ],
+)
+def test_a_setting_that_filled_a_key_is_not_told_among_the_unused(
+    made: Callable[[Mapping[str, str]], Config], values: dict[str, str], rest: list[str]
+) -> None:
+    assert unused(made(values)) == rest

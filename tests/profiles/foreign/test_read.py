@@ -159,7 +159,7 @@ def test_presets_for_printers_with_several_nozzles_say_none(tmp_path: Path) -> N
     for nozzle in ("0.4", "0.6"):
         written(tmp_path, f"Acme {nozzle}.json", json.dumps({"type": "machine", "name": nozzle, "nozzle_diameter": [nozzle]}))
     mine = {"type": "process", "name": "mine", "line_width": "110%", "compatible_printers": ["Acme 0.4", "Acme 0.6"]}
-    assert read_config(written(tmp_path, "mine.json", json.dumps(mine))).text("extrusion_width") == "0"
+    assert read_config(written(tmp_path, "mine.json", json.dumps(mine))).number("extrusion_width") is None
 
 
 def test_a_parent_that_is_nowhere_beside_it_is_told(tmp_path: Path) -> None:

@@ -1,23 +1,151 @@
 """At a port: the cold machine whose axes are measured, spoken to, homed, and left with its tip raised."""
 
+import re
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
-from machine.cli.commands.measuring.mover import PrinterMover
-from machine.cli.commands.measuring.prober import ProbingSession
 from machine.cli.terminal.interrupts import interrupting
 from machine.firmware import dialect_of
+from machine.firmware.firmware import ProbingRules
+from machine.gcode.pen import Pen
+from machine.link.medium import SERIAL, Medium, Wire
+from machine.link.protocol.events import Echo, Event, Unknown
+from machine.link.protocol.framing import LINE_LIMIT
+from machine.link.shutdown import lift_tip
 from machine.notices import say
 from machine.pipeline.requests import PortRequest
 from machine.printing.checks import check_machine
+from machine.printing.command_session import CommandSession
 from machine.printing.destination import parse_printer
 from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
 from machine.printing.serial_log import TappedWire, new_log
-from machine.simulator.contact.probe import ProbedTable
-from profiles.errors import PrinterError, add_words
+from machine.setup.calibration.program import cold_start, turn_lines
+from machine.simulator.contact import ProbedTable
+from mdp.pose import Pose
+from profiles.errors import FirmwareError, PrinterError, add_words
 from profiles.machine import Machine
 
 HOT_C = 50.0  # a nozzle from which plastic may hang
+CROSS_MM_S = 100.0
+SEEK_MM_S = 3.0
+TOLD_MM = 0.006  # what M114 rounds to hundredths of a mm
+
+
+class PrinterMover:
+    """z_mm: where the tip is, as it was sent."""
+
+    def __init__(self, session: CommandSession, pen: Pen) -> None:
+        self._session, self._pen = session, pen
+        self._up = 60.0 * pen.machine.z.speed_mm_s
+        self._across = 60.0 * min(pen.machine.x.speed_mm_s, pen.machine.y.speed_mm_s, CROSS_MM_S)
+        self.z_mm = 0.0
+        self._top: float | None = None  # the greatest height it has been sent to; None: it has not been homed
+
+    def start(self) -> None:
+        """Home as the profile's start block does, without heat; what is left out for that is said. Raises UserError."""
+        for line in list(cold_start(self._pen)):
+            if line.startswith("; left out"):
+                say(f"start block: {line.removeprefix('; ')}")
+            self._session.command(line)
+
+    def turn(self, pose: Pose) -> None:
+        """Turn the table, the head standing still."""
+        for line in turn_lines(pose, self._pen):
+            self._session.command(line)
+
+    def rise(self, z_mm: float) -> None:
+        """Bring the tip to a height."""
+        self._session.command(f"G1 Z{z_mm:.3f} F{self._up:.0f}")
+        self.z_mm, self._top = z_mm, z_mm if self._top is None else max(self._top, z_mm)
+
+    def cross(self, x_mm: float, y_mm: float) -> None:
+        """Bring the tip over a place."""
+        self._session.command(f"G1 X{x_mm:.3f} Y{y_mm:.3f} F{self._across:.0f}")
+
+    def arrive(self) -> None:
+        """Wait until all moves are made."""
+        self._session.exchange.drain()
+
+    @property
+    def raised(self) -> str:
+        """What retreat() has done, as words before others."""
+        return "" if self._top is None else "the tip is raised, "
+
+    def retreat(self) -> None:
+        """After an error: the tip up to the greatest height it has been at, whatever the printer is able to hear."""
+        if self._top is None:
+            return
+        try:
+            self.rise(self._top)
+            self._session.exchange.drain()
+        except PrinterError:
+            exchange = self._session.exchange
+            with suppress(PrinterError):
+                lift_tip(exchange.wire, exchange.medium, f"Z{self._top - self.z_mm:.3f}", self._up, lambda: None)
+
+
+class ProbingSession(CommandSession):
+    """A command session that keeps what the printer says beside its ok."""
+
+    def __init__(self, wire: Wire, limit: int = LINE_LIMIT, medium: Medium = SERIAL) -> None:
+        self.heard: list[str] = []
+        super().__init__(wire, limit, medium)
+
+    def nozzle_c(self) -> float:
+        """How hot the nozzle is; 0 where that is not reported."""
+        self.command("M105")
+        return self.heat.nozzle_c or 0.0
+
+    def _heard(self, event: Event) -> None:
+        super()._heard(event)
+        if isinstance(event, Echo | Unknown):
+            self.heard.append(event.text)
+
+
+class PrinterProber(PrinterMover):
+    """Implements machine.setup.calibration.probing.measure.Prober. offset_z_mm: from the nozzle's tip to what touches."""
+
+    def __init__(self, session: ProbingSession, pen: Pen, rules: ProbingRules, offset_z_mm: float = 0.0) -> None:
+        super().__init__(session, pen)
+        self._probing, self._rules, self._offset_z_mm = session, rules, offset_z_mm
+
+    def seek(self, low_mm: float) -> float | None:
+        """The tip's Z at contact on the way down to a height; None: there was none."""
+        session, rules = self._probing, self._rules
+        session.heard.clear()
+        began, self.z_mm = self.z_mm, low_mm if rules.limited else self._pen.machine.z.limits_mm[0]
+        try:
+            session.command(rules.command.format(low=low_mm, speed=SEEK_MM_S, feed=60.0 * SEEK_MM_S))
+        except FirmwareError as error:
+            return self._said_by(error, began)
+        if session.unknown:
+            raise PrinterError(f"the printer does not know {session.unknown[0]!r}: {rules.needs} is needed")
+        self.z_mm = self._answered() if rules.contact else self._stopped()
+        return None if rules.limited and self.z_mm <= low_mm + TOLD_MM else self.z_mm
+
+    def _said_by(self, error: FirmwareError, began_mm: float) -> float | None:
+        """What an error of the firmware's own means for the contact."""
+        if self._rules.silent and self._rules.silent in str(error):
+            return None
+        if self._rules.early and self._rules.early in str(error):
+            self.z_mm = began_mm
+            return began_mm
+        raise error
+
+    def _stopped(self) -> float:
+        position = self._session.exchange.ask_position()
+        if position is None:
+            raise PrinterError("the printer does not report where it has stopped: an answer to M114 is needed")
+        return dict(position.axes)["Z"]
+
+    def _answered(self) -> float:
+        """The tip's Z that the firmware has answered."""
+        text = "\n".join(self._probing.heard)
+        if corrected := re.search(self._rules.corrected, text):
+            return float(corrected[1]) - self._offset_z_mm
+        if contact := re.search(self._rules.contact, text):
+            return float(contact[1])
+        raise PrinterError(f"the printer does not report where it has met something: {text[:80]!r} is not understood")
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from machine.cli.commands.measuring.calibrate_dialogue import ask_touches
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.notices import show
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
@@ -51,28 +50,6 @@ def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
     if off:
         raise ProfileError(f"{off}: look at touch {calibration.worst} first")
     save_calibration(request, machine, calibration, sheet.mark_angle_deg is not None)
-    return 0
-
-
-def ask_for_touches(request: CalibrationRequest) -> int:
-    """Ask a person for the touches one by one, tell what follows from them, save it."""
-    machine, name = tilting_machine(request), request.machine
-    refuse_if_saved(request)
-    accepted: list[Calibration] = []
-
-    def judge(sheet: Sheet) -> str | int | None:
-        try:
-            calibration, off = judged(request, machine, sheet)
-        except ProfileError as error:  # the person is asked again
-            return str(error)
-        if off:
-            show(f"{off}\n")
-            return calibration.worst
-        accepted.append(calibration)
-        return None
-
-    sheet = ask_touches(name, machine, mark_height_mm(request), request.mark_radius_mm, judge)
-    save_calibration(request, machine, accepted[-1], sheet.mark_angle_deg is not None)
     return 0
 
 

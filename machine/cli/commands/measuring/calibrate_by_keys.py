@@ -5,9 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
 
-from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
+from machine.cli.commands.measuring.at_port import PrinterMover, begin_cold, cold_session, tip_raised_after
 from machine.cli.commands.measuring.calibrate import judged, mark_height_mm, refuse_if_saved, save_calibration, tilting_machine
-from machine.cli.commands.measuring.mover import PrinterMover
 from machine.cli.terminal.keys import can_type, typing
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.notices import say

@@ -7,17 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from machine.cli.commands.measuring.calibrate import refuse_if_saved, save_tables, through, tilting_machine
-from machine.cli.commands.measuring.calibrate_dialogue import read_reply
+from machine.cli.commands.measuring.questionnaire import Question, ask
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.gcode.lines import GcodeFile
 from machine.gcode.reader.parse import parse_gcode
 from machine.notices import show
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes
-from machine.setup.calibration.piece.fit import Correction, correct
-from machine.setup.calibration.piece.pads import Piece, read_piece
-from machine.setup.calibration.piece.page import piece_page
-from machine.setup.calibration.piece.readings import EXPECTED, parse_pad, parse_readings
+from machine.setup.calibration.piece.fit import Correction, correct, piece_page
+from machine.setup.calibration.piece.pads import EXPECTED, Piece, parse_pad, parse_readings, read_piece, readings_text
 from machine.setup.calibration.saved import found_tables
 from profiles.errors import ProfileError
 from profiles.machine import Machine
@@ -58,20 +56,13 @@ def ask_for_readings(request: CalibrationRequest, printed: Path) -> int:
     refuse_if_saved(request)
     piece = _read(printed, machine)
     sys.stdout.write(INTRO)
-    told: list[list[float]] = []
-    while len(told) < len(piece.pads):
-        pad = piece.pads[len(told)]
-        reply = read_reply(
-            f"pad {pad.number} ({pad.number} hole{'s' * (pad.number > 1)}): right, up, height: ", "all pads were told"
-        )
-        if reply == "b":
-            told = told[:-1]
-            continue
-        try:
-            told.append(parse_pad(reply, pad.number))
-        except ProfileError as error:  # the person is asked again
-            sys.stdout.write(f"  {error}\n")
+    told = ask([_question(pad.number) for pad in piece.pads], "all pads were told")
     return _settle(request, machine, correct(machine, [piece], np.array([told])), 1)
+
+
+def _question(pad: int) -> Question[list[float]]:
+    text = f"pad {pad} ({pad} hole{'s' * (pad > 1)}): right, up, height"
+    return Question(text, lambda reply: parse_pad(reply, pad), lambda read_mm: readings_text(np.array([read_mm])))
 
 
 def _read(path: Path, machine: Machine) -> Piece:

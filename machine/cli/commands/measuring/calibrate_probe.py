@@ -2,13 +2,12 @@
 
 import sys
 
-from machine.cli.commands.measuring.at_port import begin_cold, cold_session, tip_raised_after
+from machine.cli.commands.measuring.at_port import PrinterProber, ProbingSession, begin_cold, cold_session, tip_raised_after
 from machine.cli.commands.measuring.calibrate import MOST_OFF_MM, comparison, refuse_if_saved, save_calibration, tilting_machine
-from machine.cli.commands.measuring.calibrate_dialogue import read_reply
-from machine.cli.commands.measuring.prober import PrinterProber, ProbingSession
+from machine.cli.commands.measuring.questionnaire import read_reply
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.firmware import dialect_of, firmware_of
-from machine.firmware.probing import ProbingRules
+from machine.firmware.firmware import ProbingRules
 from machine.notices import say, show
 from machine.pipeline.output import check_writable
 from machine.pipeline.requests import ProbeRequest
@@ -17,8 +16,7 @@ from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.probing.ball import Ball
 from machine.setup.calibration.probing.measure import Measuring, Probe
 from machine.setup.calibration.program import calibration_pen, usual_radius_mm
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.contact.surface import TrueBall
+from machine.simulator.contact import ProbedTable, TrueBall
 from profiles.errors import PrinterError, ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile

@@ -1,15 +1,17 @@
 """The coupon command: writes the bars' program and the sheet, works out what their break loads say, saves it in profiles."""
 
+import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from machine.cli.commands.measuring.coupon_dialogue import ask_loads
+from machine.cli.commands.measuring.questionnaire import Question, ask
 from machine.cli.terminal.report import print_table
 from machine.cli.terminal.requests import CouponRequest
-from machine.notices import show
+from machine.notices import plain_line, show
 from machine.pipeline.output import check_outputs, check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
 from machine.pipeline.pictures import contact_sheet, write_png
 from machine.pipeline.pipeline import build
@@ -20,15 +22,19 @@ from machine.setup.coupon.bars import SHAPES, Shape
 from machine.setup.coupon.design import factors, settings_of_bars
 from machine.setup.coupon.fit import Outcome, evaluate
 from machine.setup.coupon.plate import coupon
-from machine.setup.coupon.report import outcome_text, report_lines
-from machine.setup.coupon.saved import material_tables, process_tables
-from machine.setup.coupon.sheet import Sheet, empty_sheet, read_sheet, sheet_text
+from machine.setup.coupon.report import material_tables, outcome_text, process_tables, report_lines
+from machine.setup.coupon.sheet import Sheet, empty_sheet, load_problem, read_sheet, settings_in_words, sheet_text
 from machine.view.page import print_page
 from profiles.errors import OutputError, ProfileError
 from profiles.part_settings import PartSettings
 from profiles.places import KINDS
 from profiles.profile import Profile, load, with_part_settings
 
+N_PER_KG = 9.80665
+INTRO = """{bars} bars of a {shape} coupon, printed on {machine}: at what load did each break?
+Newtons, or as a scale shows it: 9.2kg. The plate printed more than once: one load for each time, in one line.
+Enter keeps what stands in [ ], s skips a bar, b goes back, Ctrl-C ends and leaves all as it was.
+"""
 UNSUPPORTED = ("process.support=none",)  # the bars carry themselves; support would stand on what is measured
 
 
@@ -87,17 +93,43 @@ def ask_for_loads(request: CouponRequest) -> int:
     for kind in ("material", "process"):
         refuse_to_overwrite(_own_profile(request, kind, {})[0], request.replace)
 
-    def judge(answered: Sheet) -> str:
+    outcome = evaluate(_ask_loads(sheet))
+    show(outcome_text(outcome))
+    _save(request, outcome)
+    return 0
+
+
+def _ask_loads(sheet: Sheet) -> Sheet:
+    """The sheet with loads that do, as a person types them."""
+    bars = len(sheet.loads_n)
+    sys.stdout.write(INTRO.format(bars=bars, shape=sheet.shape.name, machine=plain_line(sheet.machine)))
+
+    def question(bar: int) -> Question[tuple[float, ...]]:
+        text = f"bar {bar}, {settings_in_words(sheet, bar)}, N"
+        return Question(text, lambda reply: _loads(reply, sheet.shape), lambda loads: " ".join(f"{n:g}" for n in loads), ())
+
+    def judge(loads: list[tuple[float, ...]]) -> str:
         try:
-            evaluate(answered)
+            evaluate(replace(sheet, loads_n=tuple(loads)))
         except ProfileError as error:  # the person is asked again
             return str(error)
         return ""
 
-    outcome = evaluate(ask_loads(sheet, judge))
-    show(outcome_text(outcome))
-    _save(request, outcome)
-    return 0
+    return replace(sheet, loads_n=tuple(ask([question(bar) for bar in range(1, bars + 1)], "all loads were told", judge)))
+
+
+def _loads(reply: str, shape: Shape) -> tuple[float, ...]:
+    """The loads of a line in N. Raises ProfileError for what is none."""
+    try:
+        words = reply.replace(" kg", "kg").replace(" n", "n").split()
+        loads = [float(word[:-2]) * N_PER_KG if word.endswith("kg") else float(word.removesuffix("n")) for word in words]
+    except ValueError:
+        loads = []
+    if not loads:
+        raise ProfileError(f"{reply!r} cannot be read: a number such as 85 or 9.2kg is expected")
+    if problem := next(filter(None, (load_problem(shape, load_n) for load_n in loads)), ""):
+        raise ProfileError(problem)
+    return tuple(loads)
 
 
 def _save(request: CouponRequest, outcome: Outcome) -> None:

@@ -8,7 +8,7 @@ from glob import glob, has_magic
 from pathlib import Path
 
 from machine.cli.terminal.requests import DetectRequest
-from machine.firmware.line import check_baud
+from machine.firmware.firmware import check_baud
 from machine.notices import plain_lines, say
 from machine.pipeline.output import check_writable, plain_name, refuse_to_overwrite, write_own
 from machine.pipeline.profile_file import profile_text

@@ -5,12 +5,15 @@ readings and of changes, each as a share of how far it is usually off (a maximum
 errors), by Gauss's and Newton's steps.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
+from pathlib import Path
 
 import numpy as np
 
-from machine.setup.calibration.piece.pads import PADS, WAYS, Piece
+from machine.setup.calibration.piece.pads import HEIGHT_MM, MARK_MM, PADS, WAYS, Piece
 from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats
 from mdp.pose import unit
@@ -26,6 +29,7 @@ LEAST_READINGS = 4
 ROUNDS = 20
 STEP, SETTLED = 1e-4, 1e-7
 DOUBTFUL_MM = 0.2
+TEMPLATE = Path(__file__).parent / "page.html"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +67,7 @@ def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> C
     if read.sum() < LEAST_READINGS:
         raise ProfileError(f"{read.sum()} readings of the pads are told: at least {LEAST_READINGS} are needed")
     target, weights = readings_mm.reshape(-1)[read], np.tile(1.0 / READ_MM, readings_mm.size // len(READ_MM))[read]
-    places = np.kron(np.eye(len(pieces)), np.tile(np.diag(BIAS_MM)[:, BIAS_MM > 0.0], (len(pieces[0].pads), 1)))[read]
+    places = np.kron(np.eye(len(pieces)), _biases(pieces[0]))[read]
     state = np.zeros(len(UNKNOWN) + places.shape[1])  # of numbers and biases, each as a share of what is usual
     for _ in range(ROUNDS):
         changes, biases = USUAL * state[: len(UNKNOWN)], state[len(UNKNOWN) :]
@@ -83,6 +87,11 @@ def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> C
 def slope_of(machine: Machine, piece: Piece) -> Floats:
     """(pads x ways, UNKNOWN) by how much a reading of a piece changes where a number of a machine changes by 1."""
     return _slope(machine, [piece], np.zeros(len(UNKNOWN)))
+
+
+def _biases(piece: Piece) -> Floats:
+    """(pads x ways, biases) by how much each reading of a piece is off where a bias is as large as usual."""
+    return np.tile(np.diag(BIAS_MM)[:, BIAS_MM > 0.0], (len(piece.pads), 1))
 
 
 def _explained(machine: Machine, pieces: Sequence[Piece], changes: Floats) -> Floats:
@@ -106,3 +115,28 @@ def _changed(machine: Machine, changes: Floats) -> Machine:
     turn = {"point_mm": (x + float(changes[0]), y + float(changes[1]), z)}
     update = {"tilt": machine.tilt.model_copy(update=tilt), "turn": machine.turn.model_copy(update=turn)}
     return machine.model_copy(update=update)
+
+
+def piece_page(piece: Piece, machine_name: str, file_name: str) -> bytes:
+    """The page of a printed piece; machine_name and file_name are those of the command that saves the corrections.
+
+    Its script adds reading after reading to the estimate of `correct`, with the slope at the profile's own numbers.
+    """
+    machine = piece.machine
+    values = {
+        "machine": machine_name,
+        "file": file_name,
+        "markMm": MARK_MM,
+        "heightMm": HEIGHT_MM,
+        "slope": np.hstack([slope_of(machine, piece), _biases(piece)]).tolist(),
+        "usual": [*USUAL.tolist(), *[1.0] * np.count_nonzero(BIAS_MM)],
+        "readMm": READ_MM.tolist(),
+        "turnMm": list(machine.turn.point_mm),
+        "tiltMm": list(machine.tilt.point_mm),
+        "acrossTilt": frame_across(unit(machine.tilt.axis)).tolist(),
+        "zeroDeg": machine.tilt.zero_deg,
+        "letters": [machine.turn.letter, machine.tilt.letter],
+    }
+    packed = json.dumps(values, allow_nan=False).replace("<", "\\u003c")
+    text = TEMPLATE.read_text(encoding="utf-8")
+    return text.replace("<!--TITLE-->", escape(f"{file_name} on {machine.name}")).replace("/*VALUES*/", packed).encode()

@@ -10,8 +10,7 @@ import numpy as np
 
 from machine.kinematics.table import machine_points
 from machine.setup.calibration.fit import Touch, estimate
-from machine.setup.calibration.probing.ball import Ball, ball_centre, contact_heights
-from machine.setup.calibration.probing.clear import find_in_the_way
+from machine.setup.calibration.probing.ball import Ball, ball_centre, contact_heights, find_in_the_way
 from machine.setup.calibration.program import TILTS_DEG, safe_z_mm, turns_deg
 from mdp.mesh import Floats
 from mdp.pose import Pose, level

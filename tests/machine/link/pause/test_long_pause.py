@@ -12,10 +12,10 @@ from machine.link.print_state import PrintStatus
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
-from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.errors import FirmwareError
 from profiles.profile import Profile, load
 from tests.machine.link.test_pause import BODY, PROGRAM, Watcher, is_exact
+from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 COOLS_S = 120.0
 COLD_S = COOLS_S + 120.0  # twice the time constant of the simulated nozzle later

@@ -3,7 +3,7 @@
 import pytest
 
 from machine.gcode.modes import ModalState, axes_of
-from machine.kinematics.coordinates import origin_mm
+from machine.kinematics.table import origin_mm
 from machine.link.pause.printed_bounds import PrintedBounds
 from profiles.profile import load
 

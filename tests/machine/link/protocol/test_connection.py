@@ -10,12 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from machine.firmware import FIRMWARES, Firmware
+from machine.firmware.firmware import FRAME_CHARACTERS
 from machine.firmware.klipper import KLIPPER
-from machine.firmware.line import FRAME_CHARACTERS
-from machine.firmware.marlin import MARLIN
-from machine.firmware.repetier import REPETIER
+from machine.firmware.marlin import MARLIN, REPETIER, SMOOTHIEWARE
 from machine.firmware.reprapfirmware import REPRAPFIRMWARE
-from machine.firmware.smoothieware import SMOOTHIEWARE
+from machine.link.protocol.answers import QUESTIONS_MOST
 from machine.link.protocol.connection import Connection
 from machine.link.protocol.decoder import LONGEST_LINE
 from machine.link.protocol.events import (
@@ -24,7 +23,6 @@ from machine.link.protocol.events import (
     Ok,
 )
 from machine.link.protocol.framing import LINE_LIMIT, command_of, frame
-from machine.link.protocol.questions import QUESTIONS_MOST
 from machine.link.protocol.states import State
 from machine.link.protocol.timeout import Timing
 from machine.link.protocol.verdict import SYNC_TRIES

@@ -6,8 +6,7 @@ import numpy as np
 
 from machine.setup.calibration.probing.ball import Ball
 from machine.setup.calibration.probing.measure import Measuring, Probe
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.contact.surface import TrueBall
+from machine.simulator.contact import ProbedTable, TrueBall
 from mdp.pose import Pose
 from profiles.machine import Machine
 from tests.machine.setup.calibration.misaligned import misaligned

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from machine.firmware.marlin_settings import settings_report
+from machine.firmware.marlin import settings_report
 from machine.setup.detect.found import ConfigText, Found
 from machine.setup.detect.marlin import recognise
 from machine.setup.detect.proposal import propose

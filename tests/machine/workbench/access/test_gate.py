@@ -10,10 +10,10 @@ import pytest
 from starlette.responses import PlainTextResponse
 from starlette.types import Receive, Scope, Send
 
-from machine.workbench.access.door import Door
 from machine.workbench.access.gate import UNPAIRED_CODE, Gate
-from machine.workbench.access.lan import Certificate, Lan
 from machine.workbench.access.limits import DEVICE
+from machine.workbench.access.network import Certificate, Lan
+from machine.workbench.access.pairing import Door
 
 ADDRESS, PORT = "192.168.1.5", 8123
 OWN = f"http://{ADDRESS}:{PORT}"

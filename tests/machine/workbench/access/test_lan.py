@@ -8,10 +8,8 @@ from pathlib import Path
 import pytest
 
 from machine.cli.cli import main
-from machine.workbench.access import lan
-from machine.workbench.access.addresses import network_addresses
-from machine.workbench.access.lan import Certificate, Lan, open_lan
-from machine.workbench.access.listening import listen, listen_at_all
+from machine.workbench.access import network as lan
+from machine.workbench.access.network import Certificate, Lan, listen, listen_at_all, network_addresses, open_lan
 from profiles.errors import OutputError
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")

@@ -13,10 +13,8 @@ from machine.cli.terminal.requests import CalibrationRequest
 from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import workpiece_path
-from machine.setup.calibration.piece.fit import correct
-from machine.setup.calibration.piece.pads import Piece, read_piece
-from machine.setup.calibration.piece.page import piece_page
-from machine.setup.calibration.piece.readings import parse_readings, readings_text
+from machine.setup.calibration.piece.fit import correct, piece_page
+from machine.setup.calibration.piece.pads import Piece, parse_readings, read_piece, readings_text
 from profiles.errors import OutputError, ProfileError
 from profiles.places import own_folder
 from profiles.profile import load

@@ -8,8 +8,7 @@ import pytest
 from PIL import Image
 
 from machine.cli.cli import main
-from machine.simulator.contact.probe import ProbedTable
-from machine.simulator.contact.surface import TrueBall
+from machine.simulator.contact import ProbedTable, TrueBall
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.places import own_folder
 from profiles.profile import load

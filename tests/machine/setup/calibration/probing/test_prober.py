@@ -2,7 +2,7 @@
 
 import pytest
 
-from machine.cli.commands.measuring.prober import PrinterProber
+from machine.cli.commands.measuring.at_port import PrinterProber
 from machine.firmware import firmware_of
 from machine.setup.calibration.program import calibration_pen
 from profiles.errors import FirmwareError, PrinterError

@@ -1,0 +1,190 @@
+"""What the printer's answers tell: which line an `ok` acknowledges, which lines are asked for again, how many questions stay
+unanswered, and how many lines may be on their way.
+
+Most firmwares do not name the line of an `ok`, and some of their oks belong to no line. A question is a numbered M105 that shows
+what has arrived when an answer is missing; its number is a new one each time: Marlin swallows a repeat of its last line without a
+word.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from math import inf
+
+from machine.firmware.firmware import LineRules
+from machine.link.protocol.events import Ok
+from machine.link.protocol.window import FIRST_NUMBER_AGAIN, Window
+
+UNKNOWN_COMMAND = "nknown command"  # echoed with the text of a line that was not understood, ahead of its ok
+ASKED_LIMIT = 10  # the same line asked for so often means that the cable is too noisy (OctoPrint's figure)
+LOOK_BACK = 200  # lines
+NOISE_LIMIT = 20  # of them asked for again: a tenth, at which a print has a blob on every layer
+QUESTION = "M105"
+QUESTIONS_MOST = 4  # in a row without any answer before the printer counts as gone
+IDLE_REPORTS = 2  # a printer that says twice in a row that it has nothing to do has lost the line in flight
+CLEAN_LINES = 8  # acknowledgements awaited one by one before the window opens
+# After each error four times as many: when a line is refused the printer throws away what it has of the next one, and the rest of
+# that one may be run without check. A window of one line cannot be torn so, and costs a tenth of the speed.
+CAUTION_MOST = 8192
+PLACES_MOST = 16  # Marlin's BUFSIZE is 4 to 16; a greater number is a damaged answer
+
+
+class Acknowledgement:
+    """What has come so far that makes one `ok` differ from another."""
+
+    def __init__(self) -> None:
+        self._reports_temperature = False  # the answer to M105 begins with `ok T:`
+        self._unknown_echoed = False
+        self._resend_ok_until_s = -inf
+
+    def hear_echo(self, text: str) -> None:
+        """An echo has come."""
+        if UNKNOWN_COMMAND in text:
+            self._unknown_echoed = True
+
+    def take_unknown(self) -> bool:
+        """Whether the `ok` that has come belongs to a line that the printer did not understand."""
+        unknown, self._unknown_echoed = self._unknown_echoed, False
+        return unknown
+
+    def expect_resend_ok(self, until_s: float) -> None:
+        """A Resend or its error has come: the `ok` that follows acknowledges nothing."""
+        self._resend_ok_until_s = until_s
+
+    def belongs_to_resend(self, now_s: float) -> bool:
+        """Whether this is the ok that belongs to a Resend; some firmwares omit it, so it is not waited for long."""
+        until_s, self._resend_ok_until_s = self._resend_ok_until_s, -inf
+        return now_s < until_s
+
+    def answers_m110(self, ok: Ok, numbered: bool, unknown: bool, now_s: float) -> bool:
+        """Whether the numbers begin anew as M110 has asked; unknown: the `ok` belongs to a line that was not understood."""
+        if numbered:
+            return ok.line == FIRST_NUMBER_AGAIN
+        return not (unknown or ok.temperature or self.belongs_to_resend(now_s))
+
+    def line(self, ok: Ok, window: Window, numbered: bool, now_s: float) -> int | None:
+        """The number of the line that is answered, None for none; numbered: this printer's answers name their lines."""
+        if ok.temperature is not None:
+            self._reports_temperature = True
+            return window.oldest_question()
+        if numbered:
+            return None if ok.line is None else window.line_number(ok.line)
+        if self.belongs_to_resend(now_s) or not window.flight:
+            return None
+        oldest = window.flight[0]
+        return None if oldest.asks_temperature and self._reports_temperature else oldest.number
+
+
+class Resends:
+    """next_line: the first one still to be repeated; repeated: how many were, in all; alone: nothing but the `ok` that belongs to
+    the Resend is on its way; words: what the printer has said of the line that it refused last.
+    """
+
+    def __init__(self) -> None:
+        self.next_line = self.repeated = 0
+        self.alone, self.words = False, ""
+        self._asked = self._times = 0
+        self._asked_lines: deque[int] = deque()
+
+    @property
+    def same_line(self) -> bool:
+        """Whether of the last lines only the newest one was asked for: it is refused, others pass."""
+        return len(set(self._asked_lines)) == 1
+
+    def request(self, number: int) -> str:
+        """Take note of a Resend; what is too much about it, "" when the line can be repeated."""
+        self._times = self._times + 1 if number == self._asked else 1
+        self._asked = number
+        if self._times > ASKED_LIMIT:
+            return f"this line {ASKED_LIMIT} times"
+        self._asked_lines.append(number)
+        while self._asked_lines[0] < number - LOOK_BACK:
+            self._asked_lines.popleft()
+        if len(self._asked_lines) > NOISE_LIMIT:
+            return f"{NOISE_LIMIT} of the last {LOOK_BACK} lines"
+        self.next_line = number
+        return ""
+
+    def acknowledge(self, number: int) -> None:
+        """A line was acknowledged."""
+        if number > self._asked:
+            self._times = 0
+
+    def repeat(self, window: Window, now_s: float) -> bytes:
+        """The bytes of the next line, in flight again; none when all were repeated."""
+        if self.next_line > window.sent:
+            return b""
+        framed = window.repeat(self.next_line, now_s)
+        self.next_line += 1
+        self.repeated += 1
+        return framed
+
+
+@dataclass
+class Questions:
+    """unanswered: in a row; first: line number of the first one; implausible: the line that was asked for although it cannot
+    be meant, 0: none.
+    """
+
+    unanswered: int = 0
+    first: int = 0
+    implausible: int = 0
+    _idle_reports: int = 0
+
+    def ask(self) -> bool:
+        """Count one more; False when the printer has to be given up."""
+        self.unanswered += 1
+        return self.unanswered <= QUESTIONS_MOST
+
+    def hear_idle(self, in_flight: bool) -> bool:
+        """The printer says that it has nothing to do; whether that calls for a question."""
+        self._idle_reports += 1
+        if self._idle_reports < IDLE_REPORTS or not in_flight:
+            return False
+        self._idle_reports = 0
+        return True
+
+    def acknowledge(self) -> None:
+        """A line or a question was answered."""
+        self.unanswered = self._idle_reports = 0
+
+    def end(self) -> None:
+        """What has arrived is known."""
+        self.unanswered = self.first = self.implausible = 0
+
+
+class FlowControl:
+    """`numbered`: the answers name the line they belong to."""
+
+    def __init__(self) -> None:
+        self.numbered = False
+        self._free = 0
+        self._clean, self._caution = 0, CLEAN_LINES
+
+    def lines(self, rules: LineRules, emergency_parser: bool) -> int:
+        """Lines in flight. Without an emergency parser one place of the printer stays free, so that it sees an M112 at once."""
+        if self._clean < self._caution:
+            return 1
+        if not self.numbered:
+            return rules.places_plain
+        if not self._free:
+            return rules.places
+        return self._free if emergency_parser else max(1, self._free - 1)
+
+    def learn(self, rx_free: int | None) -> None:
+        """A numbered answer has come, with or without the free places of the printer's queue."""
+        self.numbered = True
+        if rx_free is not None:
+            self._free = max(self._free, min(rx_free + 1, PLACES_MOST))  # B counts the line itself as still there
+
+    def acknowledge(self, lines: int) -> None:
+        """So many lines were acknowledged."""
+        self._clean += lines
+
+    def slow_down(self) -> None:
+        """An answer is missing: one by one for a while."""
+        self._clean = 0
+
+    def back_off(self) -> None:
+        """A line was refused: one by one for longer than the last time."""
+        self._clean = 0
+        self._caution = min(4 * self._caution, CAUTION_MOST)

@@ -1,0 +1,182 @@
+"""Network: how the workbench is reached from the local network: by which addresses (IPv4 only, which every such network has), at
+which sockets, encrypted or not."""
+
+import os
+import socket
+import ssl
+import struct
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from ipaddress import AddressValueError, IPv4Address
+from pathlib import Path
+
+from machine.view.serving.guard import HOST, own_hosts
+from profiles.errors import OutputError, reason
+
+ELSEWHERE = "198.51.100.1"  # of documentation, RFC 5737: nobody is there, and nothing is sent
+SIOCGIFADDR = 0x8915  # Linux, netdevice(7)
+INTERFACES = Path("/sys/class/net")
+TRIES = 20  # ports of the system's choice, each free here, until one is free at all addresses
+
+
+def network_addresses() -> tuple[str, ...]:
+    """Addresses of private networks, that by which this computer goes out first. None that the internet reaches: who has such a
+    one has no door of his own before it."""
+    found = dict.fromkeys([*_outgoing(), *_of_name(), *_of_interfaces()])
+    return tuple(address for address in found if _is_private(address))
+
+
+def host_names() -> tuple[str, ...]:
+    """Names by which a network may know this computer, in small letters."""
+    name = socket.gethostname().lower()
+    first = name.partition(".")[0]
+    return () if first in ("", "localhost") else tuple(dict.fromkeys([name, first, f"{first}.local"]))
+
+
+def _is_private(address: str) -> bool:
+    try:
+        parsed = IPv4Address(address)
+    except AddressValueError:
+        return False
+    return not (parsed.is_global or parsed.is_loopback or parsed.is_unspecified or parsed.is_multicast)
+
+
+def _outgoing() -> Iterator[str]:
+    """The address that a packet to elsewhere would have; connecting a datagram socket sends none."""
+    with suppress(OSError), closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as own:
+        own.connect((ELSEWHERE, 9))
+        yield own.getsockname()[0]
+
+
+def _of_name() -> Iterator[str]:
+    """Those that the system has for its own name: all of them where it is Windows or macOS."""
+    with suppress(OSError):
+        yield from socket.gethostbyname_ex(socket.gethostname())[2]
+
+
+def _of_interfaces() -> Iterator[str]:
+    """On Linux those of network cards; bridges and tunnels of programs have no device."""
+    if sys.platform != "linux":
+        return
+    from fcntl import ioctl
+
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as own:
+        for _, name in socket.if_nameindex():
+            if (INTERFACES / name / "device").exists():
+                with suppress(OSError):  # it has none
+                    answer = ioctl(own.fileno(), SIOCGIFADDR, struct.pack("256s", name.encode()[:15]))
+                    yield socket.inet_ntoa(answer[20:24])
+
+
+def listen(port: int, host: str = HOST) -> socket.socket:
+    """A socket at a port of an address of this computer, 0: any free one. Raises OutputError for one that cannot be had."""
+    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    try:
+        if os.name == "posix":  # lines of a server that died keep its port for a minute; a second listener is refused as ever
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        elif hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows keeps no port, and would let a second program listen there
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+        own.bind((host, port))
+        own.listen()  # at once: of two that are bound so, the second is refused here
+    except (OSError, OverflowError) as error:
+        own.close()
+        why = reason(error) if isinstance(error, OSError) else str(error)
+        where = "" if host == HOST else f" at {host}"
+        raise OutputError(f"--port {port} cannot be used{where}: {why}; without it any free one is taken") from None
+    return own
+
+
+def listen_at_all(port: int, hosts: Iterable[str]) -> tuple[socket.socket, list[socket.socket]]:
+    """The socket at this computer alone, and one at the same port of every other address. Raises OutputError as `listen`."""
+    hosts = tuple(hosts)
+    for left in reversed(range(TRIES)):
+        own = listen(port)
+        others: list[socket.socket] = []
+        try:
+            for host in hosts:
+                others.append(listen(own.getsockname()[1], host))
+        except OutputError:
+            for each in (own, *others):
+                each.close()
+            if port:
+                raise
+            if not left:
+                raise OutputError(f"--lan: no port is free at all of {', '.join((HOST, *hosts))}") from None
+        else:
+            return own, others
+    raise AssertionError("the last try returns or raises")
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Files in PEM."""
+
+    chain: Path
+    key: Path
+
+
+@dataclass(frozen=True)
+class Lan:
+    """addresses: of this computer; names: by which it may be known, too; certificate: None: not encrypted."""
+
+    addresses: tuple[str, ...]
+    names: tuple[str, ...] = ()
+    certificate: Certificate | None = None
+
+    @property
+    def scheme(self) -> str:
+        """The scheme of its addresses: http or https."""
+        return "http" if self.certificate is None else "https"
+
+    def hosts(self, port: int) -> tuple[str, ...]:
+        """What a browser may call the server at a port."""
+        return own_hosts((*self.addresses, *self.names), port, self.scheme)
+
+    def urls(self, port: int) -> tuple[str, ...]:
+        """What a person types."""
+        return tuple(f"{self.scheme}://{address}:{port}/" for address in self.addresses)
+
+
+def open_lan(chain: Path | None, key: Path | None) -> Lan:
+    """The network that is there now. Raises OutputError where there is none, and for a certificate that cannot be used."""
+    certificate = None if chain is None and key is None else _checked(chain, key)
+    addresses = network_addresses()
+    if not addresses:
+        raise OutputError("--lan: this computer has no address in a private network: join one, or leave --lan out")
+    return Lan(addresses, host_names(), certificate)
+
+
+def _checked(chain: Path | None, key: Path | None) -> Certificate:
+    if chain is None or key is None:
+        given, other = ("--key", "--certificate") if chain is None else ("--certificate", "--key")
+        raise OutputError(f"{given} needs {other}, too: a certificate and its key, each a PEM file")
+    for option, file in (("--certificate", chain), ("--key", key)):
+        try:
+            file.read_bytes()
+        except OSError as error:
+            raise OutputError(f"{option} {file} cannot be read: {reason(error)}") from None
+    _check_pair(chain, key)
+    return Certificate(chain, key)
+
+
+def _check_pair(chain: Path, key: Path) -> None:
+    """Raises OutputError for what is no certificate, no key, or not the certificate's."""
+    asked = []
+
+    def password() -> str:
+        asked.append(True)
+        return ""
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_cert_chain(chain, key, password)
+    except (ssl.SSLError, ValueError) as error:
+        if asked:
+            raise OutputError(f"--key {key} is encrypted by a password: one without is needed") from None
+        if getattr(error, "reason", "") == "KEY_VALUES_MISMATCH":
+            raise OutputError(f"--key {key} does not belong to --certificate {chain}") from None
+        raise OutputError(
+            f"--certificate {chain} and --key {key} cannot be used: both must be PEM files, of an X.509 certificate and its key"
+        ) from None

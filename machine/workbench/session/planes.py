@@ -1,0 +1,141 @@
+"""Planes in a person's hand, tried as they move and taken when they can be cut; zones, and the planes that they drive away."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, inf
+
+from machine.workbench.bench.bench import Bench, with_cuts, with_zones
+from machine.workbench.bench.marks import Marking
+from machine.workbench.bench.planes import Cuts, Edit, Snap, check_unlocked
+from machine.workbench.bench.values import Asked
+from machine.workbench.session.base import Derived, SessionBase, asking
+from machine.workbench.session.placement import Readiness
+from mdp.plane import Plane
+from mdp.search.neck import REACH_DEG, REACH_SHARE
+from mdp.search.trial import Obstacle, Trial
+from profiles.errors import PlanError
+
+REST_S = 0.1  # how long a hand must rest before what it holds is tried more closely
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Planes that could not be cut: the page that wanted them, what is in the way where, and the command that puts the one that
+    was moved at the nearest place; None: it was none that is put somewhere, or there is none."""
+
+    page: str
+    obstacle: Obstacle | None
+    near: Asked | None = None
+
+
+class PlaneTrials:
+    """trial: of the planes that were tried last, and the bench that they were tried on. refused: those that were refused last."""
+
+    def __init__(self, session: SessionBase, readiness: Readiness) -> None:
+        self.trial: tuple[Bench, Cuts, Trial] | None = None
+        self.refused: Refused | None = None
+        self._session, self._readiness = session, readiness
+        self._held: Cuts | None = None  # by a person's hand
+        self._figures = Derived(session, self._to_try, self._try)
+        session.followers.append(self.settle)
+
+    def hold(self, cuts: Cuts) -> None:
+        """Have planes tried, the newest ones as soon as the ones before are done."""
+        self._held = cuts
+        self._figures.follow()
+
+    def settle(self) -> None:
+        """Have the planes on the bench tried anew where others were tried last: no hand holds those any more."""
+        self._held = None
+        self._figures.follow()
+
+    async def take(self, edit: Edit) -> None:
+        """Take planes that can be cut. Raises PlanError for those that cannot."""
+        bench, self.refused = self._session.bench, None
+        cuts = edit.cuts(bench)
+        trial = await self.attempt(bench, cuts)
+        if trial.refused and edit.near and edit.nearer is not None:
+            with self._session.waiting("looking for the nearest place that can be cut"):
+                nearest: Cuts | None = await self._readiness.ask("nearest", bench, edit.orders(bench))
+            if nearest is not None:
+                cuts, trial = nearest, await self.attempt(bench, nearest)
+        if trial.refused:
+            self.settle()
+            raise self._refusal(trial, edit)
+        self.trial = bench, cuts, trial
+        self._session.do(edit.word, with_cuts(bench, cuts))
+
+    async def take_neck(self, part: int) -> None:
+        """Take the neck near the plane of a part. Raises PlanError where there is none, or it cannot be cut."""
+        bench = self._session.bench
+        check_unlocked(bench, part)
+        assert bench.model is not None
+        reach_mm = REACH_SHARE * hypot(*bench.model.size_mm)
+        with self._session.waiting(f"looking for a neck near the plane of part {part}"):
+            neck: Plane | None = await self._readiness.ask("near_neck", bench, bench.cuts, part, reach_mm)
+        if neck is None:
+            where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
+            raise PlanError(f"there is no neck near the plane of part {part}: {where}")
+        await self.take(Snap.of({"part": part, "normal": neck.normal.tolist(), "offset_mm": neck.offset_mm}))
+
+    def _refusal(self, trial: Trial, edit: Edit) -> PlanError:
+        """Why planes cannot be cut; what is known of that is kept."""
+        why, nearer = f"{edit.instead}part {trial.refused_part} cannot be cut off: {trial.refused}", edit.nearer
+        if edit.near and nearer is not None:
+            why += "; shifted along its normal it cannot be cut either"
+        self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
+        return PlanError(why)
+
+    async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
+        """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
+        trial: Trial = await self._readiness.ask("try_cuts", bench, cuts, most_cuts)
+        return trial
+
+    def _wanted(self, bench: Bench) -> Cuts | None:
+        return bench.cuts if self._held is None else self._held
+
+    def _to_try(self, bench: Bench) -> tuple[object, ...] | None:
+        """The planes and what decides their figures; None where these are known."""
+        cuts, tried = self._wanted(bench), self.trial
+        if cuts is None or bench.model is None:
+            return None
+        known = tried is not None and tried[1] == cuts and tried[0].sought == bench.sought and not tried[2].unchecked
+        return None if known else (cuts, bench.sought)
+
+    async def _try(self, bench: Bench) -> None:
+        """Figures at once; where parts are not looked at yet, one after the other as soon as the hand rests."""
+        cuts = self._wanted(bench)
+        if cuts is None:
+            return
+        self.trial = tried = bench, cuts, await self.attempt(bench, cuts, 0)
+        while tried[2].unchecked:
+            self._session.notify()
+            if not await self._figures.rests(REST_S):
+                return
+            trial = await self.attempt(bench, cuts, 1)
+            if self.trial is not tried:
+                return
+            self.trial = tried = bench, cuts, trial
+
+    async def mark(self, marking: Marking) -> None:
+        """Take other zones; planes that they forbid go, and the reason is told. Raises PlanError for what makes no sense, and
+        where a plane that would go is locked."""
+        before, removed = self._session.bench, list[str]()
+        bench = with_zones(before, await self._session.quick.run("mark", before, marking))
+        while bench.cuts:
+            trial = await self.attempt(bench, bench.cuts)
+            if not trial.refused:
+                break
+            part = bench.cuts[trial.refused_part - 2]
+            if part in bench.locked:
+                raise PlanError(f"the plane of part {trial.refused_part} is locked and would be in the way: {trial.refused}")
+            removed.append(trial.refused)
+            bench = with_cuts(bench, tuple(cut for cut in bench.cuts if cut is not part))
+        self._session.do(marking.step, bench, _removed_in_words(marking.step, removed))
+
+
+def _removed_in_words(word: str, reasons: Sequence[str]) -> str:
+    if not reasons:
+        return ""
+    planes = "a plane was" if len(reasons) == 1 else f"{len(reasons)} planes were"
+    return f"{word}: {planes} taken away: {'; '.join(dict.fromkeys(reasons))}"
