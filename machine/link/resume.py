@@ -22,7 +22,7 @@ from machine.link.pause.park_moves import axis_position, filament_commands, heat
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.progress import ProgramPosition
 from machine.link.protocol.framing import command_of
-from machine.link.status import PrinterStatus
+from machine.link.status import SEVERAL, PrinterStatus
 from machine.planning.stand import Turn
 from mdp.mesh import Floats
 from mdp.pose import Pose
@@ -45,7 +45,6 @@ FAULTY = (
     "the printer does not say where it stands, but reports: {}. Nothing was changed: when that is put right (Klipper's "
     "FIRMWARE_RESTART, another firmware's reset), resume can be tried again"
 )
-SEVERAL = 3  # coordinates that are not 0: that many do not agree by chance
 UNSURE_MM = 0.005
 SAME = 0.02  # mm or deg: M114 reports hundredths
 HOME_KEYS = ("x.home_mm", "y.home_mm", "z.home_mm", "tilt.home_deg", "turn.home_deg")
