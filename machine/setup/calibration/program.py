@@ -1,5 +1,6 @@
-"""Touches: the poses at which a mark is touched, and the G-code that takes the head there and waits until X Y Z are noted; or what a
-person's key makes of the tip's place, and which places are refused.
+"""Touches: the poses at which a mark is touched, and the G-code that takes the head there and waits until X Y Z are noted.
+
+At a port a person's keys take the tip there: what a key makes of its place, and which places are refused.
 """
 
 from collections.abc import Iterator
