@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.gcode.commands import command_named
+from machine.gcode.words import split_command
 from machine.link.pending_commands import Command, PendingCommand
 from machine.link.protocol import events
-from machine.link.protocol.framing import name_of
 from profiles.errors import PrinterError
 
 SILENCE_S = 120.0  # a report is asked for every few seconds: that many questions do not stay unanswered by chance
@@ -128,7 +128,7 @@ class PrinterReports:
         """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""
         if not self.unknown:
             return False
-        name = name_of(command)
+        name = split_command(command.upper())[0]
         return name in self.unknown and (command_named(name).shows or command_named(name).tunes)
 
     @property
