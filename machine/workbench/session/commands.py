@@ -27,6 +27,8 @@ from machine.workbench.work.cutting import SearchWay
 from mdp.ranking.ranker import CLASSIC
 from profiles.errors import PlanError
 
+ProfileKind = Literal["machine", "material", "process"]
+
 
 class Need(StrEnum):
     """What must lie on a bench; parts: cuts, or at least marks; slices: of all that lies there now."""
@@ -91,14 +93,14 @@ class Reset(Command):
     """Take back what is set for a machine, a material or a process; null: for all."""
 
     do: Literal["reset"]
-    kind: str | None = None
+    kind: ProfileKind | None = None
 
 
 class TakeProfile(Command):
     """Another machine, material or process."""
 
     do: Literal["profile"]
-    kind: str
+    kind: ProfileKind
     name: str
 
 
