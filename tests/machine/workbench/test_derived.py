@@ -78,6 +78,8 @@ def test_nothing_is_worked_out_without_a_key_and_nothing_is_held_of_another_benc
         await copies.settle()
         await copies.become(1)
         assert (copies.derived.result, copies.derived.done, copies.begun) == (None, None, [2])
+        await copies.become(3, 1)  # before the task has begun
+        assert (copies.derived.progress, copies.begun) == (None, [2])
 
     run(work)
 
