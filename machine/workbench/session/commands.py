@@ -5,21 +5,9 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Literal, get_args
 
-from machine.workbench.bench.changes import (
-    AddStop,
-    Change,
-    Copies,
-    Lay,
-    Lock,
-    RemoveStop,
-    ResetPart,
-    SetPart,
-    Stand,
-    Take,
-    Turn,
-)
+from machine.workbench.bench.changes import CHANGES, Change
 from machine.workbench.bench.marks import Mark, Marking, Unmark
-from machine.workbench.bench.planes import Add, Edit, Limb, Move, Remove, Reorder
+from machine.workbench.bench.planes import EDITS, Edit, Move
 from machine.workbench.bench.settings import with_name, with_typed, without_settings
 from machine.workbench.bench.values import Asked, Command
 from machine.workbench.session.session import Session
@@ -126,8 +114,9 @@ class Neck(Command):
 
 
 KINDS: tuple[type[Command], ...] = (
-    *(Plain, Demo, Unit, Plate, Set, Reset, TakeProfile, SetPart, ResetPart, Turn, Stand, Lay, Search, Take, Try, Add, Move),
-    *(Remove, Reorder, Limb, Neck, Lock, Mark, Unmark, AddStop, RemoveStop, Copies),
+    *(Plain, Demo, Unit, Plate, Set, Reset, TakeProfile, Search, Try, Neck, Mark, Unmark),
+    *CHANGES,
+    *EDITS,
 )
 COMMANDS = {name: kind for kind in KINDS for name in get_args(kind.model_fields["do"].annotation)}
 NEEDS = {"compare": Need.SLICES} | dict.fromkeys(
