@@ -9,6 +9,7 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from profiles.errors import OutputError, notes, reason
+from profiles.files import keep_newest
 from profiles.folders import state_folder
 
 KEPT = 20  # logs of bugs
@@ -17,7 +18,8 @@ TOLD = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "ty
 
 def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
     """Write the traceback and the versions to a new file of the state folder and return its path."""
-    _thin(state_folder())
+    with suppress(OSError):  # another run may have been quicker
+        keep_newest(state_folder().glob("bug-*.log"), KEPT - 1)
     versions = sorted(f"{d.name} {d.version}" for d in distributions() if d.name in TOLD)
     with tempfile.NamedTemporaryFile(
         "w", prefix="bug-", suffix=".log", dir=state_folder(), delete=False, encoding="utf-8", errors="backslashreplace"
@@ -35,10 +37,3 @@ def bug_in_words(error: BaseException, arguments: Sequence[str]) -> str:
         why = reason(unwritten) if isinstance(unwritten, OSError) else str(unwritten)
         details = f"the details could not be written: {why}"
     return f"a bug in tiltprint: {type(error).__name__}: {error}{notes(error)}; {details}"
-
-
-def _thin(folder: Path) -> None:
-    """Delete the oldest logs of bugs, so that one more makes no more than KEPT."""
-    with suppress(OSError):  # another run may have been quicker
-        for file in sorted(folder.glob("bug-*.log"), key=lambda file: file.stat().st_mtime, reverse=True)[KEPT - 1 :]:
-            file.unlink(missing_ok=True)

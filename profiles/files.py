@@ -1,4 +1,6 @@
-"""Files: written whole or not at all, locked for one process at a time on every system that Python runs on, and damaged zips."""
+"""Files: written whole or not at all, locked for one process at a time on every system that Python runs on, only the newest
+kept; and damaged zips.
+"""
 
 import errno
 import lzma
@@ -7,8 +9,9 @@ import shutil
 import struct
 import sys
 import tempfile
+import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -67,6 +70,33 @@ def write_whole(path: Path, content: bytes, mode: int = PRIVATE) -> None:
     """Write a file whole or not at all. Raises OSError, then what was there before is there still."""
     with whole_file(path, mode) as file:
         file.write(content)
+
+
+def modified_s(path: Path) -> float:
+    """When a file was written last, seconds since 1970."""
+    return path.stat().st_mtime
+
+
+def keep_newest(paths: Iterable[Path], count: int, age: Callable[[Path], float] = modified_s) -> list[Path]:
+    """Delete all but the newest `count` files or folders; those that stay, the newest first. age: rises with time.
+
+    Raises OSError.
+    """
+    newest = sorted(paths, key=age, reverse=True)
+    for path in newest[count:]:
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    return newest[:count]
+
+
+def remove_older(paths: Iterable[Path], seconds: float) -> None:
+    """Delete the files that were written longer ago, as far as possible."""
+    for path in paths:
+        with suppress(OSError):
+            if time.time() - modified_s(path) > seconds:
+                path.unlink()
 
 
 def _umask() -> int:

@@ -22,10 +22,8 @@ from machine.cli.commands.measuring.at_port import PrinterProber, ProbingSession
 from machine.firmware import dialect_of, firmware_of
 from machine.kinematics.table import machine_points
 from machine.setup.calibration.fit import calibrate
-from machine.setup.calibration.piece.fit import correct
-from machine.setup.calibration.piece.pads import Piece
-from machine.setup.calibration.probing.ball import contact_heights, find_in_the_way
-from machine.setup.calibration.probing.measure import AROUND, WIDE, Measuring
+from machine.setup.calibration.piece import Piece, correct
+from machine.setup.calibration.probing import AROUND, WIDE, Measuring, contact_heights, find_in_the_way
 from machine.setup.calibration.program import calibration_pen
 from machine.simulator.contact import ProbedTable
 from mdp.mesh import Floats
@@ -35,7 +33,7 @@ from profiles.machine import Machine
 from profiles.profile import load, shipped
 from tests.machine.setup.calibration.direct import HEIGHT_MM, DirectProber, probed
 from tests.machine.setup.calibration.misaligned import prediction_errors_mm
-from tests.machine.setup.calibration.piece.pieces import off, read_off, seam_mm, standing
+from tests.machine.setup.calibration.pieces import off, read_off, seam_mm, standing
 from tests.machine.setup.calibration.test_directions import worst_predictions_mm
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 

@@ -11,8 +11,7 @@ from functools import reduce
 from pathlib import Path
 
 from machine.cli.commands.profiles.detection import read_file
-from machine.setup.detect.proposal import propose
-from machine.setup.detect.read import read
+from machine.setup.detect.proposal import propose, read
 from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import load

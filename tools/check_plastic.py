@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.dryrun.balance.interfaces import LEAST, MOST, Interface, interfaces
+from machine.dryrun.balance.interfaces import Interface, interfaces
 from machine.dryrun.dryrun import dry_run
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.pictures import write_png
 from profiles.profile import load
-from tools.layer_balance import layer_balances, wall_edges
+from tools.layer_balance import LEAST, MOST, balance_map, layer_balances, wall_edges
 
 HEAD = (
     "file",
@@ -40,7 +40,7 @@ GREY, WHITE, RED, BLUE = (np.array(colour, float) for colour in ((170, 170, 170)
 
 def row(name: str, face: Interface) -> str:
     """One interface's line of the table."""
-    ratio = face.map
+    ratio = balance_map(face)
     told = np.isfinite(ratio)
     over, under = (float(bad.sum()) / max(int(told.sum()), 1) for bad in (ratio[told] > MOST, ratio[told] < LEAST))
     held, inside = wall_edges(face)
@@ -53,7 +53,7 @@ def row(name: str, face: Interface) -> str:
 
 def picture(face: Interface) -> np.ndarray:
     """(h, w, 3) uint8: a pixel a column, Y upward."""
-    ratio = face.map
+    ratio = balance_map(face)
     image = np.full((*ratio.shape, 3), 255.0)
     image[face.section] = GREY
     told = np.isfinite(ratio)

@@ -11,8 +11,8 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.balance.columns import Bars, Lattice, Mask, laid, lattice_over, over_room
-from machine.dryrun.balance.interfaces import LEAST, MOST, Interface
+from machine.dryrun.balance.columns import Bars, Lattice, Mask, laid, lattice_over
+from machine.dryrun.balance.interfaces import Interface
 from machine.dryrun.strokes import Beads
 from machine.gcode.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices
@@ -20,6 +20,9 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 CELL_MM = 0.1
+LEAST, MOST = 0.9, 1.1  # plastic over room of a square millimetre that is as it should be
+WINDOW_MM = 1.0
+LEAST_MM2 = 0.5  # of a window: where less of it has room, as on the tip of a corner, a part of one bead decides
 SOLID = (Kind.OUTER_WALL.value, Kind.INNER_WALL.value, Kind.SKIN.value, Kind.TOP_SKIN.value, Kind.GAP.value)
 OTHERS = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value, Kind.IRONING.value)
 SAMPLE_MM, FAR_MM, AROUND_MM = 0.1, 1.5, 0.05  # of looks along outer walls, and across them
@@ -133,3 +136,30 @@ def _at(mask: Mask, points: Floats, lattice: Lattice) -> Mask:
     i, j = np.moveaxis(((points - lattice.origin) / lattice.cell).astype(np.int64), -1, 0)
     found: Mask = mask[i.clip(0, lattice.shape[0] - 1), j.clip(0, lattice.shape[1] - 1)]
     return found
+
+
+def balance_map(face: Interface) -> Floats:
+    """(nx, ny) plastic over room in the square millimetre around each column of an interface; nan outside."""
+    return over_room(face.plastic, np.where(face.touching & face.section, face.room, np.nan), face.lattice)
+
+
+def window_sums(values: Floats, lattice: Lattice) -> Floats:
+    """For each column the sum over the square of WINDOW_MM around it."""
+    reach = max(1, round(0.5 * (WINDOW_MM / lattice.cell - 1.0)))
+    padded = np.pad(values, ((reach + 1, reach), (reach + 1, reach)))
+    sums = padded.cumsum(axis=0).cumsum(axis=1)
+    wide = 2 * reach + 1
+    whole: Floats = sums[wide:, wide:] - sums[:-wide, wide:] - sums[wide:, :-wide] + sums[:-wide, :-wide]
+    return whole
+
+
+def over_room(plastic: Floats, room: Floats, lattice: Lattice) -> Floats:
+    """Plastic over room in the square millimetre around each column with room, mm3 both; nan where there is too little to tell.
+
+    room: mm3 of each column, nan where it is none.
+    """
+    there = np.isfinite(room)
+    covered = window_sums(there * lattice.column_mm2, lattice)
+    mm3 = window_sums(np.where(there, room, 0.0), lattice)
+    enough = there & (covered >= LEAST_MM2 * WINDOW_MM**2) & (mm3 > 1e-9)
+    return np.where(enough, window_sums(np.where(there, plastic, 0.0), lattice) / np.where(enough, mm3, 1.0), np.nan)

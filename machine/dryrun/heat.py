@@ -6,6 +6,7 @@ from math import inf, pi
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
+from machine.gcode.commands import BED, COMMANDS, NOZZLE
 from machine.gcode.line_text import to_ascii
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, fan_shares, pieces, temperatures
 from machine.gcode.words import quote
@@ -45,11 +46,11 @@ def waits(program: ParsedProgram, times_s: Floats, machine: Machine) -> list[tup
     first = int(np.argmax(program.kind == MoveKind.EXTRUDE)) if len(program.kind) else 0
     waited, target_c, from_c, asked = [], 0.0, 0.0, 0
     for event in program.events:
-        if event.code not in ("M104", "M109"):
+        if event.code not in NOZZLE:
             continue
         if event.value != target_c:
             from_c, target_c, asked = target_c, event.value, event.row
-        if event.code == "M109" and event.row > first:
+        if COMMANDS[event.code].waits == "heat" and event.row > first:
             waited.append((event.line, machine.heating_s(target_c - from_c, float(times_s[asked : event.row].sum()))))
     return waited
 
@@ -57,10 +58,10 @@ def waits(program: ParsedProgram, times_s: Floats, machine: Machine) -> list[tup
 def _cold(program: ParsedProgram) -> Iterable[Finding]:
     """Filament pushed while the nozzle has not been waited for, or its heater is off."""
     hot = np.zeros(len(program.line), dtype=np.bool_)
-    heating = [e for e in program.events if e.code in ("M104", "M109")]
+    heating = [e for e in program.events if e.code in NOZZLE]
     warm = False
     for event in heating:
-        warm = event.value >= MELTING_C and (warm or event.code == "M109")
+        warm = event.value >= MELTING_C and (warm or COMMANDS[event.code].waits == "heat")
         hot[event.row :] = warm
     rows = np.flatnonzero((program.e_mm > 1e-9) & ~hot)
     if not len(rows):
@@ -76,7 +77,7 @@ def _cold(program: ParsedProgram) -> Iterable[Finding]:
 def _left_on(program: ParsedProgram) -> Iterator[Finding]:
     extruding = np.flatnonzero(program.e_mm > 1e-9)
     last = int(extruding[-1]) if len(extruding) else -1  # a macro in the midst of the print ends nothing
-    for codes, name, off in ((("M104", "M109"), "nozzle", "M104 S0"), (("M140", "M190"), "bed", "M140 S0")):
+    for codes, name, off in ((NOZZLE, "nozzle", "M104 S0"), (BED, "bed", "M140 S0")):
         events = [e for e in program.events if e.code in codes]
         if events and events[-1].value > 0:
             severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
@@ -87,7 +88,7 @@ def _left_on(program: ParsedProgram) -> Iterator[Finding]:
 def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     """In every part the first bead at another temperature than the material's, or far from the rest of the file's."""
     material, machine = profile.material, profile.machine
-    hot_c = [event.value for event in program.events if event.code in ("M104", "M109") and event.value >= MELTING_C]
+    hot_c = [event.value for event in program.events if event.code in NOZZLE and event.value >= MELTING_C]
     if own:
         own_c = (material.first_layer_nozzle_c, material.nozzle_c)
         hotter = max(profile.of_part(part).process.interface_temperature_add_c for part in (0, *program.parts))
@@ -96,7 +97,7 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
         least, most = max(hot_c, default=0.0) - FAR_C, min(min(hot_c, default=inf) + FAR_C, machine.nozzle_limit_c)
     if all(least <= target_c <= most for target_c in hot_c):
         return []
-    wanted = temperatures(program, "M104", "M109")
+    wanted = temperatures(program, *NOZZLE)
     beads = (program.kind == MoveKind.EXTRUDE) & (wanted >= MELTING_C)
     if not beads.any():
         return []
@@ -113,10 +114,10 @@ def _bed_off(program: ParsedProgram) -> list[Finding]:
     beads = np.flatnonzero(
         (program.kind == MoveKind.EXTRUDE) & (program.remarks.part + program.remarks.layer > 0)[program.remark]
     )
-    switched_off = (event.code in ("M140", "M190") and event.value <= 0.0 and event.row <= beads[-1] for event in program.events)
+    switched_off = (event.code in BED and event.value <= 0.0 and event.row <= beads[-1] for event in program.events)
     if not len(beads) or not any(switched_off):
         return []
-    bed = temperatures(program, "M140", "M190")
+    bed = temperatures(program, *BED)
     if bed[beads[0]] <= 0.0:
         return []
     off = beads[bed[beads] <= 0.0]

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
-from machine.dryrun.strokes import Beads
+from machine.dryrun.strokes import SUPPORT, Beads
 from machine.gcode.reader.parsed import Indices32, ParsedProgram, Remarks, pieces
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from slicer.paths import ON_PLATE_MM, Kind
 
-SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 LOOSE = (Kind.OVERHANG.value, Kind.BRIDGE.value, Kind.IRONING.value, Kind.PURGE.value, Kind.SKIRT.value, *SUPPORT)
 SLACK_MM, SLACK_SHARE = 0.02, 0.1  # of a layer's height
 STAND_OFF_MM = 0.5  # at most between a part and the support below it

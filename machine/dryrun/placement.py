@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
-from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, Beads, highest_of
+from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, SUPPORT, Beads, highest_of
 from machine.gcode.reader.parsed import ParsedProgram, pieces
 from machine.planning.limits import over_edge_mm
 from mdp.mesh import Floats
@@ -15,7 +15,6 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 HANGING = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # the slicer itself says that these hang
-SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 IRONING = Kind.IRONING.value  # goes over what has been laid
 PURGE = Kind.PURGE.value  # what a start block pushes out beside the plate is meant to fall
 ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air

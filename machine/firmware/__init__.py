@@ -5,13 +5,12 @@ the firmware of an answer to M115. `firmware` has what a byte and a numbered lin
 """
 
 from machine.firmware.dialect import Dialect
-from machine.firmware.firmware import Firmware
+from machine.firmware.firmware import Firmware, SimulationRules
 from machine.firmware.grblhal import GRBLHAL
 from machine.firmware.klipper import KLIPPER
 from machine.firmware.linuxcnc import LINUXCNC
 from machine.firmware.marlin import MARLIN, REPETIER, SIMULATED, SMOOTHIEWARE
 from machine.firmware.reprapfirmware import REPRAPFIRMWARE
-from machine.firmware.simulation import SimulationRules
 from profiles.machine import Machine
 
 __all__ = ["FIRMWARES", "Dialect", "Firmware", "dialect_of", "dialects", "firmware_of", "identify", "simulation_of"]

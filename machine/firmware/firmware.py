@@ -1,14 +1,20 @@
-"""Firmware: everything the program knows about one, so that a new one is a new file; the serial line: what a byte and a numbered
-line cost on it, its rates, how a firmware behaves at its other end, and how it is told to seek contact along Z.
+"""Firmware: everything the program knows about one, so that a new one is a new file.
+
+Beside its dialects: the serial line, what a byte and a numbered line cost on it, its rates, how the firmware behaves at its other
+end; how it is told to seek contact along Z; and how the simulated printer takes lines and words its answers in its name.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 from machine.firmware.dialect import Dialect
-from machine.firmware.simulation import SimulationRules
 from profiles.errors import PortError
 
+# Coordinates and steps by letter -> the answer to M114.
+PositionReport = Callable[[Mapping[str, float], Mapping[str, int]], str]
+# Nozzle, its target, bed, its target, all deg C -> what M105 answers.
+TemperatureReport = Callable[[float, float, float, float], str]
 BYTE_BITS = 10  # start, eight, stop
 BAUDS = (115200, 250000, 230400, 500000, 1000000, 57600)  # what firmwares are built with, the usual ones first
 SLOWEST_BAUD, FASTEST_BAUD = 1200, 4_000_000  # that an adapter is known to take
@@ -18,6 +24,106 @@ LAST_NUMBER = 99_900
 NUMBER_DIGITS = len(str(LAST_NUMBER))
 FRAME_BYTES = len("N *123\n")  # what the sender adds to a command at most, its number's digits aside
 FRAME_CHARACTERS = FRAME_BYTES - len("\n") + NUMBER_DIGITS  # of those that a firmware keeps
+
+
+@dataclass(frozen=True)
+class SimulatedSettings:
+    """What a printer stands at. letters: of X Y Z and what turns the table, the filament last; limits: mm or deg, and steps a mm
+    or degree: of all but the filament; speeds, accelerations: of all, per s and s2; printing, travelling: of M204, mm/s2; jerk:
+    mm/s."""
+
+    letters: str
+    limits: Sequence[tuple[float, float]]
+    steps: Sequence[float]
+    speeds: Sequence[float]
+    accelerations: Sequence[float]
+    printing: float
+    travelling: float
+    jerk: float
+    soft_limits: bool
+    nozzle_limit_c: float
+    bed_limit_c: float
+
+
+# A command and the settings -> the lines that it is answered with before its ok.
+SettingsReport = Callable[[str, SimulatedSettings], list[str]]
+
+
+def no_settings_report(command: str, settings: SimulatedSettings) -> list[str]:
+    """The simulation of a firmware that tells nothing by commands."""
+    return []
+
+
+def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
+    """`X:1.00 Y:2.00 Z:3.00 E:0.00 Count X:80 Y:160 Z:1200`."""
+    named = " ".join(f"{letter}:{value:.2f}" for letter, value in coordinates.items())
+    return f"{named} Count " + " ".join(f"{letter}:{count}" for letter, count in steps.items())
+
+
+def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, bed_target_c: float) -> str:
+    """`T:19.38 /0.00 B:20.00 /0.00 @:0 B@:0`."""
+    return (
+        f"T:{nozzle_c:.2f} /{nozzle_target_c:.2f} B:{bed_c:.2f} /{bed_target_c:.2f} "
+        f"@:{127 * (nozzle_target_c > 0)} B@:{127 * (bed_target_c > 0)}"
+    )
+
+
+@dataclass(frozen=True)
+class Idle:
+    """What a firmware does by itself when nothing has moved for after_s: the motors of its first `axes` go off, which M84 S may
+    forbid. shuts_down: heaters, too, and nothing moves any more before it is homed; a dwell is a move, and M84 knows no S.
+    """
+
+    after_s: float
+    axes: int
+    shuts_down: bool = False
+
+
+@dataclass(frozen=True)
+class SimulationRules:
+    """What a host sees of the firmware; {} is the command or the coordinates.
+
+    identity: the FIRMWARE_NAME line of M115, {axes}: how many; identity_in_ok: it stands behind the ok. banner: said after a
+    restart. numbers: "resend": lines are checked and asked for again; "drop": a bad checksum is dropped in silence, any number
+    is taken; "ignore": number and checksum are cut off unread. queue_lines: kept before the one at work is done; more wait.
+    blocks: planned moves. min_segment_s: shorter moves are stretched while few wait. urgent: where an M112 is seen before its
+    turn ("bytes": an emergency parser, "lines": when its line has been read). unknown, cold, unhomed, out_of_range: what is
+    said of such commands; out_of_range "": the target is clamped without a word. cold_moves: a cold move is made without
+    filament. heater_fault: its own reason when a heater fails. kill: said when it stops for ever; after_kill: said to every line
+    from then on, {}: why it has stopped; answers_killed: commands that are answered otherwise. has_build_options: it is built
+    with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
+    behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
+    it believes itself at its home positions, and keeps only axes that were homed inside the limits.
+    settings: what it tells of its settings. answers_blank: an empty line is answered with ok. idle: None: its motors stay on.
+    """
+
+    identity: str
+    banner: tuple[str, ...]
+    numbers: Literal["resend", "drop", "ignore"]
+    queue_lines: int
+    urgent: Literal["bytes", "lines", ""]
+    unknown: str
+    cold: tuple[str, ...]
+    unhomed: str
+    kill: tuple[str, ...]
+    blocks: int = 15
+    min_segment_s: float = 0.0
+    cold_moves: bool = True
+    out_of_range: str = ""
+    heater_fault: str = ""
+    after_kill: tuple[str, ...] = ()
+    answers_killed: Mapping[str, str] = field(default_factory=dict)
+    has_build_options: bool = False
+    identity_in_ok: bool = False
+    reports_position: bool = False
+    position: PositionReport = position_report
+    temperatures: TemperatureReport = temperature_report
+    settings: SettingsReport = no_settings_report
+    while_heating: str = " W:?"
+    lacks: frozenset[str] = frozenset()
+    starts_at_home: bool = False
+    answers_blank: bool = False
+    idle: Idle | None = None
 
 
 def check_baud(baud: int) -> None:

@@ -11,8 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from machine.firmware.dialect import HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command, Dialect
-from machine.firmware.firmware import Firmware, LineRules, ProbingRules
-from machine.firmware.simulation import Idle, SimulationRules
+from machine.firmware.firmware import Firmware, Idle, LineRules, ProbingRules, SimulationRules
 from profiles.axes import RotaryAxis
 
 _STANDS = (

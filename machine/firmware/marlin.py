@@ -8,8 +8,7 @@ Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
 from collections.abc import Iterable, Mapping
 
 from machine.firmware.dialect import HEATING_S, PROBING_S, Command, Dialect
-from machine.firmware.firmware import Firmware, LineRules, ProbingRules
-from machine.firmware.simulation import Idle, SimulatedSettings, SimulationRules
+from machine.firmware.firmware import Firmware, Idle, LineRules, ProbingRules, SimulatedSettings, SimulationRules
 
 # Meanings from gcode/gcode.h; what heats: gcode/bedlevel/G26.cpp, gcode/probe/G76_M871.cpp, gcode/temp/M306.cpp.
 # fmt: off

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from machine.firmware.dialect import PERSON_S, Command, Dialect
-from machine.firmware.firmware import Firmware, LineRules, ProbingRules
-from machine.firmware.simulation import SimulatedSettings, SimulationRules
+from machine.firmware.firmware import Firmware, LineRules, ProbingRules, SimulatedSettings, SimulationRules
 
 # docs.duet3d.com/User_manual/Reference/Gcodes; GCodes/GCodes2.cpp, 3.6: G10 and M568 share SetOrReportOffsets, M144 S1 switches
 # the bed to its active temperature. A code that the firmware does not know runs a macro of that name where there is one.

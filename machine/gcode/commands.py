@@ -163,6 +163,9 @@ EVERY: Mapping[str, Command] = {  # where firmwares differ the shared row counts
     for name, command in table.items()
 }
 PATHS = frozenset(name for name, command in EVERY.items() if command.moves == "path")
+# What sets a target without waiting, then what waits for it: a reader of G-code tells every firmware's heating by these names.
+NOZZLE, BED = (tuple(name for name, row in COMMANDS.items() if row.heats == heater) for heater in ("nozzle", "bed"))
+URGENT = frozenset(name for name, row in COMMANDS.items() if row.refused == SENDERS)  # heeded by a firmware before their turn
 
 
 def commands_of(dialect: Dialect) -> Mapping[str, Command]:

@@ -23,7 +23,7 @@ from profiles.machine import Machine
 INCH_MM = 25.4
 E_AXIS = 5
 LINEAR = (0, 1, 2, E_AXIS)  # their words count in inches after G20, degrees never do
-COMMANDS = ("G20", "G21", "G90", "G91", "G93", "G94", "M82", "M83")
+MODES = ("G20", "G21", "G90", "G91", "G93", "G94", "M82", "M83")
 Coordinates = tuple[float | None, ...]  # X Y Z tilt turn E
 
 
@@ -67,7 +67,7 @@ class Modes:
     steps: list[bool] = field(default_factory=lambda: [False] * 6)  # whether a word is a step
 
     def set(self, name: str) -> None:
-        """One of COMMANDS."""
+        """One of MODES."""
         if name in ("G20", "G21"):
             self.inches = name == "G20"
             for axis in LINEAR:
@@ -168,7 +168,7 @@ class ModalState:
         if name == "MANUAL_STEPPER":
             return self._turn(read_values(rest))
         words, heats = read_words(rest), EVERY[name].heats if name in EVERY else ""
-        if name in COMMANDS:
+        if name in MODES:
             self.modes.set(name)
         elif name == "G92":
             for axis, coordinate in self.modes.named(words):

@@ -7,7 +7,7 @@ from math import inf
 from threading import Event as Flag
 
 from machine.gcode.modes import ModalState, axes_of
-from machine.gcode.words import PAUSE_REMARK
+from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
 from machine.link.journal import FINISHED, LEFT, PAUSED, Checkpoint, Journal
 from machine.link.line_history import Barriers, LineHistory, PlannerReports, SentLine, shifts
@@ -18,7 +18,7 @@ from machine.link.pending_commands import Control, PendingCommands
 from machine.link.print_state import PrintState, PrintStatus
 from machine.link.progress import ProgramPosition, StreamPlan
 from machine.link.protocol.events import Event, Ok, Position
-from machine.link.protocol.framing import command_of, name_of
+from machine.link.protocol.framing import command_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
 from machine.link.status import position_differences
@@ -161,7 +161,7 @@ class Feed:
 
     def _prints(self, command: str) -> bool:
         """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
-        return name_of(command) == "MANUAL_STEPPER" or self.modal.names_filament(command)
+        return split_command(command.upper())[0] == "MANUAL_STEPPER" or self.modal.names_filament(command)
 
     def _new_history(self, before: int = 0) -> LineHistory:
         connection = self.exchange.connection

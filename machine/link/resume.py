@@ -8,7 +8,7 @@ A restart shows in what it changes: the greeting of the firmware, line numbers t
 believes in before anything is homed: 0 0 0, or Marlin's home positions (profiles.machine.Machine.home).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 
@@ -18,12 +18,11 @@ from machine.gcode.modes import E_AXIS, ModalState, axes_of
 from machine.kinematics.collision import Printed
 from machine.link.journal import EVERY_LINES, LEFT, PAUSED, Checkpoint
 from machine.link.line_history import shifts
-from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands
+from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands, homed_return_moves, return_moves
 from machine.link.pause.printed_bounds import PrintedBounds
-from machine.link.pause.return_path import homed_return_moves, return_moves
 from machine.link.progress import ProgramPosition
 from machine.link.protocol.framing import command_of
-from machine.link.status import PrinterStatus
+from machine.link.status import SEVERAL, PrinterStatus
 from machine.planning.stand import Turn
 from mdp.mesh import Floats
 from mdp.pose import Pose
@@ -46,7 +45,6 @@ FAULTY = (
     "the printer does not say where it stands, but reports: {}. Nothing was changed: when that is put right (Klipper's "
     "FIRMWARE_RESTART, another firmware's reset), resume can be tried again"
 )
-SEVERAL = 3  # coordinates that are not 0: that many do not agree by chance
 UNSURE_MM = 0.005
 SAME = 0.02  # mm or deg: M114 reports hundredths
 HOME_KEYS = ("x.home_mm", "y.home_mm", "z.home_mm", "tilt.home_deg", "turn.home_deg")
@@ -62,18 +60,10 @@ class ResumePoint:
 
 
 @dataclass(frozen=True)
-class ProgramState:
-    """The firmware's state after a command of the program."""
-
-    line: int
-    modal: ModalState
-
-
-@dataclass(frozen=True)
 class InterruptedPrint:
-    """What a journal and its program say. line: the first one not surely executed; modal: the state before it; ahead: the states
-    after the commands that may have been done since; stroked: whether anything was printed before. stood_mm: the height at which
-    the tip stands, as a person has seen it.
+    """What a journal and its program say. line: the first one not surely executed; modal: the state before it; ahead: line -> the
+    state after its command, which may have been done since; stroked: whether anything was printed before. stood_mm: the height at
+    which the tip stands, as a person has seen it.
     """
 
     line: int
@@ -82,7 +72,7 @@ class InterruptedPrint:
     position: ProgramPosition
     printed: Printed
     stroked: bool
-    ahead: tuple[ProgramState, ...]
+    ahead: Mapping[int, ModalState]
     checkpoint: Checkpoint
     stood_mm: float | None = None
 
@@ -101,7 +91,7 @@ def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile
     modal, position, bounds = ModalState(axes_of(profile.machine)), ProgramPosition(), PrintedBounds(profile.machine)
     first, stroked = checkpoint.executed + 1, False
     before: tuple[ModalState, ProgramPosition] | None = None
-    ahead: list[ProgramState] = []
+    ahead: dict[int, ModalState] = {}
     for number, text in enumerate(lines, 1):
         command = command_of(text, number, limit)
         if before is None and (not command or number < first):
@@ -120,11 +110,11 @@ def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile
         if before is None:
             stroked = stroked or extruded
         else:
-            ahead.append(ProgramState(number, deepcopy(modal)))
+            ahead[number] = deepcopy(modal)
     if before is None:
         raise JournalError("all of the program has been executed: there is nothing left to resume")
-    last = ahead[-1].line if ahead else first
-    return InterruptedPrint(first, last, before[0], before[1], bounds.corners(modal.follows), stroked, tuple(ahead), checkpoint)
+    last = max(ahead, default=first)
+    return InterruptedPrint(first, last, before[0], before[1], bounds.corners(modal.follows), stroked, ahead, checkpoint)
 
 
 def has_not_restarted(point: InterruptedPrint, status: PrinterStatus) -> bool | None:
@@ -146,9 +136,10 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     begun = stands_as_begun(status, profile.machine)
     standing = _match_position(point, status) if alive or not (begun or status.greeted) else None
     if standing is not None:
-        before = (*heat_commands(standing.modal, profile), *standing.modal.lines())
+        line, modal = standing
+        before = (*heat_commands(modal, profile), *modal.lines())
         done = "the printer stands where this line begins: nothing is repeated"
-        return ResumePlan(ResumePoint(standing.line + 1, before), done)
+        return ResumePlan(ResumePoint(line + 1, before), done)
     if not point.stroked:
         return ResumePlan(ResumePoint(1, ()), f"{TOO_LITTLE}, clear the table of the little there may be")
     _check(point, profile)
@@ -190,17 +181,17 @@ def _check(point: InterruptedPrint, profile: Profile) -> None:
         )
 
 
-def _match_position(point: InterruptedPrint, status: PrinterStatus) -> ProgramState | None:
-    """The first state whose position the printer reports: after the line before the first one, or after one of those ahead."""
+def _match_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[int, ModalState] | None:
+    """The first line whose position the printer reports, with the state after it: of the one before the first, or ahead."""
     if status.position is None:
         return None
     reported = dict(status.position.axes)
-    for reached in (ProgramState(point.line - 1, point.modal), *point.ahead):
-        pairs = [(reported[letter], value) for letter, value in zip(reached.modal.axes.letters, reached.modal.at, strict=True)
+    for line, modal in ((point.line - 1, point.modal), *point.ahead.items()):
+        pairs = [(reported[letter], value) for letter, value in zip(modal.axes.letters, modal.at, strict=True)
                  if value is not None and letter in reported]  # fmt: skip
-        known = all(value is not None for value in reached.modal.at[:3])
+        known = all(value is not None for value in modal.at[:3])
         if known and all(abs(a - b) <= SAME for a, b in pairs) and sum(abs(b) > SAME for _, b in pairs) >= SEVERAL:
-            return reached
+            return line, modal
     return None
 
 
@@ -275,7 +266,7 @@ def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple
         return np.array(known[:3]), Pose(*known[3:])
     if state in MOVING and not profile.machine.gcode.resume:
         raise JournalError(f"the tip was on its way between print and parking place, so nobody knows where it stands; {HOME_IT}")
-    states = [point.modal, *(reached.modal for reached in point.ahead)]
+    states = [point.modal, *point.ahead.values()]
     for axis in (3, 4):
         if len({modal.at[axis] for modal in states}) > 1 and not profile.machine.gcode.resume:
             letter = point.modal.axes.letters[axis]
@@ -291,7 +282,7 @@ def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
     """
     if point.stood_mm is not None:
         return (point.stood_mm,)
-    heights = sorted(z for modal in (point.modal, *(state.modal for state in point.ahead)) if (z := modal.at[2]) is not None)
+    heights = sorted(z for modal in (point.modal, *point.ahead.values()) if (z := modal.at[2]) is not None)
     return tuple(z for k, z in enumerate(heights) if k == 0 or z - heights[k - 1] > UNSURE_MM)
 
 

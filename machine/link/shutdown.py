@@ -7,6 +7,7 @@ from enum import Enum
 from types import TracebackType
 from typing import Self
 
+from machine.firmware.dialect import HOMING_S
 from machine.link.exchange import Exchange
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.events import (
@@ -34,7 +35,6 @@ AGAIN_S = 2.0  # noise may eat an order; without the proof they are given again 
 OLD_REPORTS_S = 1.0  # a report from before the orders proves nothing; a printer that never falls silent is not waited for
 SETTLE_S = 20.0  # lines that the printer had already taken are run first
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
-HOMING_S = 600.0  # five axes at the speed of the slowest; a dwell is not ended by anything either
 LIFT_S = 10.0  # a lift of some millimetres at any Z axis' speed
 STOP_AGAIN_S, STOP_MOST_S = 0.5, 2.0
 PARTIAL_BYTES = 4096

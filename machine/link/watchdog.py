@@ -9,24 +9,11 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.gcode.commands import command_named
+from machine.gcode.words import split_command
 from machine.link.pending_commands import Command, PendingCommand
 from machine.link.protocol import events
-from machine.link.protocol.framing import name_of
 from profiles.errors import PrinterError
 
-
-@dataclass(frozen=True)
-class Bounds:
-    """How far (K) a heater may stay from its target for how long (s), and what counts as getting nearer (K) meanwhile."""
-
-    name: str
-    off_c: float
-    off_s: float
-    nearer_c: float = 2.0
-
-
-NOZZLE = Bounds("nozzle", 20.0, 60.0)
-BED = Bounds("bed", 15.0, 180.0, 1.0)
 SILENCE_S = 120.0  # a report is asked for every few seconds: that many questions do not stay unanswered by chance
 OVER_LIMIT_C = 15.0
 OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
@@ -39,9 +26,12 @@ SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prom
 
 @dataclass
 class HeaterWatch:
-    """One heater's way to its target."""
+    """One heater's way to its target: how far (K) it may stay from it for how long (s), and what counts as getting nearer (K)."""
 
-    bounds: Bounds
+    name: str
+    off_c: float
+    off_s: float
+    nearer_c: float = 2.0
     target_c: float | None = None
     nearest_c: float = inf  # least distance from the target since it was set or reached
     nearest_s: float = 0.0  # when that was
@@ -52,14 +42,14 @@ class HeaterWatch:
         if now_c is None or not target_c:
             self.target_c = None
             return
-        off, bounds = abs(now_c - target_c), self.bounds
-        if target_c != self.target_c or off <= bounds.off_c:
-            self.target_c, self.nearest_c, self.nearest_s = target_c, max(off, bounds.off_c), now_s
-        elif off <= self.nearest_c - bounds.nearer_c:
+        off = abs(now_c - target_c)
+        if target_c != self.target_c or off <= self.off_c:
+            self.target_c, self.nearest_c, self.nearest_s = target_c, max(off, self.off_c), now_s
+        elif off <= self.nearest_c - self.nearer_c:
             self.nearest_c, self.nearest_s = off, now_s
-        elif now_s - self.nearest_s > bounds.off_s:
+        elif now_s - self.nearest_s > self.off_s:
             raise PrinterError(
-                f"the {bounds.name} has been at {now_c:.0f} deg C for {now_s - self.nearest_s:.0f} s although {target_c:.0f} is "
+                f"the {self.name} has been at {now_c:.0f} deg C for {now_s - self.nearest_s:.0f} s although {target_c:.0f} is "
                 "wanted: its heater or its sensor has failed"
             )
 
@@ -70,7 +60,9 @@ class Watchdog:
 
     most_c: tuple[float, float] = (inf, inf)
     reported_s: float | None = None
-    _heaters: tuple[HeaterWatch, HeaterWatch] = field(default_factory=lambda: (HeaterWatch(NOZZLE), HeaterWatch(BED)))
+    _heaters: tuple[HeaterWatch, ...] = field(
+        default_factory=lambda: (HeaterWatch("nozzle", 20.0, 60.0), HeaterWatch("bed", 15.0, 180.0, 1.0))
+    )
 
     def check(self, report: events.Temperature, now_s: float) -> None:
         """Judge a report. Raises PrinterError."""
@@ -79,7 +71,7 @@ class Watchdog:
         for heater, most_c, (now_c, target_c) in zip(self._heaters, self.most_c, pairs, strict=True):
             heater.over = heater.over + 1 if now_c is not None and now_c > most_c + OVER_LIMIT_C else 0
             if heater.over >= OVER_REPORTS:
-                raise PrinterError(f"the {heater.bounds.name} is at {now_c:.0f} deg C: this machine allows at most {most_c:g}")
+                raise PrinterError(f"the {heater.name} is at {now_c:.0f} deg C: this machine allows at most {most_c:g}")
             if not heater.over:
                 heater.check(now_c, target_c, now_s)
 
@@ -136,7 +128,7 @@ class PrinterReports:
         """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""
         if not self.unknown:
             return False
-        name = name_of(command)
+        name = split_command(command.upper())[0]
         return name in self.unknown and (command_named(name).shows or command_named(name).tunes)
 
     @property

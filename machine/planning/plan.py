@@ -2,7 +2,7 @@
 the plate that fills the nozzle and wipes it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from math import sqrt
@@ -52,7 +52,6 @@ def plan(
     for piece in pieces:
         part = parts[piece.index]
         shift = part_shift(machine, part.pose, part.base.offset_mm)
-        points = [layer.points_mm for layer in piece.layers]
         begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported)
         first = next(layer for layer in piece.layers if len(layer))
         target = np.array([*first.points[0], first.z_mm]) + shift
@@ -62,16 +61,8 @@ def plan(
         tip.mark(begin)
         _go_down(tip, target, across_mm)
         tip.limb = (part.index, standing_beads(part, done, machine)) if is_limb else None
-        for number, (layer, at) in enumerate(zip(piece.layers, points, strict=True), start=1):
-            if (part.index, number) in stopped:
-                _stop(tip, Pause(part.index, number, stopped[part.index, number]))
-            if len(layer):
-                z_mm = layer.z_mm + part.lifted_mm
-                tip.mark(BeginLayer(part.index, number, z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c))
-                print_layer(tip, layer, at + shift, shift, on_plate=part.on_platform and number == 1)
-        widest_mm = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
-        corners = hull(np.concatenate(points), 0.0).points_mm + shift
-        printed.append(hull(workpiece_points(machine, part.pose, corners), 0.5 * widest_mm))
+        _print_layers(tip, part, piece, shift, stopped)
+        printed.append(_outline(part, piece, shift, machine))
         tip.printed = join_hulls(printed)
         done.append((part, piece))
     if pieces:
@@ -79,6 +70,25 @@ def plan(
     program = MachineProgram.of(decomposition.name, tip.moves, tip.marks)
     limits.check(program, machine)
     return program
+
+
+def _print_layers(tip: Tip, part: Part, piece: SlicedPart, shift: Floats, stopped: Mapping[tuple[int, int], bool]) -> None:
+    """The layers of a part and the stops before them. shift: (3,) from the part's frame to the machine's; stopped: (part, layer)
+    before which the print waits -> whether for another filament."""
+    for number, layer in enumerate(piece.layers, start=1):
+        if (part.index, number) in stopped:
+            _stop(tip, Pause(part.index, number, stopped[part.index, number]))
+        if len(layer):
+            z_mm = layer.z_mm + part.lifted_mm
+            tip.mark(BeginLayer(part.index, number, z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c))
+            print_layer(tip, layer, layer.points_mm + shift, shift, on_plate=part.on_platform and number == 1)
+
+
+def _outline(part: Part, piece: SlicedPart, shift: Floats, machine: Machine) -> Printed:
+    """The hull of a printed part in the workpiece frame, half its widest bead around it."""
+    widest_mm = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
+    corners = hull(piece.points_mm, 0.0).points_mm + shift
+    return hull(workpiece_points(machine, part.pose, corners), 0.5 * widest_mm)
 
 
 def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> float:

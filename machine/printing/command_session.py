@@ -3,10 +3,11 @@
 from types import TracebackType
 from typing import Self
 
+from machine.gcode.words import split_command
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.protocol.events import Event, Ok, Position, Temperature, position_in, unknown_command
-from machine.link.protocol.framing import LINE_LIMIT, command_of, name_of
+from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.shutdown import HeaterGuard, Heaters, shows_off
 from profiles.errors import FirmwareError, PortError, PrinterError
@@ -79,7 +80,7 @@ class CommandSession:
     @property
     def restarts(self) -> bool:
         """Whether the newest command restarts the printer."""
-        return bool(self._command) and name_of(self._command) in RESTARTS and self._command not in self.unknown
+        return bool(self._command) and split_command(self._command.upper())[0] in RESTARTS and self._command not in self.unknown
 
     def listen(self) -> None:
         """One short turn without sending anything."""

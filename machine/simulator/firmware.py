@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from math import inf
 
 from machine.firmware import dialect_of
-from machine.gcode.commands import PATHS
+from machine.gcode.commands import PATHS, URGENT
 from machine.gcode.words import read_words, split_command
 from machine.simulator.board import Board, BuildOptions, Order, Work
 from machine.simulator.commands import command_of, move
@@ -21,7 +21,6 @@ from profiles.machine import Machine
 BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
 UNREAD_LINES = 20
 CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
-EARLY = ("M108", "M112", "M410")
 IDLE_S = 1.0  # Marlin's NO_TIMEOUTS: `wait` is said so often
 MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_IDLE
 
@@ -244,7 +243,7 @@ class SimulatedFirmware:
             if taken is not None:
                 label, text = taken
                 queue.append((label, text, *split_command(text)))
-                if self._emergency is None and self._rules.urgent == "bytes" and text in EARLY:
+                if self._emergency is None and self._rules.urgent == "bytes" and text in URGENT:
                     self._act_at_once(text)
 
     def _run(self) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import ceil, hypot, inf, pi, sqrt
 
 from machine.firmware import simulation_of
-from machine.firmware.simulation import SimulatedSettings
+from machine.firmware.firmware import SimulatedSettings
 from machine.gcode.arcs import arc_centre, chords, sweep_rad
 from machine.gcode.modes import Modes, axes_of
 from machine.kinematics.table import origin_mm

@@ -3,7 +3,7 @@
 import re
 from collections import deque
 
-from machine.firmware.simulation import SimulationRules
+from machine.firmware.firmware import SimulationRules
 from machine.link.protocol.framing import checksum
 
 HALF_BYTES = 1024

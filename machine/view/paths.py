@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.strokes import beads_of
+from machine.gcode.commands import BED, NOZZLE
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, fan_shares, temperatures
 from machine.view.encoding import Column
 from machine.view.layers import Layers
@@ -71,8 +72,8 @@ def columns(run: DryRun, profile: Profile, layers: Layers, ends_s: Floats, shown
         "width": Column(width, "u16", 0.001),
         "height": Column(height, "u16", 0.001),
         "fan": Column(fan_shares(program, profile.machine), "u8", 1 / 255),
-        "nozzle": Column(temperatures(program, "M104", "M109"), "u16", 0.1),
-        "bed": Column(temperatures(program, "M140", "M190"), "u16", 0.1),
+        "nozzle": Column(temperatures(program, *NOZZLE), "u16", 0.1),
+        "bed": Column(temperatures(program, *BED), "u16", 0.1),
     }
     rows = {name: Column(column.values[shown], column.type, column.scale, column.delta) for name, column in table.items()}
     start = np.clip(program.start[shown[jumps]], -REACH, REACH)

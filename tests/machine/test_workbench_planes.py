@@ -106,9 +106,9 @@ def test_a_mark_ends_the_search_that_knew_nothing_of_it(bench: Running, folder: 
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"kind": "seam"}, "kind is 'seam': keep, no_seam, no_support, support are allowed"),
+        ({"kind": "seam"}, 'kind is "seam": it must be one of "keep", "no_seam", "no_support", "support"'),
         ({"kind": "keep", "point_mm": [0, 0, 52], "angle_deg": 5}, "12 mm from the model: up to 1 is allowed"),
-        ({"kind": "keep", "point_mm": [0, 0, 40], "angle_deg": 190}, "angle_deg is 190: 0 to 180 is allowed"),
+        ({"kind": "keep", "point_mm": [0, 0, 40], "angle_deg": 190}, "angle_deg is 190: it must be a number from 0 to 180"),
         ({"kind": "keep", "min_mm": [0, 0, 0], "max_mm": [1, 0, 1]}, "each number of min_mm must be less"),
         ({"kind": "keep", "number": 1, "min_mm": [0, 0, 0], "max_mm": [1, 1, 1]}, "number is 1: there is none yet"),
     ],

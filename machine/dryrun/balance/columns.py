@@ -12,8 +12,6 @@ from mdp.mesh import Floats
 NOTHING = -1e9
 ROUNDING_MM = 1e-6
 MOST_COLUMNS = 4_000_000
-WINDOW_MM = 1.0
-LEAST_MM2 = 0.5  # of a window: where less of it has room, as on the tip of a corner, a part of one bead decides
 
 Mask = NDArray[np.bool_]
 
@@ -41,7 +39,7 @@ class Bars(NamedTuple):
     height: Floats
 
 
-def lattice_over(points: Floats, cell_mm: float, margin_mm: float = 1.5 * WINDOW_MM) -> Lattice:
+def lattice_over(points: Floats, cell_mm: float, margin_mm: float = 1.5) -> Lattice:
     """A lattice over (n, 2) points and what is near them; its columns grow where there would be too many."""
     low, high = points.min(axis=0) - margin_mm, points.max(axis=0) + margin_mm
     cell = max(cell_mm, float(np.sqrt((high - low).prod() / MOST_COLUMNS)))
@@ -200,25 +198,3 @@ def _crossings(sides: Floats, lattice: Lattice) -> Floats:
                 if j >= 0:
                     crossings[i, min(j, lattice.shape[1] - 1)] += 1.0
     return crossings
-
-
-def window_sums(values: Floats, lattice: Lattice) -> Floats:
-    """For each column the sum over the square of WINDOW_MM around it."""
-    reach = max(1, round(0.5 * (WINDOW_MM / lattice.cell - 1.0)))
-    padded = np.pad(values, ((reach + 1, reach), (reach + 1, reach)))
-    sums = padded.cumsum(axis=0).cumsum(axis=1)
-    wide = 2 * reach + 1
-    whole: Floats = sums[wide:, wide:] - sums[:-wide, wide:] - sums[wide:, :-wide] + sums[:-wide, :-wide]
-    return whole
-
-
-def over_room(plastic: Floats, room: Floats, lattice: Lattice) -> Floats:
-    """Plastic over room in the square millimetre around each column with room, mm3 both; nan where there is too little to tell.
-
-    room: mm3 of each column, nan where it is none.
-    """
-    there = np.isfinite(room)
-    covered = window_sums(there * lattice.column_mm2, lattice)
-    mm3 = window_sums(np.where(there, room, 0.0), lattice)
-    enough = there & (covered >= LEAST_MM2 * WINDOW_MM**2) & (mm3 > 1e-9)
-    return np.where(enough, window_sums(np.where(there, plastic, 0.0), lattice) / np.where(enough, mm3, 1.0), np.nan)

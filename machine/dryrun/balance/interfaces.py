@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, over_room, tops
+from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, tops
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.strokes import Beads, parts_on_plate, turned_box
 from machine.gcode.reader.parsed import ParsedProgram
@@ -24,7 +24,6 @@ AT_THE_EDGE = (Kind.OUTER_WALL.value, Kind.OVERHANG.value)
 NO_PART = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value, Kind.IRONING.value)
 NEAR = 1.5  # heights of a bead: what lies farther below its tip it does not touch
 LEAST_TOLD, MOST_TOLD, LEAST_TOLD_MM2 = 0.75, 1.4, 10.0  # of all of it: steps of slanted layers leave a tenth open or taken
-LEAST, MOST = 0.9, 1.1  # plastic over room of a square millimetre that is as it should be
 LEAN, RICH = 0.1, 1.1  # the leanest tenth of a layer's beads; what has so much more makes up for what oozed
 REACH_MM = 2.0  # from the plane of the tip, of plastic that can matter
 
@@ -68,11 +67,6 @@ class Interface:
         """Plastic over room where beads lie on something, whatever they leave open."""
         there = self.touching & self.bead
         return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
-
-    @property
-    def map(self) -> Floats:
-        """(nx, ny) plastic over room in the square millimetre around each column; nan outside."""
-        return over_room(self.plastic, np.where(self.touching & self.section, self.room, np.nan), self.lattice)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ Judged at the points of a lattice inside the model. A bead is taken as what its 
 as the bead, lying in its part's own direction; the corners that round beads leave are filled by the plastic they push aside.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -25,26 +24,14 @@ MOST_CELLS = 20_000_000
 ROUND_MM = 0.02  # three rounded coordinates, and beads whose tops meet
 
 
-@dataclass(frozen=True)
-class Fill:
-    """Points of a lattice inside the model, and how many of them lie in a bead."""
-
-    filled: int
-    points: int
-
-    @property
-    def share(self) -> float:
-        """0..1; 1 where the model has no inside."""
-        return self.filled / self.points if self.points else 1.0
-
-
-def filled_share(run: DryRun, mesh: Mesh, profile: Profile, points: int = POINTS) -> Fill:
-    """How much of the closed model, in the workpiece frame, the beads of its own fill (support and skirt aside)."""
+def filled_share(run: DryRun, mesh: Mesh, profile: Profile, points: int = POINTS) -> float:
+    """0 to 1: how much of the closed model, in the workpiece frame, the beads of its own fill (support and skirt aside); 1 where
+    it has no inside. points: at about how many that is judged."""
     places = lattice(mesh, points)
     own = np.flatnonzero([name not in AROUND for name in run.segment_type])
     width_mm, height_mm = run.deposited.sizes[run.deposited.size[own]].T
     hit = in_beads(places, run.deposited.segments(own), printing_directions(run, profile)[own], width_mm, height_mm)
-    return Fill(int(hit.sum()), len(places))
+    return float(hit.mean()) if len(places) else 1.0
 
 
 def lattice(mesh: Mesh, points: int) -> Floats:

@@ -8,7 +8,8 @@ import numpy as np
 
 from machine.firmware import klipper
 from machine.gcode.arcs import arc_centre, chord_count, chords, sweep_rad
-from machine.gcode.modes import COMMANDS, E_AXIS
+from machine.gcode.commands import BED, HOME, HOMES, NOZZLE
+from machine.gcode.modes import E_AXIS, MODES
 from machine.gcode.reader.state import Reader, Words
 from machine.gcode.words import quote, read_number, read_values
 from machine.kinematics.table import axis_positions, followed_places
@@ -19,7 +20,7 @@ CHORD_MM = 0.005  # arcs are read as chords that stay so near
 ROUND_MM = 0.1  # by how much an arc's radius may differ at its ends
 Values = Mapping[str, str]
 KEYS = re.compile(r"(?: +[A-Z_][A-Z0-9_]*=(?:\"[^\"]*\"|[^\s\"'#()\\]*))* *").fullmatch  # a # begins a comment for Klipper
-HEATERS = {"EXTRUDER": ("M104", "M109"), "HEATER_BED": ("M140", "M190")}  # the codes that set, and that wait for, a target
+HEATERS = {"EXTRUDER": NOZZLE, "HEATER_BED": BED}
 
 
 def dispatch(reader: Reader, name: str, words: Words) -> None:
@@ -240,7 +241,7 @@ def _probe(reader: Reader, name: str, words: Words) -> None:
 ACTIONS: tuple[tuple[Callable[[Reader, str, Words], None], str], ...] = (
     (_straight, "G0 G1"),
     (_arc, "G2 G3"),
-    (_mode, " ".join(COMMANDS)),
+    (_mode, " ".join(MODES)),
     (_note, "G4 M0 M1 M226 M600 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
     (_nothing, "G17 G40 G43 G49 G53 G54 G61 G64 G80 G91.1 G92.1 G92.2 M6"),
     (_nothing, "M17 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M126 M127 M208 M486 M502 M572 M900"),
@@ -267,9 +268,10 @@ def macro(reader: Reader, code: str) -> bool:
     name, _, rest = code.partition(" ")
     action = MACROS.get(name)
     if action is None:
-        if homed := re.fullmatch(r"HOME_([A-DU-Z]+)", name):
-            _home_turned(reader, homed[1])
-        return homed is not None
+        homes = HOMES.fullmatch(name) is not None
+        if homes:
+            _home_turned(reader, name.removeprefix(HOME))
+        return homes
     if name in KEYED and not KEYS(f" {rest}"):
         raise GcodeError(f"{quote(code)}: behind {name} only KEY=VALUE is allowed")
     if reader.turning and name != "MANUAL_STEPPER":

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from machine.gcode.commands import PATHS
 from machine.gcode.line_text import FREE_TEXT, begins_layer, begun_part, command_name, read_line, to_ascii
 from machine.gcode.lines import Lines
-from machine.gcode.modes import COMMANDS
+from machine.gcode.modes import MODES
 from machine.gcode.reader.codes import BARE_WORDS, VALUED, dispatch, flush, macro
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, Remarks, Unheld, pieces
 from machine.gcode.reader.plain_moves import read_plain_moves
@@ -121,7 +121,7 @@ def _check_condition(reader: Reader, line: str, command: str) -> None:
     indent = len(spread) - len(spread.lstrip())
     if reader.condition is not None and indent <= reader.condition:
         reader.condition = None
-    if reader.condition is not None and name in (*PATHS, *COMMANDS, "G10", "G11", "G92"):
+    if reader.condition is not None and name in (*PATHS, *MODES, "G10", "G11", "G92"):
         raise GcodeError(f"{quote(command)} depends on a condition: write moves and modes outside of it")
     if name in CONDITIONS and reader.condition is None:
         reader.condition = indent

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.firmware import Dialect, dialect_of
+from machine.gcode.commands import BED, NOZZLE
 from machine.gcode.modes import E_AXIS, Modes, axes_of
 from machine.gcode.reader.parsed import OWN, Event, Unheld
 from machine.gcode.settings import PartTotals
@@ -116,9 +117,9 @@ class Reader:
 
     def note(self, code: str, value: float = 0.0, letters: str = "") -> None:
         """Put an event on record, before the next row; targets of heaters are remembered."""
-        if code in ("M104", "M109"):
+        if code in NOZZLE:
             self.nozzle_c = value
-        elif code in ("M140", "M190"):
+        elif code in BED:
             self.bed_c = value
         self.events.append(Event(self.number, code, value, letters, self.rows))
 

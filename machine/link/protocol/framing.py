@@ -7,7 +7,7 @@ from machine.firmware.firmware import FRAME_CHARACTERS
 from machine.firmware.marlin import DIALECT
 from machine.gcode.commands import command_in
 from machine.gcode.line_text import is_plain_move, read_line, to_ascii
-from machine.gcode.words import PAUSE_REMARK
+from machine.gcode.words import PAUSE_REMARK, split_command
 from profiles.errors import GcodeError, LocalProtocolError
 
 LINE_LIMIT = DIALECT.longest_line
@@ -77,7 +77,9 @@ def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
         )
         raise LocalProtocolError(f"{_called(source)} ({command[:40]!r}) {why}")
     if command[0] == "M" and (reason := command_in(command).refused):
-        raise LocalProtocolError(f"{_called(source)} holds {name_of(command)}, which {reason}: remove it from the program")
+        raise LocalProtocolError(
+            f"{_called(source)} holds {split_command(command)[0]}, which {reason}: remove it from the program"
+        )
     if len(command) > limit - FRAME_CHARACTERS:
         raise LocalProtocolError(
             f"{_called(source)} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
@@ -88,16 +90,6 @@ def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
 
 def _called(source: int | str) -> str:
     return f"line {source}" if isinstance(source, int) else source
-
-
-def name_of(command: str) -> str:
-    """The letter and number a command begins with, "M109" of "M109 S210"; of a Klipper macro its first word."""
-    if command[1:2].isalpha():
-        return command.partition(" ")[0].upper()
-    end = 1
-    while end < len(command) and (command[end].isdigit() or command[end] == "."):
-        end += 1
-    return command[:end].upper()
 
 
 def number_lines(first: int, commands: Sequence[str]) -> bytes:

@@ -40,6 +40,7 @@ REGISTERED = re.compile(r"MANUAL_STEPPER\b([^\n]*\bGCODE_AXIS=[ \t]*([A-Z])\b[^\
 STEPPER = re.compile(r"\bSTEPPER=\s*\"?([A-Za-z0-9_]+)", re.IGNORECASE)
 SCREW_MM = 10.0  # greatest lead of the usual screws; as degrees it would be a gear of 36 to 1
 TURN_DEG = 360.0
+RATES = {SPEED: "velocity", ACCELERATION: "accel"}
 CORNER_MM_S = 5.0  # toolhead.py: square_corner_velocity where it is not set
 PROBES = ("bltouch", "probe", "smart_effector", "probe_eddy_current", "load_cell_probe", "cartographer", "beacon")
 SETTINGS = {  # key below machine -> section and key
@@ -136,7 +137,7 @@ def _linear(sections: Sections, remarks: list[str]) -> dict[str, AxisReadings]:
         remarks.append(f"its kinematics are {named[0]}: how far X, Y and Z reach stands in no axis of them")
     axes: dict[str, AxisReadings] = {letter: {} for letter in PRINTING}
     for letter, readings in axes.items():
-        for key, word in ((SPEED, "velocity"), (ACCELERATION, "accel")):
+        for key, word in RATES.items():
             told = (sections.reading("printer", f"max_{part}{word}") for part in ("", f"{letter.lower()}_"))
             if values := [reading for reading in told if reading is not None]:
                 readings[key] = min(values)
@@ -193,7 +194,8 @@ def _doubt(sections: Sections, title: str, letter: str) -> str:
 def _turning(sections: Sections, title: str, registration: str) -> AxisReadings:
     """The numbers of a stepper; those with which it is registered as an axis go before its own."""
     readings: AxisReadings = {}
-    for key, own, told in ((SPEED, "velocity", "LIMIT_VELOCITY"), (ACCELERATION, "accel", "LIMIT_ACCEL")):
+    for key, own in RATES.items():
+        told = f"LIMIT_{own.upper()}"
         as_axis = re.search(rf"\b{told}=\s*([0-9]+(?:\.[0-9]+)?)", registration, re.IGNORECASE)
         reading = Reading(float(as_axis[1]), told) if as_axis else sections.reading(title, own)
         if reading is not None and reading.value:  # without an accel it starts and stops at once

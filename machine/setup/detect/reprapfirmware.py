@@ -48,9 +48,15 @@ KINEMATICS = dict(  # Movement/Kinematics/Kinematics.h, KinematicsType
     enumerate(("cartesian", "corexy", "corexz", "delta", "scara", "corexyu", "hangprinter", "polar", "corexyuv"))
 ) | {10: "rotarydelta", 11: "markforged"}
 
+MINUTE_S = 60.0
+# Command -> what it tells of each axis, the seconds of its unit, and letters that are no axes; S1 among these: per second.
+RATES = {"M201": (ACCELERATION, 1.0, ""), "M203": (SPEED, MINUTE_S, "SI")}
+JERKS = {"M205": 1.0, "M566": MINUTE_S}  # command -> the seconds of its unit
+HEATERS = {"M140": "bed", "M563": "nozzle"}  # command -> the field that H of the bed, of the first tool, sets
+FIELDS = {"speed": (SPEED, MINUTE_S), "acceleration": (ACCELERATION, 1.0)}  # of an axis in the object model
+
 Parameters = dict[str, list[float]]  # letter -> its numbers, several with colons between
 Ends = dict[str, list[float | None]]  # letter -> least and greatest
-MINUTE_S = 60.0
 TURNING = "ABCD"  # GCodes3.cpp, DoDriveMapping: of these letters an axis turns unless R0 says otherwise
 PROBES = {  # Endstops/EndstopDefs.h, ZProbeType
     1: "an analogue probe",
@@ -175,7 +181,7 @@ def _model(config: ConfigText) -> dict[str, Any]:
 
 
 def _drive(drive: Table, source: str) -> AxisReadings:
-    told = ((key, number(drive.get(key)), unit_s) for key, unit_s in ((SPEED, MINUTE_S), (ACCELERATION, 1.0)))
+    told = ((key, number(drive.get(field)), unit_s) for field, (key, unit_s) in FIELDS.items())
     return {key: Reading(value / unit_s, source) for key, value, unit_s in told if value is not None}
 
 
@@ -213,18 +219,23 @@ def _read_commands(config: ConfigText) -> Found:
 def _take(board: DuetBoard, ends: Ends, command: str, parameters: Parameters) -> None:
     """Take in one command."""
     first = {letter: numbers[0] for letter, numbers in parameters.items()}
+    if command in RATES:
+        key, unit_s, others = RATES[command]
+        unit_s = 1.0 if "S" in others and first.get("S") == 1.0 else unit_s
+        for letter, value in first.items():
+            if letter not in others:
+                board.axes.setdefault(letter, {})[key] = Reading(value / unit_s, command)
+    elif command in JERKS:
+        board.jerks_mm_s |= {letter: value / JERKS[command] for letter, value in first.items()}
+    elif command in HEATERS and "H" in first and first.get("P", 0.0) == 0.0:
+        setattr(board, HEATERS[command], int(first["H"]))
+    else:
+        _take_other(board, ends, command, parameters, first)
+
+
+def _take_other(board: DuetBoard, ends: Ends, command: str, parameters: Parameters, first: Mapping[str, float]) -> None:
+    """Take in a command that has a rule of its own."""
     match command:
-        case "M201":
-            for letter, value in first.items():
-                board.axes.setdefault(letter, {})[ACCELERATION] = Reading(value, command)
-        case "M203":
-            unit_s = 1.0 if first.get("S") == 1.0 else MINUTE_S
-            for letter, value in first.items():
-                if letter not in "SI":  # I: the least speed
-                    board.axes.setdefault(letter, {})[SPEED] = Reading(value / unit_s, command)
-        case "M205" | "M566":
-            unit_s = 1.0 if command == "M205" else MINUTE_S
-            board.jerks_mm_s |= {letter: value / unit_s for letter, value in first.items()}
         case "M208":
             for letter, numbers in parameters.items():
                 both = ends.setdefault(letter, [None, None])
@@ -240,12 +251,8 @@ def _take(board: DuetBoard, ends: Ends, command: str, parameters: Parameters) ->
             board.kinematics = "delta"
         case "M669" if "K" in first:
             board.kinematics = KINEMATICS.get(int(first["K"]), f"K{first['K']:g}")
-        case "M140" if "H" in first and first.get("P", 0.0) == 0.0:
-            board.bed = int(first["H"])
         case "M143" if "S" in first:
             board.heaters_c[int(first.get("H", 1.0))] = first["S"]
-        case "M563" if "H" in first and first.get("P", 0.0) == 0.0:  # of the first tool
-            board.nozzle = int(first["H"])
         case "M558":
             board.probe = int(first.get("P", 0.0))
 

@@ -6,15 +6,15 @@ What a browser is started with every user of the computer can read, and the addr
 
 import os
 import tempfile
-import time
 import webbrowser
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from html import escape
 from pathlib import Path
 from threading import Thread
 
 from machine.notices import say
+from profiles.files import remove_older
 from profiles.folders import state_folder
 
 PREFIX, SUFFIX = "workbench-", ".html"
@@ -30,7 +30,7 @@ PAGE = """<!doctype html>
 def redirecting(address: str) -> Iterator[Path]:
     """A file that this user alone can read, as long as the program goes on. Raises OSError where none can be written."""
     folder = state_folder()
-    _remove_old(folder)
+    remove_older(folder.glob(f"{PREFIX}*{SUFFIX}"), OLD_S)
     opened, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=folder)  # of mode 0600
     path = Path(name)
     try:
@@ -39,13 +39,6 @@ def redirecting(address: str) -> Iterator[Path]:
         yield path
     finally:
         path.unlink(missing_ok=True)
-
-
-def _remove_old(folder: Path) -> None:
-    for file in folder.glob(f"{PREFIX}*{SUFFIX}"):
-        with suppress(OSError):
-            if time.time() - file.stat().st_mtime > OLD_S:
-                file.unlink()
 
 
 def lead_browser(address: str, until_end: ExitStack) -> None:

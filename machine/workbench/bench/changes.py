@@ -164,6 +164,9 @@ class Copies(Change):
         return bench if count == bench.copies else replace(bench, copies=count)
 
 
+CHANGES = (Turn, Stand, Lay, Take, Lock, SetPart, ResetPart, AddStop, RemoveStop, Copies)
+
+
 def _part(bench: Bench, part: int) -> int:
     return check_number("part", part, 1, max(bench.parts, 1))  # an uncut model is part 1
 

@@ -141,6 +141,9 @@ class Reorder(Edit):
         return tuple(others)
 
 
+EDITS = (Add, Move, Limb, Remove, Reorder)
+
+
 def planned_part(bench: Bench, part: int) -> PlannedPart:
     """The part of a number, which has a plane. Raises PlanError."""
     return (bench.cuts or ())[check_number("part", part, 2, bench.parts) - 2]

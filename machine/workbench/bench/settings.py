@@ -19,7 +19,7 @@ from profiles.errors import ProfileError
 from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
 from profiles.machine import GCODE
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
-from profiles.places import KINDS, OF_KIND, known
+from profiles.places import OF_KIND, known
 from profiles.profile import DEFAULTS, SECTIONS, Profile, load, with_part_settings
 from profiles.toml_text import read_value, rows_text, value_text
 
@@ -61,9 +61,7 @@ def _in_one_line(value: str) -> str:
 
 
 def without_settings(given: Given, kind: str | None) -> Given:
-    """The same with none of what is set for a machine, a material or a process; None: for all three. Raises ProfileError."""
-    if kind is not None and kind not in KINDS:
-        raise ProfileError(f"{kind!r} is no profile: {', '.join(KINDS)} are known")
+    """The same with none of what is set for a machine, a material or a process; None: for all three."""
     gone = given.settings if kind is None else settings_of(given, kind)
     return replace(given, settings=tuple(setting for setting in given.settings if setting not in gone))
 
@@ -75,9 +73,8 @@ def settings_of(given: Given, kind: str) -> list[str]:
 
 def with_name(given: Given, kind: str, name: str) -> Given:
     """The same with another machine, material or process. Raises ProfileError for one that is not known."""
-    if kind not in KINDS or name not in known(kind):
-        allowed = ", ".join(known(kind)) if kind in KINDS else ", ".join(KINDS)
-        raise ProfileError(f"{name!r} is no {kind if kind in KINDS else 'profile'}: {allowed} are known")
+    if name not in known(kind):
+        raise ProfileError(f"{name!r} is no {kind}: {', '.join(known(kind))} are known")
     return named(given, kind, name)
 
 

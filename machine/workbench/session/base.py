@@ -282,6 +282,9 @@ class Derived(Generic[Value]):
         if not self._interrupts:  # the bench may have changed since
             self.bench = self._session.bench
             self._begun = self._key_of(self.bench)
+            if self._begun is None:
+                self._end()
+                return
         try:
             answer = await self._work(self.bench)
             if self._accept is None:

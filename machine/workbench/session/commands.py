@@ -5,27 +5,17 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Literal, get_args
 
-from machine.workbench.bench.changes import (
-    AddStop,
-    Change,
-    Copies,
-    Lay,
-    Lock,
-    RemoveStop,
-    ResetPart,
-    SetPart,
-    Stand,
-    Take,
-    Turn,
-)
+from machine.workbench.bench.changes import CHANGES, Change
 from machine.workbench.bench.marks import Mark, Marking, Unmark
-from machine.workbench.bench.planes import Add, Edit, Limb, Move, Remove, Reorder
+from machine.workbench.bench.planes import EDITS, Edit, Move
 from machine.workbench.bench.settings import with_name, with_typed, without_settings
 from machine.workbench.bench.values import Asked, Command
 from machine.workbench.session.session import Session
 from machine.workbench.work.cutting import SearchWay
 from mdp.ranking.ranker import CLASSIC
 from profiles.errors import PlanError
+
+ProfileKind = Literal["machine", "material", "process"]
 
 
 class Need(StrEnum):
@@ -91,14 +81,14 @@ class Reset(Command):
     """Take back what is set for a machine, a material or a process; null: for all."""
 
     do: Literal["reset"]
-    kind: str | None = None
+    kind: ProfileKind | None = None
 
 
 class TakeProfile(Command):
     """Another machine, material or process."""
 
     do: Literal["profile"]
-    kind: str
+    kind: ProfileKind
     name: str
 
 
@@ -124,8 +114,9 @@ class Neck(Command):
 
 
 KINDS: tuple[type[Command], ...] = (
-    *(Plain, Demo, Unit, Plate, Set, Reset, TakeProfile, SetPart, ResetPart, Turn, Stand, Lay, Search, Take, Try, Add, Move),
-    *(Remove, Reorder, Limb, Neck, Lock, Mark, Unmark, AddStop, RemoveStop, Copies),
+    *(Plain, Demo, Unit, Plate, Set, Reset, TakeProfile, Search, Try, Neck, Mark, Unmark),
+    *CHANGES,
+    *EDITS,
 )
 COMMANDS = {name: kind for kind in KINDS for name in get_args(kind.model_fields["do"].annotation)}
 NEEDS = {"compare": Need.SLICES} | dict.fromkeys(

@@ -285,7 +285,7 @@ class Session(SessionBase):
         """The parts as bodies of their own, as `work.pieces` packs them. Raises UserError where they cannot be cut."""
         out, before = self.new_file(), self.pieces.done
         await self.quick.run("draw_pieces", bench, out)
-        if before is not None:
+        if before is not None and not self.pieces.stale:
             before.unlink(missing_ok=True)
         return out
 

@@ -1,11 +1,13 @@
-"""Server: the page, and the addresses of the workbench: its sessions' models, files and lines; benches opened and closed."""
+"""Server: the page, and all addresses of the workbench: models, files and lines of its sessions, and the benches themselves."""
 
 import re
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from urllib.parse import quote
 
 from starlette.applications import Starlette
+from starlette.background import BackgroundTask
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
@@ -13,31 +15,22 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from machine.notices import say
+from machine.pipeline.output import plain_name
+from machine.pipeline.profile_file import profile_text
 from machine.view.page import TEMPLATE, bundle, hash_source
 from machine.view.serving.guard import NAMES, Guard
 from machine.workbench.access.gate import Gate
 from machine.workbench.access.network import Lan
 from machine.workbench.access.pairing import Door
 from machine.workbench.bench.page_words import page_words
-from machine.workbench.bench.settings import export_command, settings_list
+from machine.workbench.bench.settings import export_command, file_stem, settings_list, settings_of
 from machine.workbench.bench.values import is_small_number
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import Need, check_need
 from machine.workbench.session.placement import pedestal_key
 from machine.workbench.session.session import Session, Workbench
-from machine.workbench.web.downloads import (
-    folder,
-    gcode,
-    pictures,
-    plan,
-    print_page,
-    print_text,
-    print_walls,
-    profile,
-    project,
-    shared_page,
-)
+from machine.workbench.session.slicing import Slices
 from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
 from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
 from machine.workbench.web.sessions_thread import SessionsThread
@@ -46,10 +39,101 @@ from machine.workbench.web.uploads import ProfileFiles, Uploads
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
+Act = Callable[[Session, Request], Awaitable[Response]]
 OWN = Path(__file__).parent / "page"
 MARKER = re.compile(r"/\*(?:STYLE|SCRIPT|NETWORK)\*/")
-Act = Callable[[Session, Request], Awaitable[Response]]
+ZIP = "application/zip"
 BELOW = "/{token}/{session:int}/"
+
+
+async def profile(session: Session, request: Request) -> Response:
+    """The machine, the material or the process with what is changed of it, as a profile file."""
+    given, kind = session.bench.given, request.path_params["kind"]
+    if kind not in KINDS:
+        return Response("there is no such profile\n", 404)
+    name = getattr(given, kind)
+    text = profile_text(kind, name, settings_of(given, kind))
+    own = _saved_as(f"{plain_name(Path(name).stem) or kind}-own.toml")
+    return Response(text, headers=own, media_type="application/toml")
+
+
+async def plan(session: Session, request: Request) -> Response:
+    """The plan's file."""
+    text: str = await session.make("cutting the parts", "make_plan")
+    return Response(text, headers=_saved_as(f"{file_stem(session.bench)}-plan.toml"), media_type="application/toml")
+
+
+def _made_file(word: str, task: str, kind: str, ending: str) -> Act:
+    """A file that a task makes of the parts; word: what the pages wait for; ending: of its name after the model's."""
+
+    async def answer(session: Session, request: Request) -> Response:
+        out = session.new_file()
+        await session.make(word, task, out)
+        return _once(out, kind, f"{file_stem(session.bench)}{ending}")
+
+    return answer
+
+
+async def print_page(session: Session, request: Request) -> Response:
+    """The page of the last slices as `view` writes it, with its own content security policy in it."""
+    slices = _slices(session, request)
+    return _gone() if slices is None else FileResponse(slices.sliced.page, media_type="text/html")
+
+
+async def print_text(session: Session, request: Request) -> Response:
+    """The G-code of the last slices to look at, whatever the dry run found."""
+    slices = _slices(session, request)
+    return _gone() if slices is None else FileResponse(slices.sliced.gcode, media_type="text/plain")
+
+
+async def print_walls(session: Session, request: Request) -> Response:
+    """What is seen of a part that is sliced, as `work.walls` gives it."""
+    drawn = session.slicing.walls_of(request.path_params["number"], request.path_params["part"])
+    return _gone() if drawn is None else Response(drawn, media_type="application/octet-stream")
+
+
+async def shared_page(session: Session, request: Request) -> Response:
+    """The same as a file to save, with the comparison with one piece where that has been worked out."""
+    page, alternatives, name = session.slicing.needed().sliced.page, session.comparing.rows(), f"{file_stem(session.bench)}.html"
+    if not alternatives:
+        return FileResponse(page, headers=_saved_as(name), media_type="text/html")
+    out = session.new_file()
+    await session.quick.run("share_page", page, alternatives, out)
+    return _once(out, "text/html", name)
+
+
+async def gcode(session: Session, request: Request) -> Response:
+    """The G-code; with errors only for who has said that he wants it all the same."""
+    sliced = session.slicing.needed().sliced
+    if (errors := sliced.errors) and request.query_params.get("force") != "yes":
+        count = f"{len(errors)} error{'s' * (len(errors) > 1)}"
+        raise PlanError(
+            f"the dry run found {count}, the first: {errors[0].message}: no G-code is saved unless you say that you want it all"
+            " the same"
+        )
+    return FileResponse(sliced.gcode, headers=_saved_as(f"{file_stem(session.bench)}.gcode"), media_type="text/plain")
+
+
+def _slices(session: Session, request: Request) -> Slices | None:
+    """The last slices, where they are those that are asked for."""
+    slices = session.slicing.latest()
+    return slices if slices is not None and slices.sliced.key == request.path_params["key"] else None
+
+
+def _gone() -> Response:
+    return Response("these slices are not there any more\n", 404)
+
+
+def _once(file: Path, kind: str, name: str) -> Response:
+    """A file that goes when it has been sent."""
+    remove = BackgroundTask(file.unlink, missing_ok=True)
+    return FileResponse(file, headers=_saved_as(name), media_type=kind, background=remove)
+
+
+def _saved_as(name: str) -> dict[str, str]:
+    """How a browser is told a file's name, letters of all scripts as RFC 6266 has them."""
+    plain = name.encode("ascii", "replace").decode().replace("?", "_")
+    return {"content-disposition": f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name)}"}
 
 
 def workbench_page(lines: Iterable[str], network: str = "") -> tuple[bytes, str]:
@@ -150,12 +234,12 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("left/{number:int}", uploads.open_left, "POST"),
         route("kept", uploads.list_kept),
         route("kept/{name}", uploads.open_kept, "POST"),
-        route("project.3mf", project, need=Need.MODEL),
+        route("project.3mf", _made_file("saving the project", "make_project", "model/3mf", ".3mf"), need=Need.MODEL),
         route("plan.toml", plan, need=Need.PARTS),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces, need=Need.PARTS),
-        route("parts.zip", folder, need=Need.PARTS),
-        route("pictures.zip", pictures, need=Need.PARTS),
+        route("parts.zip", _made_file("cutting the parts", "make_folder", ZIP, "-parts.zip"), need=Need.PARTS),
+        route("pictures.zip", _made_file("drawing the parts", "make_pictures", ZIP, "-pictures.zip"), need=Need.PARTS),
         route("print/{key}", print_page),
         route("print/{key}/text", print_text),
         route("walls/{number:int}/{part:int}", print_walls),

@@ -21,7 +21,7 @@ from machine.pipeline.project import PLAN, Project, figures_of, write_folder
 from machine.pipeline.project_record import RECORD
 from machine.workbench.bench.bench import Bench, plan_of_bench
 from mdp.model_file import DEMO
-from profiles.files import LOCK, lock_folder, remove_locked
+from profiles.files import LOCK, keep_newest, lock_folder, modified_s, remove_locked
 from profiles.folders import state_folder
 
 PREFIX = "tiltprint-edit-"
@@ -150,10 +150,7 @@ def work_of(bench: Bench) -> Project:
 
 def folders_kept() -> list[Path]:
     """The folders with work that no bench writes to, the newest first; where more are kept than may be, the oldest go."""
-    folders = sorted(_folders(), key=lambda folder: (folder / RECORD).stat().st_mtime, reverse=True)
-    for folder in folders[MOST_KEPT:]:
-        shutil.rmtree(folder, ignore_errors=True)
-    return folders[:MOST_KEPT]
+    return keep_newest(_folders(), MOST_KEPT, lambda folder: modified_s(folder / RECORD))
 
 
 def _folders() -> Iterator[Path]:

@@ -5,12 +5,12 @@ from math import cos, nextafter, pi, radians, sin, tan
 import numpy as np
 import pytest
 
-from machine.dryrun.balance.columns import NOTHING, Bars, inside_loops, laid, lattice_over, over_room, tops
+from machine.dryrun.balance.columns import NOTHING, Bars, inside_loops, laid, lattice_over, tops
 from machine.dryrun.balance.interfaces import Interface, interfaces
 from machine.dryrun.dryrun import dry_run, summary
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import Lines, layers, on, word
-from tools.layer_balance import PartBalance, layer_balances, wall_edges
+from tools.layer_balance import PartBalance, layer_balances, over_room, wall_edges
 
 FIELD = np.array([[-1.0, -1.0], [11.0, 11.0]])
 

@@ -1,8 +1,7 @@
 """A firmware that exists only here: written as docs/gcode.md tells how to add one."""
 
 from machine.firmware.dialect import Command, Dialect
-from machine.firmware.firmware import Firmware, LineRules
-from machine.firmware.simulation import SimulationRules
+from machine.firmware.firmware import Firmware, LineRules, SimulationRules
 
 MADE_UP = Firmware(
     name="Made-up",

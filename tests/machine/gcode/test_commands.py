@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from machine.firmware import Dialect, dialect_of, dialects
 from machine.gcode.blocks import cold_block, filled_start
 from machine.gcode.commands import EVERY, NOTHING_KNOWN, Heat, command_in, command_named, heat_in
-from machine.gcode.modes import COMMANDS as MODES
+from machine.gcode.modes import MODES
 from machine.gcode.reader.codes import CODES, MACROS
 from machine.link.protocol.framing import command_of
 from machine.printing.settings_queries import QUESTIONS

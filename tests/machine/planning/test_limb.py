@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from machine.kinematics.collision import hull
-from machine.link.pause.return_path import return_moves
+from machine.link.pause.park_moves import return_moves
 from machine.planning import layer
 from machine.planning.fit import standing_at
 from machine.planning.moves import Pause

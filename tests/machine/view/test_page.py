@@ -2,6 +2,9 @@
 
 import base64
 import re
+import shutil
+import subprocess
+from graphlib import CycleError
 from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,7 +16,8 @@ from machine.cli.cli import main
 from machine.kinematics.table import workpiece_path
 from machine.pipeline.pipeline import build
 from machine.view.contents import of_parts
-from machine.view.page import page, print_page
+from machine.view.page import EXPORT, IMPORT, TEMPLATE, bundle, page, print_page
+from machine.workbench.web.server import OWN
 from mdp.model_file import locate
 from mdp.read import read_mesh
 from mdp.save import stl
@@ -26,6 +30,10 @@ from tests.shapes import tee
 
 NASTY = '<img src=x onerror=alert(1)></title><script>alert(2)</script>/*SCRIPT*/<!--DATA-->".stl'
 COARSE = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
+SCRIPTS = sorted([*TEMPLATE.glob("*.js"), *OWN.glob("*.js")])
+NODE = shutil.which("node")
+
+
 COARSE += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6", "--as-is"]
 
 
@@ -226,3 +234,45 @@ def test_a_page_takes_a_third_of_what_it_may_and_holds_the_path_to_a_hundredth()
     on_work = workpiece_path(profile.machine, arrays["end"])
     assert np.linalg.norm(on_work - workpiece_path(profile.machine, program.run.program.end), axis=1).max() < 0.01
     assert header["time_s"] == pytest.approx(arrays["time"][-1], abs=0.001)
+
+
+def written(folder: Path, **texts: str) -> Path:
+    for name, text in texts.items():
+        (folder / f"{name}.js").write_text(text)
+    return folder / "main.js"
+
+
+@pytest.mark.skipif(NODE is None, reason="Node is not installed")
+def test_modules_of_the_same_names_inside_see_only_what_they_import(tmp_path: Path) -> None:
+    main = written(
+        tmp_path,
+        base="const own = 1;\nexport const $ = () => own;\n",
+        other='import { $ } from "./base.js";\n\nconst own = 10;\nexport async function twice() { return 2 * $() + own; }\n',
+        main='import { $ } from "./base.js";\nimport { twice } from "./other.js";\n\n'
+        "twice().then((x) => console.log(x, $(), typeof own));\n",
+    )
+    assert NODE is not None
+    run = subprocess.run([NODE, "-"], input=bundle(main), capture_output=True, text=True, check=True)
+    assert run.stdout == "12 1 undefined\n"
+
+
+def test_modules_that_need_each_other_are_refused(tmp_path: Path) -> None:
+    main = written(tmp_path, main='import { a } from "./a.js";\n', a='import { b } from "./main.js";\nexport const a = 1;\n')
+    with pytest.raises(CycleError):
+        bundle(main)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda file: f"{file.parent.name}/{file.stem}")
+def test_a_script_imports_what_the_others_export_and_uses_it(script: Path) -> None:
+    text = script.read_text("utf-8")
+    assert sum(line.startswith("import ") for line in text.splitlines()) == len(IMPORT.findall(text))
+    body = IMPORT.sub("", text)
+    for names, path in IMPORT.findall(text):
+        exported = {name for _, name in EXPORT.findall((script.parent / path).read_text("utf-8"))}
+        assert set(names.split(", ")) <= exported
+        assert [name for name in names.split(", ") if name not in body] == []
+
+
+def test_every_script_is_part_of_a_page() -> None:
+    pages = bundle(TEMPLATE / "main.js") + bundle(OWN / "main.js")
+    assert [file for file in SCRIPTS if f'modules["{file.parent.name}/{file.stem}"] = ' not in pages] == []

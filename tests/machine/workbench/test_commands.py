@@ -1,6 +1,7 @@
 """The table of commands: what each needs on the bench, and that the page's scripts know the very same names."""
 
 import re
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
@@ -74,6 +75,28 @@ def test_the_page_knows_the_very_same_names() -> None:
     never_said_so = {"resume", "feed", "flow"}  # by variables
     assert {*COMMANDS, *OF_PRINTS, *OF_DEVICES} - said <= never_said_so
     assert said <= {*COMMANDS, *OF_PRINTS, *OF_DEVICES}
+
+
+def said_with(script: str) -> Iterator[tuple[str, set[str]]]:
+    """Each command that a script writes out, `{ do: "NAME", key: value, ... }`, with its keys."""
+    for match in re.finditer(r'\{ do: "(\w+)"', script):
+        keys, depth, at = set[str](), 1, match.end()
+        while depth:
+            if depth == 1 and (key := re.match(r", (\w+)(?=[:, ])", script[at:])):
+                keys.add(key[1])
+            depth += (script[at] in "{[(") - (script[at] in "}])")
+            at += 1
+        yield match[1], keys
+
+
+def test_the_page_sends_with_a_command_what_it_has_and_all_that_it_needs() -> None:
+    scripts = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith(".js"))
+    sent = [(COMMANDS[name].model_fields, keys) for name, keys in said_with(scripts) if name in COMMANDS]
+    assert len(sent) > 30
+    assert [(fields, keys) for fields, keys in sent if not keys <= {*fields}] == []
+    needed = [({name for name, field in fields.items() if field.is_required()} - {"do"}, keys) for fields, keys in sent]
+    spread = [(missing, keys) for required, keys in needed if (missing := required - keys)]
+    assert len(spread) <= 5  # that get theirs by `...plane`
 
 
 def test_the_documentation_lists_every_command_and_no_other() -> None:

@@ -386,3 +386,16 @@ def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on
 
     session = when_done(work)
     assert (session.bench.parts, session.finding.progress) == (2, None)
+
+
+def test_a_stop_ends_the_search_at_once_though_a_command_before_it_is_still_executed() -> None:
+    async def work(session: Session) -> None:
+        session.long.warm = partial(asyncio.sleep, 0)  # type: ignore[method-assign]
+        obey(session, {"do": "search"})
+        await asyncio.sleep(0)
+        assert is_seeking(session)
+        async with session.turn:
+            obey(session, {"do": "stop"})
+            assert (is_seeking(session), session.stopped) == (False, "")
+
+    assert when_done(work).stopped == "The search was stopped before it had cut anything: all is as it was."

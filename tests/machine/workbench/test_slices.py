@@ -12,7 +12,7 @@ from starlette.responses import FileResponse
 
 from machine.dryrun.findings import Finding, known_findings
 from machine.program import Alternative
-from machine.workbench.web.downloads import gcode
+from machine.workbench.web.server import gcode
 from machine.workbench.web.snapshot import SLICE_AGAIN, SUPPORT_ON, verdict_of
 from machine.workbench.work.slices import Sliced, walls
 from profiles.errors import PlanError

@@ -103,7 +103,7 @@ class ProbingSession(CommandSession):
 
 
 class PrinterProber(PrinterMover):
-    """Implements machine.setup.calibration.probing.measure.Prober. offset_z_mm: from the nozzle's tip to what touches."""
+    """Implements machine.setup.calibration.probing.Prober. offset_z_mm: from the nozzle's tip to what touches."""
 
     def __init__(self, session: ProbingSession, pen: Pen, rules: ProbingRules, offset_z_mm: float = 0.0) -> None:
         super().__init__(session, pen)

@@ -14,8 +14,7 @@ from machine.pipeline.requests import PortRequest
 from machine.printing.command_session import CommandSession
 from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, Touch
-from machine.setup.calibration.jog import begin_jog, pressed
-from machine.setup.calibration.program import TouchPlan, calibration_pen, hover_z_mm, plan_touches
+from machine.setup.calibration.program import TouchPlan, begin_jog, calibration_pen, hover_z_mm, plan_touches, pressed
 from machine.setup.calibration.sheet import Sheet
 from mdp.pose import level
 from profiles.errors import MoveError, PrinterError, ProfileError

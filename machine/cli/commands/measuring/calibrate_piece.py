@@ -14,8 +14,17 @@ from machine.gcode.reader.parse import parse_gcode
 from machine.notices import show
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes
-from machine.setup.calibration.piece.fit import Correction, correct, piece_page
-from machine.setup.calibration.piece.pads import EXPECTED, Piece, parse_pad, parse_readings, read_piece, readings_text
+from machine.setup.calibration.piece import (
+    EXPECTED,
+    Correction,
+    Piece,
+    correct,
+    parse_pad,
+    parse_readings,
+    piece_page,
+    read_piece,
+    readings_text,
+)
 from machine.setup.calibration.saved import found_tables
 from profiles.errors import ProfileError
 from profiles.machine import Machine

@@ -13,8 +13,7 @@ from machine.pipeline.output import check_writable
 from machine.pipeline.requests import ProbeRequest
 from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, calibrate
-from machine.setup.calibration.probing.ball import Ball
-from machine.setup.calibration.probing.measure import Measuring, Probe
+from machine.setup.calibration.probing import Ball, Measuring, Probe
 from machine.setup.calibration.program import calibration_pen, usual_radius_mm
 from machine.simulator.contact import ProbedTable, TrueBall
 from profiles.errors import PrinterError, ProfileError

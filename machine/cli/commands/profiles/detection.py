@@ -15,8 +15,7 @@ from machine.pipeline.profile_file import profile_text
 from machine.printing.destination import parse_destination
 from machine.printing.settings_queries import settings_text
 from machine.setup.detect.found import ConfigText, Found
-from machine.setup.detect.proposal import CALIBRATED, Proposal, propose, settings_of
-from machine.setup.detect.read import read
+from machine.setup.detect.proposal import CALIBRATED, Proposal, propose, read, settings_of
 from profiles.errors import ProfileError, reason
 from profiles.machine import Machine
 from profiles.places import own_folder

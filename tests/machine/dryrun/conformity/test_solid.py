@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trimesh.triangles import closest_point
 
+from machine.dryrun.conformity.agreement import fit_shift
 from machine.dryrun.conformity.deposit import inside, nearest_faces, outside_mm, signed
 from machine.dryrun.conformity.filling import ROUND_MM, in_beads, lattice
-from machine.dryrun.conformity.registration import fit_shift
 from mdp.mesh import Floats, Mesh
 from tests.mdp.solids import random_solid
 from tests.shapes import box, hollow

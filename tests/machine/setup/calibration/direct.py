@@ -4,8 +4,7 @@ from math import isnan
 
 import numpy as np
 
-from machine.setup.calibration.probing.ball import Ball
-from machine.setup.calibration.probing.measure import Measuring, Probe
+from machine.setup.calibration.probing import Ball, Measuring, Probe
 from machine.simulator.contact import ProbedTable, TrueBall
 from mdp.pose import Pose
 from profiles.machine import Machine

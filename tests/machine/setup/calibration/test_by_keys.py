@@ -13,8 +13,7 @@ from machine.cli.commands.measuring.calibrate_by_keys import ENTER, KeyedTouches
 from machine.kinematics.table import machine_points
 from machine.printing.command_session import CommandSession
 from machine.setup.calibration.fit import Touch
-from machine.setup.calibration.jog import STEPS_MM, WAYS, Jog, begin_jog, pressed
-from machine.setup.calibration.program import plan_touches
+from machine.setup.calibration.program import STEPS_MM, WAYS, Jog, begin_jog, plan_touches, pressed
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.pose import Pose, level
 from profiles.errors import MoveError

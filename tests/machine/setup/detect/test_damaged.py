@@ -5,7 +5,7 @@ import random
 import pytest
 
 from machine.setup.detect.found import ConfigText
-from machine.setup.detect.read import read
+from machine.setup.detect.proposal import read
 from profiles.errors import ProfileError
 from tests.machine.setup.detect.test_grblhal import DUMP
 from tests.machine.setup.detect.test_klipper import GIMBAL, REGISTRATION, STEPPERS

@@ -4,8 +4,7 @@ import pytest
 
 from machine.setup.detect.found import ConfigText, Found
 from machine.setup.detect.grblhal import recognise
-from machine.setup.detect.proposal import propose
-from machine.setup.detect.read import read
+from machine.setup.detect.proposal import propose, read
 from profiles.errors import ProfileError
 
 DUMP = """[VER:1.1f.20240801:]

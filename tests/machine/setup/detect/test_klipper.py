@@ -6,8 +6,7 @@ import pytest
 
 from machine.setup.detect.found import ConfigText, Found
 from machine.setup.detect.klipper import recognise
-from machine.setup.detect.proposal import propose
-from machine.setup.detect.read import read
+from machine.setup.detect.proposal import propose, read
 from profiles.errors import ProfileError
 
 GIMBAL = """

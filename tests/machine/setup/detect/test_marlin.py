@@ -7,8 +7,7 @@ import pytest
 from machine.firmware.marlin import settings_report
 from machine.setup.detect.found import ConfigText, Found
 from machine.setup.detect.marlin import recognise
-from machine.setup.detect.proposal import propose
-from machine.setup.detect.read import read
+from machine.setup.detect.proposal import propose, read
 from machine.simulator.motion import Motion
 from profiles.errors import ProfileError
 from profiles.profile import load

@@ -6,8 +6,7 @@ import pytest
 
 from machine.setup.detect.found import ConfigText, Found
 from machine.setup.detect.marlin import recognise as is_marlin
-from machine.setup.detect.proposal import propose
-from machine.setup.detect.read import read
+from machine.setup.detect.proposal import propose, read
 from machine.setup.detect.reprapfirmware import recognise
 from profiles.errors import ProfileError
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from machine.setup.calibration.piece.pads import Pad, Piece
+from machine.setup.calibration.piece import Pad, Piece
 from mdp.mesh import Floats
 from mdp.pose import UP, level, poses, rotation
 from profiles.machine import Machine

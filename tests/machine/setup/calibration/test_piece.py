@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machine.setup.calibration.piece.fit import correct, slope_of
+from machine.setup.calibration.piece import correct, slope_of
 from profiles.errors import ProfileError
 from profiles.profile import load
-from tests.machine.setup.calibration.piece.pieces import off, read_off, seam_mm, standing
+from tests.machine.setup.calibration.pieces import off, read_off, seam_mm, standing
 from tests.machine.setup.calibration.touches import really
 
 GENERIC = load().machine

@@ -13,8 +13,7 @@ from machine.cli.terminal.requests import CalibrationRequest
 from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import workpiece_path
-from machine.setup.calibration.piece.fit import correct, piece_page
-from machine.setup.calibration.piece.pads import Piece, parse_readings, read_piece, readings_text
+from machine.setup.calibration.piece import Piece, correct, parse_readings, piece_page, read_piece, readings_text
 from profiles.errors import OutputError, ProfileError
 from profiles.places import own_folder
 from profiles.profile import load

@@ -1,0 +1,271 @@
+"""The calibration piece: what a print of `demo:calibration` shows of where the rotary axes are.
+
+Its pads lie on its roofs, each laid there at a pose of its own. How a pad lies tells how far the axes are from where the program
+took them to be: it should be laid at a place of the workpiece, and was laid where the true machine had its tip then. The roof
+below it was laid at the level pose.
+
+Few readings cannot tell all numbers alike: what they do not tell stays where the profile has it. The least sum of squares of
+readings and of changes, each as a share of how far it is usually off (a maximum a posteriori estimate with independent normal
+errors), by Gauss's and Newton's steps.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from math import isnan
+from pathlib import Path
+
+import numpy as np
+
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pose_runs
+from machine.kinematics.table import machine_points, workpiece_path, workpiece_points
+from mdp.directions.unit_vectors import frame_across
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose, rotation, unit
+from profiles.errors import ProfileError
+from profiles.machine import Machine
+
+PADS = 4
+LEAST_LEAN_DEG = 10.0
+EVEN_DEG = 1.0
+WAYS = ("right", "up", "height")  # seen from outside, the pad's holes above
+MARK_MM = 0.1
+HEIGHT_MM = 1.2  # of a pad that lies where it should
+MOST_MARKS = 30.0
+MOST_HEIGHT_MM = 4.0
+NOT_READ = "-"
+EXPECTED = f"two marks and a height are expected, as 2,-1,1.25, {NOT_READ} for what was not read"
+UNKNOWN = ("turn.point_mm x", "turn.point_mm y", "tilt.point_mm", "tilt.point_mm", "tilt.zero_deg")
+USUAL = np.array([0.5, 0.5, 0.5, 0.5, 0.5])  # how far they are off before the first piece, mm and deg
+READ_MM = np.array([0.05, 0.05, 0.07])  # how well each way is read
+# All pads of a piece may seem to lie so much higher up their roofs and over them: a roof is steps, and plastic swells.
+BIAS_MM = np.array([0.0, 0.05, 0.1])
+LEAST_READINGS = 4
+ROUNDS = 20
+STEP, SETTLED = 1e-4, 1e-7
+DOUBTFUL_MM = 0.2
+TEMPLATE = Path(__file__).parent / "piece.html"
+
+
+@dataclass(frozen=True, eq=False)
+class Pad:
+    """A pad by its number (that of its holes), the pose at which it was laid, the middle of its underside, and what is right, up
+    and away from its roof: (3, 3) unit vectors, all in the workpiece frame."""
+
+    number: int
+    pose: Pose
+    middle_mm: Floats
+    ways: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A printed piece: the machine that its program was made for, the pose of its roofs, its pads in order."""
+
+    machine: Machine
+    base: Pose
+    pads: tuple[Pad, ...]
+
+    def laid_aside_mm(self, true: Machine) -> Floats:
+        """(pads, 3) how far each pad lies from its place on its roof along its `ways`, where a machine is truly another one."""
+        errors = [self._error_mm(true, pad, pad.pose) - self._error_mm(true, pad, self.base) for pad in self.pads]
+        return np.array([pad.ways @ error for pad, error in zip(self.pads, errors, strict=True)])
+
+    def _error_mm(self, true: Machine, pad: Pad, pose: Pose) -> Floats:
+        told = machine_points(self.machine, pose, pad.middle_mm[None])
+        error: Floats = workpiece_points(true, pose, told)[0] - pad.middle_mm
+        return error
+
+
+def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
+    """The piece of a program that was made for a machine. Raises ProfileError for a program of anything else."""
+    poses, middles = _laid(program, machine)
+    if sorted(poses) != list(range(1, PADS + 2)):
+        raise ProfileError(f"{name} prints {len(poses)} parts: a program of demo:calibration has {PADS + 1}")
+    pads = tuple(_pad(part - 1, poses[part], middles[part], machine) for part in range(2, PADS + 2))
+    heading = [np.degrees(np.arctan2(pad.ways[2, 1], pad.ways[2, 0])) for pad in pads]
+    quarters = np.diff(heading) % 360.0
+    level = float(rotation(machine, poses[1])[2] @ UP)
+    if level < np.cos(np.radians(EVEN_DEG)) or (np.abs(quarters - 90.0) > EVEN_DEG).any() or not _alike(pads):
+        raise ProfileError(f"{name} is no program of demo:calibration: its parts lie otherwise")
+    return Piece(machine, poses[1], pads)
+
+
+def _alike(pads: Sequence[Pad]) -> bool:
+    """Whether all pads lean by the same, enough to be those of a piece."""
+    leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
+    return bool(leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG)
+
+
+def _laid(program: ParsedProgram, machine: Machine) -> tuple[dict[int, Pose], dict[int, Floats]]:
+    """By part the pose of its beads, and the middle of the lowest of them."""
+    poses: dict[int, Pose] = {}
+    middles: dict[int, Floats] = {}
+    parts = program.part
+    for run, pose in pose_runs(program):
+        rows = run.start + np.flatnonzero(program.kind[run] == MoveKind.EXTRUDE)
+        for part in np.unique(parts[rows]).tolist():
+            own = rows[parts[rows] == part]
+            lowest = own[program.end[own, 2] <= program.end[own, 2].min() + 1e-3]
+            if part > 0 and poses.setdefault(part, pose) == pose and part not in middles:
+                points = workpiece_path(machine, program.end[lowest])
+                middles[part] = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return poses, middles
+
+
+def _pad(number: int, pose: Pose, middle_mm: Floats, machine: Machine) -> Pad:
+    away = rotation(machine, pose)[2]
+    right = unit(np.cross(UP, away)) if abs(away @ UP) < 1.0 - 1e-6 else np.array([1.0, 0.0, 0.0])
+    return Pad(number, pose, middle_mm, np.array([right, np.cross(away, right), away]))
+
+
+def parse_readings(text: str) -> Floats:
+    """(pads, 3) mm aside, up and too high, nan for what was not read, of a text as `2,-1,1.25 0,0.5,- -,-,- 1,0,1.2`.
+
+    Raises ProfileError for one that is no such text, or has numbers that nobody can have read.
+
+    >>> parse_readings("2,-1,1.25 0,0.5,- -,-,- 1,0,1.2")[0].round(6).tolist()
+    [0.2, -0.1, 0.05]
+    """
+    pads = text.split()
+    if len(pads) != PADS:
+        raise ProfileError(f"--readings {text!r} tells of {len(pads)} pads: {PADS} are expected, with a space between them")
+    return np.array([parse_pad(pad, number) for number, pad in enumerate(pads, start=1)])
+
+
+def parse_pad(text: str, number: int) -> list[float]:
+    """The three readings of a pad in mm, nan for what was not read. Raises ProfileError naming the pad."""
+    words = text.replace(",", " ").split()
+    if len(words) not in (2, 3):
+        raise ProfileError(f"pad {number}: {text!r} cannot be read: {EXPECTED}")
+    values = [_number(word, text, number) for word in words] + [float("nan")] * (3 - len(words))
+    for way, value, most in zip(WAYS, values, (MOST_MARKS, MOST_MARKS, MOST_HEIGHT_MM), strict=True):
+        least = 0.0 if way == "height" else -most
+        if not isnan(value) and not least <= value <= most:
+            raise ProfileError(f"pad {number}: {way} {value:g} cannot be: {least:g} to {most:g} is allowed")
+    return [MARK_MM * values[0], MARK_MM * values[1], values[2] - HEIGHT_MM]
+
+
+def readings_text(readings_mm: Floats) -> str:
+    """The text that `parse_readings` makes these of."""
+    told = (readings_mm + np.array([0.0, 0.0, HEIGHT_MM])) / np.array([MARK_MM, MARK_MM, 1.0])
+    words = [[NOT_READ if isnan(value) else f"{round(value, 3) + 0.0:g}" for value in pad] for pad in told.tolist()]
+    return " ".join(map(",".join, words))
+
+
+def _number(word: str, text: str, number: int) -> float:
+    try:
+        return float("nan") if word == NOT_READ else float(word)
+    except ValueError:
+        raise ProfileError(f"pad {number}: {text!r} cannot be read: {EXPECTED}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """A machine with the found numbers, what each reading differs from them (pieces x pads, 3; nan: not read), and how sure each
+    number is: one sigma, mm or deg, in the order of UNKNOWN."""
+
+    machine: Machine
+    left_mm: Floats
+    sigma: Floats
+    changes: Floats
+
+    @property
+    def significant(self) -> bool:
+        """Whether any number changes by more than its uncertainty."""
+        return bool((np.abs(self.changes) > self.sigma).any())
+
+    @property
+    def doubtful(self) -> tuple[int, int, str] | None:
+        """Piece, pad and way of the reading that fits least, each counted from 1; None where all fit."""
+        off = np.nan_to_num(np.abs(self.left_mm))
+        worst = np.unravel_index(int(off.argmax()), off.shape)
+        if off[worst] <= DOUBTFUL_MM:
+            return None
+        piece, pad = divmod(int(worst[0]), PADS)
+        return piece + 1, pad + 1, WAYS[int(worst[1])]
+
+
+def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> Correction:
+    """The machine that explains (pieces, pads, 3) readings, nan where one was not taken.
+
+    Raises ProfileError for too few of them.
+    """
+    read = ~np.isnan(readings_mm).reshape(-1)
+    if read.sum() < LEAST_READINGS:
+        raise ProfileError(f"{read.sum()} readings of the pads are told: at least {LEAST_READINGS} are needed")
+    target, weights = readings_mm.reshape(-1)[read], np.tile(1.0 / READ_MM, readings_mm.size // len(READ_MM))[read]
+    places = np.kron(np.eye(len(pieces)), _biases(pieces[0]))[read]
+    state = np.zeros(len(UNKNOWN) + places.shape[1])  # of numbers and biases, each as a share of what is usual
+    for _ in range(ROUNDS):
+        changes, biases = USUAL * state[: len(UNKNOWN)], state[len(UNKNOWN) :]
+        left = target - _explained(machine, pieces, changes)[read] - places @ biases
+        slope = np.hstack([_slope(machine, pieces, changes)[read] * USUAL, places]) * weights[:, None]
+        system = np.vstack([slope, np.eye(len(state))])
+        step = np.linalg.lstsq(system, np.append(left * weights, -state), rcond=None)[0]
+        if np.abs(step).max() < SETTLED:
+            break
+        state = state + step
+    off = np.full(readings_mm.size, np.nan)
+    off[read] = left
+    sigma = USUAL * np.sqrt(np.diag(np.linalg.inv(system.T @ system))[: len(UNKNOWN)])
+    return Correction(_changed(machine, changes), off.reshape(-1, len(WAYS)), sigma, changes)
+
+
+def slope_of(machine: Machine, piece: Piece) -> Floats:
+    """(pads x ways, UNKNOWN) by how much a reading of a piece changes where a number of a machine changes by 1."""
+    return _slope(machine, [piece], np.zeros(len(UNKNOWN)))
+
+
+def _biases(piece: Piece) -> Floats:
+    """(pads x ways, biases) by how much each reading of a piece is off where a bias is as large as usual."""
+    return np.tile(np.diag(BIAS_MM)[:, BIAS_MM > 0.0], (len(piece.pads), 1))
+
+
+def _explained(machine: Machine, pieces: Sequence[Piece], changes: Floats) -> Floats:
+    true = _changed(machine, changes)
+    return np.concatenate([piece.laid_aside_mm(true).reshape(-1) for piece in pieces])
+
+
+def _slope(machine: Machine, pieces: Sequence[Piece], changes: Floats) -> Floats:
+    columns = [
+        _explained(machine, pieces, changes + step) - _explained(machine, pieces, changes - step)
+        for step in STEP * np.eye(len(UNKNOWN))
+    ]
+    return np.column_stack(columns) / (2.0 * STEP)
+
+
+def _changed(machine: Machine, changes: Floats) -> Machine:
+    """The machine whose numbers differ so from its own, in the order of UNKNOWN; the tilt axis moves across itself."""
+    x, y, z = machine.turn.point_mm
+    tilt_point = np.array(machine.tilt.point_mm) + changes[2:4] @ frame_across(unit(machine.tilt.axis))
+    tilt = {"point_mm": tuple(tilt_point.tolist()), "zero_deg": machine.tilt.zero_deg + float(changes[4])}
+    turn = {"point_mm": (x + float(changes[0]), y + float(changes[1]), z)}
+    update = {"tilt": machine.tilt.model_copy(update=tilt), "turn": machine.turn.model_copy(update=turn)}
+    return machine.model_copy(update=update)
+
+
+def piece_page(piece: Piece, machine_name: str, file_name: str) -> bytes:
+    """The page of a printed piece; machine_name and file_name are those of the command that saves the corrections.
+
+    Its script adds reading after reading to the estimate of `correct`, with the slope at the profile's own numbers.
+    """
+    machine = piece.machine
+    values = {
+        "machine": machine_name,
+        "file": file_name,
+        "markMm": MARK_MM,
+        "heightMm": HEIGHT_MM,
+        "slope": np.hstack([slope_of(machine, piece), _biases(piece)]).tolist(),
+        "usual": [*USUAL.tolist(), *[1.0] * np.count_nonzero(BIAS_MM)],
+        "readMm": READ_MM.tolist(),
+        "turnMm": list(machine.turn.point_mm),
+        "tiltMm": list(machine.tilt.point_mm),
+        "acrossTilt": frame_across(unit(machine.tilt.axis)).tolist(),
+        "zeroDeg": machine.tilt.zero_deg,
+        "letters": [machine.turn.letter, machine.tilt.letter],
+    }
+    packed = json.dumps(values, allow_nan=False).replace("<", "\\u003c")
+    text = TEMPLATE.read_text(encoding="utf-8")
+    return text.replace("<!--TITLE-->", escape(f"{file_name} on {machine.name}")).replace("/*VALUES*/", packed).encode()
