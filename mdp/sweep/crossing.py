@@ -18,7 +18,7 @@ import numpy as np
 from mdp.kernels import arrays
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
-from mdp.mesh import Floats, Ints, Mesh, dot
+from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import step_share
 from mdp.plane import Plane
 from mdp.sweep.facets import Indices, Layout, Scars, class_along
@@ -109,23 +109,26 @@ NO_RIM = Rim(0.0, 0.0, 0.0)  # of what stands on the platform
 def measure_rim(mesh: Mesh, weights: Floats, plane: Plane, feather: float) -> Rim:
     """The rim of a cut through a mesh on whose (m,) faces a mm of rim counts so much. The same as the sweep's rim, for one
     plane."""
-    corners_mm = plane.heights_mm(mesh.vertices)[mesh.faces]
-    return sum_chords(corners_mm, dot(mesh.normals, plane.normal), mesh.areas_mm2, weights, feather)
+    faces = mesh.faces, mesh.normals, mesh.areas_mm2, weights
+    return sum_chords(faces, plane.heights_mm(mesh.vertices), plane.normal, feather)
 
 
 @kernel
-def sum_chords(corners_mm: Floats, cosines: Floats, areas_mm2: Floats, weights: Floats, feather: float) -> Rim:
-    """The rim at height 0 of faces whose corners lie at (m, 3) heights; cosines (m,) of face and plane."""
+def sum_chords(faces: tuple[Ints, Floats, Floats, Floats], heights: Floats, normal: Floats, feather: float) -> Rim:
+    """The rim of a plane of that normal, over which the vertices lie at (n,) heights, on faces given by their corners (m, 3),
+    normals (m, 3), areas and weights (m,)."""
+    corners, normals, areas_mm2, weights = faces
     length, weighted, feathered = 0.0, 0.0, 0.0
-    for f in range(len(corners_mm)):
-        p, q, r = corners_mm[f, 0], corners_mm[f, 1], corners_mm[f, 2]
+    for f in range(len(corners)):
+        p, q, r = heights[corners[f, 0]], heights[corners[f, 1]], heights[corners[f, 2]]
         if weights[f] <= 0.0 or min(p, q, r) >= -ROUNDING_MM or max(p, q, r) <= ROUNDING_MM:
             continue
+        cosine = normals[f, 0] * normal[0] + normals[f, 1] * normal[1] + normals[f, 2] * normal[2]
         chord = 2.0 * areas_mm2[f] * chord_at(0.0, ramp_of(p, q, r))
-        length += chord * weigh_chord(cosines[f], 0.0)
-        weighted += chord * weights[f] * weigh_chord(cosines[f], feather)
-        if abs(cosines[f]) > FEATHER_COSINE:
-            feathered += chord * weigh_chord(cosines[f], 0.0)
+        length += chord * weigh_chord(cosine, 0.0)
+        weighted += chord * weights[f] * weigh_chord(cosine, feather)
+        if abs(cosine) > FEATHER_COSINE:
+            feathered += chord * weigh_chord(cosine, 0.0)
     return Rim(length, weighted, feathered)
 
 
