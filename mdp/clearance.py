@@ -47,20 +47,16 @@ def least_tip_height_mm(machine: Machine, pose: Pose) -> float:
 
 def lowest_body(machine: Machine, pose: Pose) -> LowestBody:
     """The body that asks for that height."""
-    normal = rotation(machine, pose) @ UP
-    across, along = hypot(normal[0], normal[1]), float(normal[2])
+    p, q, r = (rotation(machine, pose) @ UP).tolist()
+    across = hypot(p, q)
     if across < 1e-9:
         return 0.0, "nozzle tip", (0.0, 0.0, 0.0)
-    aside = -normal[:2] / across
     needed: list[LowestBody] = []
     for radius, height in machine.head.silhouette_mm:
-        point = float(radius * aside[0]), float(radius * aside[1]), float(height)
-        needed.append((radius * across - height * along, "hot end", point))
+        needed.append((radius * across - height * r, "hot end", (-radius * p / across, -radius * q / across, height)))
     for box in machine.head.boxes:
-        points = corners(box.min_mm, box.max_mm)
-        heights = points @ normal
-        x, y, z = (float(value) for value in points[int(np.argmin(heights))])
-        needed.append((float(-heights.min()), box.name, (x, y, z)))
+        x, y, z = (most if n < 0.0 else least for n, least, most in zip((p, q, r), box.min_mm, box.max_mm, strict=True))
+        needed.append((-(x * p + y * q + z * r), box.name, (x, y, z)))
     needed_mm, name, point_mm = max(needed)
     return max(0.0, needed_mm + machine.clearance_mm), name, point_mm
 

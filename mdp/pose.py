@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from math import asin, atan2, ceil, cos, degrees, floor, hypot, radians, sin
+from math import asin, atan2, ceil, cos, degrees, floor, hypot, radians, sin, sqrt
 
 import numpy as np
 
@@ -23,6 +23,7 @@ SINGULAR = 1e-7  # sine of an angle that no table can show; nearer to the singul
 KNOWN = 256  # rotations
 DECIMALS = 9  # of an angle as a file or a person says it: off by less than a tenth of a micrometre over a metre
 LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
+Three = list[float]  # a vector; numpy's operations on a single one take longer than all else that a pose needs
 
 
 @dataclass(frozen=True)
@@ -40,16 +41,19 @@ def level(machine: Machine) -> Pose:
 
 def about(axis: Floats, angle_rad: float) -> Floats:
     """(3, 3) right-handed rotation about a unit axis (Rodrigues' formula)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Floats = np.eye(3) + sin(angle_rad) * cross + (1.0 - cos(angle_rad)) * (cross @ cross)
-    return rotation
+    (x, y, z), s, t = axis.tolist(), sin(angle_rad), 1.0 - cos(angle_rad)
+    rows = [
+        [1.0 - t * (y * y + z * z), t * x * y - s * z, t * x * z + s * y],
+        [t * x * y + s * z, 1.0 - t * (x * x + z * z), t * y * z - s * x],
+        [t * x * z - s * y, t * y * z + s * x, 1.0 - t * (x * x + y * y)],
+    ]
+    return np.array(rows)
 
 
 def unit(vector: object) -> Floats:
     """The vector scaled to length 1."""
     array = np.asarray(vector, dtype=np.float64)
-    return array / np.linalg.norm(array)
+    return array / sqrt(array @ array)
 
 
 def turned_by(angles_deg: tuple[float, float, float]) -> Floats:
@@ -122,7 +126,8 @@ def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = Non
     """
     near = machine.turn.zero_deg if near_turn_deg is None else near_turn_deg
     reachable = []
-    for tilt_rad, turn_rad in _angles(unit(machine.tilt.axis), unit(machine.turn.axis), direction):
+    axes = unit(machine.tilt.axis).tolist(), unit(machine.turn.axis).tolist()
+    for tilt_rad, turn_rad in _angles(*axes, direction.tolist()):
         tilt = machine.tilt.zero_deg - machine.tilt.sign * degrees(tilt_rad)
         turn = near if turn_rad is None else machine.turn.zero_deg - machine.turn.sign * degrees(turn_rad)
         tilt_inside = nearest_turn(tilt, machine.tilt.reach_deg, machine.tilt.zero_deg)
@@ -201,18 +206,18 @@ def _any_turn_serves(machine: Machine, pose: Pose) -> bool:
     return hypot(x, y) < SINGULAR
 
 
-def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tuple[float, float | None]]:
+def _angles(tilt_axis: Three, turn_axis: Three, direction: Three) -> list[tuple[float, float | None]]:
     """Rotations (tilt, turn), radians, with R_tilt R_turn direction = up: subproblem 2 of Paden and Kahan.
 
     The turned direction c has the same turn_axis component as `direction` and the same tilt_axis component as up. Its third
     component is the height of the corner c of a spherical triangle whose sides are angles; taken from their sines it keeps its
     digits where c comes near to the plane of the axes (L'Huilier's way of writing the triple product).
     """
-    k = float(tilt_axis @ turn_axis)
-    p, q = float(turn_axis @ direction), float(tilt_axis @ UP)
+    up = UP.tolist()
+    k, p, q = _dot(tilt_axis, turn_axis), _dot(turn_axis, direction), tilt_axis[2]
     determinant = 1.0 - k * k
     along_turn, along_tilt = (p - k * q) / determinant, (q - k * p) / determinant
-    a, b, c = _angle(turn_axis, direction), _angle(tilt_axis, UP), _angle(tilt_axis, turn_axis)
+    a, b, c = _angle(turn_axis, direction), _angle(tilt_axis, up), _angle(tilt_axis, turn_axis)
     s = 0.5 * (a + b + c)
     triple2 = 4.0 * sin(s) * sin(s - a) * sin(s - b) * sin(s - c)
     if triple2 < -SINGULAR * SINGULAR:
@@ -221,8 +226,9 @@ def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tup
     length = max(triple2, 0.0) ** 0.5 / determinant
     solutions: list[tuple[float, float | None]] = []
     for side in (1.0, -1.0):
-        turned = along_turn * turn_axis + along_tilt * tilt_axis + side * length * normal
-        tilt = _turn_between(tilt_axis, turned, UP)
+        parts = zip(turn_axis, tilt_axis, normal, strict=True)
+        turned = [along_turn * x + along_tilt * y + side * length * z for x, y, z in parts]
+        tilt = _turn_between(tilt_axis, turned, up)
         free = hypot(*_cross(turn_axis, direction)) < SINGULAR
         solutions.append((tilt, None if free else _turn_between(turn_axis, direction, turned)))
         if length < SINGULAR:
@@ -230,18 +236,23 @@ def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tup
     return solutions
 
 
-def _angle(a: Floats, b: Floats) -> float:
+def _angle(a: Three, b: Three) -> float:
     """Angle between two unit vectors, radians, exact for small ones too."""
-    return atan2(hypot(*_cross(a, b)), float(a @ b))
+    return atan2(hypot(*_cross(a, b)), _dot(a, b))
 
 
-def _turn_between(axis: Floats, a: Floats, b: Floats) -> float:
+def _turn_between(axis: Three, a: Three, b: Three) -> float:
     """Angle about `axis` that turns the part of a across it onto that of b, radians in (-pi, pi]."""
-    across_a, across_b = a - axis * (axis @ a), b - axis * (axis @ b)
-    return atan2(float(axis @ _cross(across_a, across_b)), float(across_a @ across_b))
+    across_a, across_b = ([x - n * _dot(axis, vector) for x, n in zip(vector, axis, strict=True)] for vector in (a, b))
+    return atan2(_dot(axis, _cross(across_a, across_b)), _dot(across_a, across_b))
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    """Product of two single vectors: numpy's own takes longer than all else that a pose needs."""
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+def _dot(a: Three, b: Three) -> float:
+    """Product of two single vectors, a number."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Three, b: Three) -> Three:
+    """Product of two single vectors, a vector."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]

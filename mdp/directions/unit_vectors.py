@@ -35,9 +35,15 @@ def _lattice(z: Floats, place: Floats) -> Floats:
 def framed(directions: Floats, axes: Floats = AXES) -> tuple[Floats, Floats]:
     """(k, 3) unit directions for kernels, and (k, 2, 3) with each of them the vector across it and the one of (3, 3) axes that it
     leans on least, and the one across both."""
-    aside = np.cross(axes[np.abs(np.round(directions @ axes.T, 9)).argmin(axis=1)], directions)
+    aside = _cross(axes[np.abs(np.round(directions @ axes.T, 9)).argmin(axis=1)], directions)
     aside /= np.sqrt(np.vecdot(aside, aside))[:, None]
-    return np.array(directions), np.stack([aside, np.cross(directions, aside)], axis=1)
+    return np.array(directions), np.stack([aside, _cross(directions, aside)], axis=1)
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    """(k, 3) products of vectors. numpy's own takes five times as long for a single one."""
+    (a, b, c), (p, q, r) = first.T, second.T
+    return np.stack([b * r - c * q, c * p - a * r, a * q - b * p], axis=1)
 
 
 def frame_across(direction: Floats) -> Floats:

@@ -6,14 +6,14 @@ plane, and however the plane is tilted.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import atan2, ceil, cos, pi, radians, sin
 
 import numpy as np
 
 from mdp.directions.unit_vectors import frame_across
-from mdp.mesh import Floats, Ints, Mesh, dot
+from mdp.mesh import Floats, Ints, Mesh
 from mdp.plane import Plane
-from mdp.pose import about
 from mdp.sweep.crossing import sum_chords
 from mdp.sweep.sweep import Remainder, gains
 
@@ -29,18 +29,17 @@ NEAR_MM = 1e-6  # corners nearer to a plane count as above it, or rims along edg
 
 @dataclass(frozen=True, eq=False)
 class _Surface:
-    """Vertices, faces, normals and areas near a plane, and (m,) 1 where a rim is seen."""
+    """Vertices, and the faces near a plane on which a rim is seen, with their normals and areas."""
 
     vertices: Floats
     faces: Ints
     normals: Floats
     areas_mm2: Floats
-    seen: Floats
 
     def rim_mm(self, plane: Plane) -> float:
         """The length of a plane's rim where it is seen."""
-        corners_mm, cosines = self._heights_mm(plane)[self.faces], dot(self.normals, plane.normal)
-        return float(sum_chords(corners_mm, cosines, self.areas_mm2, self.seen, 0.0).length_mm)
+        faces = self.faces, self.normals, self.areas_mm2, self.areas_mm2
+        return float(sum_chords(faces, self._heights_mm(plane), plane.normal, 0.0).length_mm)
 
     def _heights_mm(self, plane: Plane) -> Floats:
         heights: Floats = plane.heights_mm(self.vertices)
@@ -49,9 +48,8 @@ class _Surface:
 
     def centre_mm(self, plane: Plane) -> Floats:
         """(3,) the middle of a plane's rim."""
-        heights = self._heights_mm(plane)[self.faces]
-        crossed = (heights.min(axis=1) < 0.0) & (heights.max(axis=1) > 0.0) & (self.seen > 0.0)
-        near = self.vertices[self.faces[crossed]].reshape(-1, 3)
+        a, b, c = (self._heights_mm(plane) > 0.0)[self.faces.T]
+        near = self.vertices[self.faces[(a != b) | (b != c)]].reshape(-1, 3)
         middle = 0.5 * (near.min(axis=0) + near.max(axis=0))
         centre: Floats = middle - plane.heights_mm(middle[None])[0] * plane.normal
         return centre
@@ -82,15 +80,14 @@ def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surfac
     wide_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     far_mm = 2.0 * reach_mm + wide_mm * sin(radians(REACH_DEG))
     around = heights[mesh.faces]
-    kept = (around.min(axis=1) <= far_mm) & (around.max(axis=1) >= -far_mm)
-    weights = (seen[kept] > 0.0).astype(np.float64)
-    return _Surface(mesh.vertices, mesh.faces[kept], np.ascontiguousarray(mesh.normals[kept]), mesh.areas_mm2[kept], weights)
+    kept = (around.min(axis=1) <= far_mm) & (around.max(axis=1) >= -far_mm) & (seen > 0.0)
+    return _Surface(mesh.vertices, mesh.faces[kept], mesh.normals[kept], mesh.areas_mm2[kept])
 
 
 def _first_look(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_mm: float) -> Iterator[tuple[float, Plane]]:
     """Planes whose rim is shorter than those of their neighbours along their normal, with their rims: a sweep along each
     direction."""
-    step_mm, directions = 2.0 * reach_mm / OFFSETS, np.array(list(_directions(normal)))
+    step_mm, directions = 2.0 * reach_mm / OFFSETS, np.vstack([normal, *map(partial(_ring, normal), range(1, RINGS + 1))])
     remainder = Remainder(mesh, np.zeros(len(mesh.faces), dtype=np.bool_), np.where(seen > 0.0, 1.0, 0.0))
     swept = gains(remainder, directions, step_mm, NOTHING_RISKY)
     all_offsets_mm = swept.offsets_mm(step_mm)
@@ -115,14 +112,17 @@ def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plan
     return [plane for _, plane in taken]
 
 
-def _directions(normal: Floats) -> Iterator[Floats]:
-    """A direction and rings of others around it, up to the reach."""
+def _ring(normal: Floats, number: int) -> Floats:
+    """(k, 3) directions around one; those of the last ring lie as far from it as the reach."""
+    return _leaning(normal, radians(REACH_DEG * number / RINGS), pi * np.arange(6 * number) / (3 * number))
+
+
+def _leaning(normal: Floats, tilt_rad: float, turns_rad: Floats) -> Floats:
+    """(k, 3) directions that lean away from one by an angle, each to another (k,) side."""
     aside, across = frame_across(normal)
-    yield normal
-    for ring in range(1, RINGS + 1):
-        for k in range(6 * ring):
-            turn, tilt = pi * k / (3 * ring), radians(REACH_DEG * ring / RINGS)
-            yield cos(tilt) * normal + sin(tilt) * (cos(turn) * aside + sin(turn) * across)
+    sides = np.cos(turns_rad)[:, None] * aside + np.sin(turns_rad)[:, None] * across
+    leaning: Floats = cos(tilt_rad) * normal + sin(tilt_rad) * sides
+    return leaning
 
 
 def _refined(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
@@ -146,15 +146,11 @@ def _refined(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
 
 def _around(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Iterator[Plane]:
     """Planes one step away."""
-    centre, tilt = surface.centre_mm(plane), radians(step_deg)
     yield Plane(plane.normal, plane.offset_mm + step_mm)
     yield Plane(plane.normal, plane.offset_mm - step_mm)
-    aside, across = frame_across(plane.normal)
-    for k in range(8):
-        axis = cos(0.25 * pi * k) * aside + sin(0.25 * pi * k) * across
-        normal = about(axis, tilt) @ plane.normal
-        normal /= np.linalg.norm(normal)
-        yield Plane(normal, float(normal @ centre))
+    normals = _leaning(plane.normal, radians(step_deg), pi * (np.arange(8) - 2) / 4)
+    for normal, offset_mm in zip(normals, normals @ surface.centre_mm(plane), strict=True):
+        yield Plane(normal, float(offset_mm))
 
 
 def _is_neck(surface: _Surface, neck: Plane, plane: Plane, reach_mm: float) -> bool:

@@ -116,7 +116,7 @@ def anchor_of(layout: Layout, v: int) -> int:
         triangles, inward = layout.triangles, table(2, 3)
         for axis in range(3):
             inward[0, axis], inward[1, axis] = triangles.vertices[v, axis], -layout.vertex_normals[axis, v]
-        layout.anchors[v] = first_hit(triangles, inward, np.inf, v, ANY_FACE)
+        layout.anchors[v] = first_hit(triangles, inward, np.inf, v, ANY_FACE, 0.0)
     return int(layout.anchors[v])
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from mdp.kernels import arrays
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
-from mdp.mesh import Floats, Ints, Mesh, dot
+from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import step_share
 from mdp.plane import Plane
 from mdp.sweep.facets import Indices, Layout, Scars, class_along
@@ -109,23 +109,26 @@ NO_RIM = Rim(0.0, 0.0, 0.0)  # of what stands on the platform
 def measure_rim(mesh: Mesh, weights: Floats, plane: Plane, feather: float) -> Rim:
     """The rim of a cut through a mesh on whose (m,) faces a mm of rim counts so much. The same as the sweep's rim, for one
     plane."""
-    corners_mm = plane.heights_mm(mesh.vertices)[mesh.faces]
-    return sum_chords(corners_mm, dot(mesh.normals, plane.normal), mesh.areas_mm2, weights, feather)
+    faces = mesh.faces, mesh.normals, mesh.areas_mm2, weights
+    return sum_chords(faces, plane.heights_mm(mesh.vertices), plane.normal, feather)
 
 
 @kernel
-def sum_chords(corners_mm: Floats, cosines: Floats, areas_mm2: Floats, weights: Floats, feather: float) -> Rim:
-    """The rim at height 0 of faces whose corners lie at (m, 3) heights; cosines (m,) of face and plane."""
+def sum_chords(faces: tuple[Ints, Floats, Floats, Floats], heights: Floats, normal: Floats, feather: float) -> Rim:
+    """The rim of a plane of that normal, over which the vertices lie at (n,) heights, on faces given by their corners (m, 3),
+    normals (m, 3), areas and weights (m,)."""
+    corners, normals, areas_mm2, weights = faces
     length, weighted, feathered = 0.0, 0.0, 0.0
-    for f in range(len(corners_mm)):
-        p, q, r = corners_mm[f, 0], corners_mm[f, 1], corners_mm[f, 2]
+    for f in range(len(corners)):
+        p, q, r = heights[corners[f, 0]], heights[corners[f, 1]], heights[corners[f, 2]]
         if weights[f] <= 0.0 or min(p, q, r) >= -ROUNDING_MM or max(p, q, r) <= ROUNDING_MM:
             continue
+        cosine = normals[f, 0] * normal[0] + normals[f, 1] * normal[1] + normals[f, 2] * normal[2]
         chord = 2.0 * areas_mm2[f] * chord_at(0.0, ramp_of(p, q, r))
-        length += chord * weigh_chord(cosines[f], 0.0)
-        weighted += chord * weights[f] * weigh_chord(cosines[f], feather)
-        if abs(cosines[f]) > FEATHER_COSINE:
-            feathered += chord * weigh_chord(cosines[f], 0.0)
+        length += chord * weigh_chord(cosine, 0.0)
+        weighted += chord * weights[f] * weigh_chord(cosine, feather)
+        if abs(cosine) > FEATHER_COSINE:
+            feathered += chord * weigh_chord(cosine, 0.0)
     return Rim(length, weighted, feathered)
 
 
@@ -220,49 +223,74 @@ def _add_volumes(weights: Floats, ramps: Floats, shares: Floats, sums: Floats) -
 def _kind_of(scars: Scars, row: int, f: int, cosine: float) -> int:
     """What a face needs: 0: no support, 1: support printed upright only, 2: along the direction only, 3: both; 4 and 5: as 2 and
     3, and along the direction it is unsupportable; 6 and 7: as 3 and 5, and no cut can save it."""
-    kind = int(scars.faces.risky[f]) + 2 * (class_along(scars, row, f) if cosine < scars.risky_below else 0)
+    kind = int(scars.faces.risky[f]) + 2 * class_along(scars, row, f) * int(cosine < scars.risky_below)
     if len(scars.unavoidable) > 0 and scars.unavoidable[f]:
         kind = 6 if kind == 3 else 7 if kind == 5 else kind
     return kind
 
 
+@no_nrt
+def _share(ahead: int, ramps: Floats, shares: Floats) -> None:
+    """Share above and chord at, (2, k), the column that lies `ahead` columns after the first that each face crosses."""
+    for k in range(ramps.shape[1]):
+        ramp = ramps[0, k], ramps[1, k], ramps[2, k], ramps[3, k], ramps[4, k]
+        height = max(np.ceil(ramp[0]), 0.0) + ahead
+        inside = 1.0 if height < ramp[2] else 0.0
+        shares[0, k], shares[1, k] = inside * share_above(height, ramp), inside * chord_at(height, ramp)
+
+
 @helper
 def integrate_scars(scars: Scars, row: int, grid: OffsetGrid) -> Floats:
-    """(n + 1, KINDS + 3) what the faces have above each offset, the last row without use: area by their kind, see _kind_of, what
-    their stairs count printed straight up and along the direction, and at it their weighted rim times the step."""
-    faces, heights, d = scars.faces, grid.heights, grid.direction
-    corners, normals, areas = faces.corners, faces.normals, faces.areas_mm2
-    n, wholes, shares = grid.columns, table(grid.columns + 1, KINDS + 3), table(grid.columns + 1, KINDS + 3)
+    """(n + AHEAD + 1, KINDS + 3) what the faces have above each offset, the rows beyond n without use: area by their kind, see
+    _kind_of, what their stairs count printed straight up and along the direction, and at it their weighted rim times the step."""
+    faces, n = scars.faces, grid.columns
+    corners, normals = faces.corners, faces.normals
+    wholes, sums, block = table(n + 1, KINDS + 3), table(n + AHEAD + 1, KINDS + 3), table(6 + 2 * AHEAD, BLOCK)
+    for begin in range(0, corners.shape[1], BLOCK):
+        end = min(begin + BLOCK, corners.shape[1])
+        ramps, cosines, shares = block[:5, : end - begin], block[5, : end - begin], block[6:, : end - begin]
+        _lay_ramps(corners[:, begin:end], grid.heights, ramps)
+        arrays.dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], grid.direction, cosines)
+        for ahead in range(AHEAD):
+            _share(ahead, ramps, shares[2 * ahead : 2 * ahead + 2])
+        _add_scars(scars, (row, begin), block, wholes, sums)
+    for column in range(n - 1, -1, -1):
+        for which in range(KINDS + 3):
+            sums[column, which] += wholes[column + 1, which]
+            wholes[column, which] += wholes[column + 1, which]
+    return sums
+
+
+@no_nrt
+def _add_scars(scars: Scars, place: tuple[int, int], block: Floats, wholes: Floats, sums: Floats) -> None:
+    """Add a block of faces, whose first is given with the row of the direction, to the sums of the columns."""
+    faces, (row, begin) = scars.faces, place
     seams, stairs = len(faces.seam_weights) > 0, len(faces.seam_weights) > 0 and len(faces.stair_weights) > 0
-    for f in range(corners.shape[1]):
-        cosine = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
-        kind = _kind_of(scars, row, f, cosine)
-        if kind == 0 and not seams:
-            continue
-        p, q, r = heights[corners[0, f]], heights[corners[1, f]], heights[corners[2, f]]
-        first, end = column_over(min(p, q, r)), column_over(max(p, q, r))
-        counted, upright, leaning = areas[f] * faces.counts[f], 0.0, 0.0
+    for f in range(begin, min(begin + BLOCK, faces.corners.shape[1])):
+        k = f - begin
+        ramp, cosine = (block[0, k], block[1, k], block[2, k], block[3, k], block[4, k]), block[5, k]
+        kind, first, end = _kind_of(scars, row, f, cosine), column_over(ramp[0]), column_over(ramp[2])
+        counted, upright, leaning, chord = faces.areas_mm2[f] * faces.counts[f], 0.0, 0.0, 0.0
+        if seams:
+            chord = 2.0 * faces.areas_mm2[f] * faces.seam_weights[f] * weigh_chord(cosine, scars.feather)
         if stairs:
-            upright = areas[f] * faces.stair_weights[f] * step_share(normals[2, f])
-            leaning = areas[f] * faces.stair_weights[f] * step_share(cosine)
+            stair = faces.areas_mm2[f] * faces.stair_weights[f]
+            upright, leaning = stair * step_share(faces.normals[2, f]), stair * step_share(cosine)
         wholes[first, kind] += counted
         wholes[first, STAIRS_UP] += upright
         wholes[first, STAIRS] += leaning
-        if first < end:
-            ramp = ramp_of(p, q, r)
-            chord = 2.0 * areas[f] * faces.seam_weights[f] * weigh_chord(cosine, scars.feather) if seams else 0.0
-            for column in range(first, end):
-                share = share_above(float(column), ramp)
-                shares[column, kind] += counted * share
-                shares[column, STAIRS_UP] += upright * share
-                shares[column, STAIRS] += leaning * share
-                shares[column, RIM] += chord * chord_at(float(column), ramp)
-    for which in range(KINDS + 3):
-        above = 0.0
-        for column in range(n - 1, -1, -1):
-            above += wholes[column + 1, which]
-            shares[column, which] += above
-    return shares
+        for ahead in range(AHEAD):
+            share, column = block[6 + 2 * ahead, k], first + ahead
+            sums[column, kind] += counted * share
+            sums[column, STAIRS_UP] += upright * share
+            sums[column, STAIRS] += leaning * share
+            sums[column, RIM] += chord * block[7 + 2 * ahead, k]
+        for column in range(first + AHEAD, end):
+            share = share_above(float(column), ramp)
+            sums[column, kind] += counted * share
+            sums[column, STAIRS_UP] += upright * share
+            sums[column, STAIRS] += leaning * share
+            sums[column, RIM] += chord * chord_at(float(column), ramp)
 
 
 @helper

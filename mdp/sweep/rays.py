@@ -91,11 +91,11 @@ def _distance(p: Floats, q: Floats, r: Floats, origin: Floats, ray: Floats) -> f
 
 
 @helper
-def first_hit(tree: TriangleTree, placed_ray: Floats, reach: float, own_vertex: int, facing: float) -> int:
+def first_hit(tree: TriangleTree, placed_ray: Floats, reach: float, own_vertex: int, facing: float, enough: float) -> int:
     """The first face that a ray, its origin and unit direction (2, 3), meets within reach and whose normal has at least the
     cosine `facing` with it; -1: none.
 
-    The faces around own_vertex are left out (-1: around none).
+    The faces around own_vertex are left out (-1: around none). A face that is nearer than `enough` will do, first or not.
     """
     vertices, faces, normals, origin, ray = tree.vertices, tree.faces, tree.normals, placed_ray[0], placed_ray[1]
     leaves = len(tree.low) // 2
@@ -123,6 +123,8 @@ def first_hit(tree: TriangleTree, placed_ray: Floats, reach: float, own_vertex: 
             t = _distance(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], origin, ray)
             if t < reach:
                 reach, hit = t, f
+                if reach < enough:
+                    return hit
     return hit
 
 
@@ -144,7 +146,7 @@ def faces_met(tree: TriangleTree, rays: Floats, reach: float, facing: float = AN
 def _find_met(begin: int, end: int, tree: TriangleTree, rays: tuple[Floats, float, float], met: Ints) -> None:
     placed, reach, facing = rays
     for k in range(begin, end):
-        met[k] = first_hit(tree, placed[k], reach, -1, facing)
+        met[k] = first_hit(tree, placed[k], reach, -1, facing, 0.0)
 
 
 def blocked_shares(
@@ -182,7 +184,7 @@ def _find_blocked(begin: int, end: int, tree: TriangleTree, bundles: tuple[Float
             for axis in range(3):
                 ray[0, axis] = places[f, axis]
                 ray[1, axis] = rays[k, 0] * x[axis] + rays[k, 1] * y[axis] + rays[k, 2] * z[axis]
-            blocked += int(first_hit(tree, ray, reach, -1, ANY_FACE) >= 0)
+            blocked += int(first_hit(tree, ray, reach, -1, ANY_FACE, reach) >= 0)
         out[f] = blocked / len(rays)
 
 
