@@ -1,7 +1,7 @@
 """Effect of a changed setting on parts that were found before.
 
-A search reads its own keys, nearly all of a machine, whose shape decides, and few of process and material; what it finds has
-prices only afterwards. So each section has a usual effect, and keys with another one say so where they are declared.
+A search reads all of its own keys, most keys of the machine and few of process and material; the parts it finds are priced
+afterwards. So each section has a usual effect, and keys with another one say so where they are declared.
 """
 
 from collections.abc import Iterator

@@ -77,12 +77,12 @@ def modified_s(path: Path) -> float:
     return path.stat().st_mtime
 
 
-def keep_newest(paths: Iterable[Path], count: int, age: Callable[[Path], float] = modified_s) -> list[Path]:
-    """Delete all but the newest `count` files or folders; those that stay, the newest first. age: rises with time.
+def keep_newest(paths: Iterable[Path], count: int, when: Callable[[Path], float] = modified_s) -> list[Path]:
+    """Delete all but the newest `count` files or folders; those that stay, the newest first. when: their date.
 
     Raises OSError.
     """
-    newest = sorted(paths, key=age, reverse=True)
+    newest = sorted(paths, key=when, reverse=True)
     for path in newest[count:]:
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)

@@ -6,11 +6,9 @@ for matplotlib.
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode.writer import write_gcode
@@ -29,6 +27,9 @@ from profiles.machine import Machine
 from profiles.profile import Profile, load
 from slicer.paths import Layer
 from slicer.slice import slice_parts
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "tour"
 MODEL = "demo:tree"
@@ -59,12 +60,14 @@ def main() -> None:
 
 def save(name: str, show: Callable[..., None], *values: object) -> None:
     """One picture: what a function shows of some values."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(6.4, 3.2), layout="constrained")
     show(figure.subplots(), *values)
     figure.savefig(OUT / f"{name}.png", dpi=100, metadata={"Software": None})
 
 
-def head_over_table(axes: Axes, machine: Machine) -> None:
+def head_over_table(axes: "Axes", machine: Machine) -> None:
     """The head's silhouette over the tilted table, seen along the tilt axis."""
     radius, height = np.array(machine.head.silhouette_mm).T
     outline = np.column_stack([np.concatenate([-radius[::-1], radius]), np.concatenate([height[::-1], height])])
@@ -80,13 +83,13 @@ def head_over_table(axes: Axes, machine: Machine) -> None:
     axes.legend(loc="upper right", fontsize=8)
 
 
-def mesh_with_overhangs(axes: Axes, mesh: Mesh, profile: Profile) -> None:
+def mesh_with_overhangs(axes: "Axes", mesh: Mesh, profile: Profile) -> None:
     """The model, with what needs support red if it is printed straight up."""
     risky = needing_upright(mesh, profile)
     show_image(axes, draw([floor_of(mesh), mesh], [FLOOR, GREY], reds=[None, risky], view=best_view(mesh, risky), size=SIZE))
 
 
-def parts_moved_apart(axes: Axes, decomposition: Decomposition, profile: Profile) -> None:
+def parts_moved_apart(axes: "Axes", decomposition: Decomposition, profile: Profile) -> None:
     """The parts a little apart, with what still needs support red."""
     mesh, parts = decomposition.mesh, decomposition.parts
     reds = [residual_faces(part, profile) for part in parts]
@@ -95,14 +98,16 @@ def parts_moved_apart(axes: Axes, decomposition: Decomposition, profile: Profile
     show_image(axes, draw([floor_of(mesh), *parts_apart(parts)], colours, reds=[None, *reds], view=view, size=SIZE))
 
 
-def show_image(axes: Axes, image: Image) -> None:
+def show_image(axes: "Axes", image: Image) -> None:
     """A picture without a frame."""
     axes.imshow(image)
     axes.set_axis_off()
 
 
-def strokes_by_kind(axes: Axes, layer: Layer) -> None:
-    """The strokes of a layer, as wide as they are laid, a colour for each kind."""
+def strokes_by_kind(axes: "Axes", layer: Layer) -> None:
+    """The strokes of a layer, a colour for each kind."""
+    from matplotlib.collections import LineCollection
+
     for colour, kind in enumerate(dict.fromkeys(path.kind for path in layer.paths)):
         paths = [path for path in layer.paths if path.kind == kind]
         lines = LineCollection([path.points for path in paths], colors=f"C{colour}", linewidths=1.2, label=kind.value)
@@ -112,7 +117,7 @@ def strokes_by_kind(axes: Axes, layer: Layer) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
 
 
-def axes_over_time(axes: Axes, run: DryRun) -> None:
+def axes_over_time(axes: "Axes", run: DryRun) -> None:
     """Where the machine's axes stand while it prints."""
     minutes = np.cumsum(run.times_s) / 60.0
     for k, letter in enumerate(run.letters):
@@ -121,7 +126,7 @@ def axes_over_time(axes: Axes, run: DryRun) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
 
 
-def change_of_parts(axes: Axes, lines: Sequence[str]) -> None:
+def change_of_parts(axes: "Axes", lines: Sequence[str]) -> None:
     """The lines about the first change from one part to the next."""
     at = next((k for k, line in enumerate(lines) if line.startswith(";PART:2")), len(lines) // 2)
     text = "\n".join(line[:90] for line in lines[at - EXCERPT // 3 : at + 2 * EXCERPT // 3])
@@ -129,8 +134,10 @@ def change_of_parts(axes: Axes, lines: Sequence[str]) -> None:
     axes.set_axis_off()
 
 
-def beads_by_part(axes: Axes, run: DryRun) -> None:
+def beads_by_part(axes: "Axes", run: DryRun) -> None:
     """The plastic in the workpiece frame, seen from the front, a colour for each part."""
+    from matplotlib.collections import LineCollection
+
     segments, part = run.deposited.segments(), run.program.part[run.segment_row]
     for number in np.unique(part):
         lines = LineCollection(segments[part == number][:, :, [0, 2]], colors=f"C{number}", linewidths=0.2)

@@ -38,7 +38,7 @@ class _Surface:
 
     def rim_mm(self, plane: Plane) -> float:
         """The length of a plane's rim where it is seen."""
-        faces = self.faces, self.normals, self.areas_mm2, self.areas_mm2
+        faces = self.faces, self.normals, self.areas_mm2, self.areas_mm2  # any weights above 0: only the length is asked for
         return float(sum_chords(faces, self._heights_mm(plane), plane.normal, 0.0).length_mm)
 
     def _heights_mm(self, plane: Plane) -> Floats:
@@ -81,7 +81,9 @@ def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surfac
     far_mm = 2.0 * reach_mm + wide_mm * sin(radians(REACH_DEG))
     around = heights[mesh.faces]
     kept = (around.min(axis=1) <= far_mm) & (around.max(axis=1) >= -far_mm) & (seen > 0.0)
-    return _Surface(mesh.vertices, mesh.faces[kept], mesh.normals[kept], mesh.areas_mm2[kept])
+    faces = mesh.faces[kept]
+    faces.setflags(write=False)  # as the mesh's own are: the kernel of rims is compiled once for both
+    return _Surface(mesh.vertices, faces, mesh.normals[kept], mesh.areas_mm2[kept])
 
 
 def _first_look(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_mm: float) -> Iterator[tuple[float, Plane]]:

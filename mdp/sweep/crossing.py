@@ -241,7 +241,7 @@ def _share(ahead: int, ramps: Floats, shares: Floats) -> None:
 
 @helper
 def integrate_scars(scars: Scars, row: int, grid: OffsetGrid) -> Floats:
-    """(n + AHEAD + 1, KINDS + 3) what the faces have above each offset, the rows beyond n without use: area by their kind, see
+    """(n + AHEAD + 1, KINDS + 3) what the faces have above each offset, the rows from n on without use: area by their kind, see
     _kind_of, what their stairs count printed straight up and along the direction, and at it their weighted rim times the step."""
     faces, n = scars.faces, grid.columns
     corners, normals = faces.corners, faces.normals

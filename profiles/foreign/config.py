@@ -119,8 +119,9 @@ Entry = tuple[str, str]  # name of a setting as its file has it, and its text as
 @dataclass(frozen=True)
 class Config:
     """What a file says. entries: by PrusaSlicer's key; unknown: names in the file that no key stands for; process, material: what
-    the presets are called, empty where the file does not tell. own: of entries whose text is not the file's, the file's own text
-    and what was made of it, "" where the two mean the same."""
+    the presets are called, empty where the file does not tell. own: of entries whose text is not the file's, the file's own text,
+    or the worked-out one where the file has none, and how it was worked out, "" where the two mean the same; read: names in the
+    file that other entries follow from."""
 
     program: str
     entries: Mapping[str, Entry]
@@ -128,6 +129,7 @@ class Config:
     process: str = ""
     material: str = ""
     own: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    read: frozenset[str] = frozenset()
 
     def text(self, key: str) -> str | None:
         """The text of a key, of the first extruder where there are several; None where nothing is said."""

@@ -113,10 +113,12 @@ def width(height: str = "layer_height", auto: float = AUTO_WIDTH) -> Convert:
 
     def convert(config: Config, key: str) -> Converted:
         for name in dict.fromkeys((key, "extrusion_width")):
+            if (number := config.number(name)) is not None and number < 0.0:
+                return None, "is less than 0"
             value, how = part_of(height, "by the nozzle")(config, name)
             if value is not None:
                 return value, how if name == key else f"0 is {name}"
-            if config.text(name) is not None and config.number(name) != 0.0:
+            if config.text(name) is not None and number != 0.0:
                 return None, how if name == key else f"0 is {name}, {how}"
         nozzle = config.number("nozzle_diameter")
         if nozzle is None:

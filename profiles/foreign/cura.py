@@ -16,7 +16,7 @@ from zipfile import ZipFile
 from profiles.errors import ProfileError, first_line, reason
 from profiles.files import DAMAGED_ZIP
 from profiles.foreign.config import CURAS, Config, Entry, finite, without_still_fan
-from profiles.foreign.cura_formulas import USUAL, worked_out
+from profiles.foreign.cura_formulas import USUAL, inputs, worked_out
 
 PROGRAM = "Cura"
 SLICER_FILE = re.compile(r"Cura/(.*)\.inst\.cfg$")  # members of a slicer file that have settings
@@ -75,33 +75,40 @@ def read_profile(file: Path) -> Config:
 
 def of_values(values: Mapping[str, str], name: str = "") -> Config:
     """Settings under Cura's names, formulas worked out where that can be."""
-    entries, hows, formulas, known = dict[str, Entry](), dict[str, str](), list[str](), worked_out(values)
+    entries, hows, known = dict[str, Entry](), dict[str, str](), worked_out(values)
+    unknown, read = list[str](), set[str]()
     for theirs, text in known.items():
         switch, word, off = HOLDS.get(theirs, ("", "", None))
+        key, how = CURAS.get(theirs, theirs), ""
         if text.startswith("="):
-            formulas.append(theirs)
+            unknown.append(f"{theirs} (a formula)")
             continue
-        key = CURAS.get(theirs, theirs)
         if (said := known.get(switch, word)).lower() != word and not said.startswith("="):
-            entries |= {key: (theirs, off)} if off is not None else {}
-            hows[key] = f"{switch} is {said}"
+            how = f"{switch} is {said}"
+            if off is None:
+                unknown += [f"{theirs} ({how})"] if theirs in values else []
+                read.add(switch)
+                continue
+            entries[key] = theirs, off
         elif (theirs in values or theirs in CURAS) and theirs not in BESIDE_OTHERS:
             entries[key] = theirs, _said(key, text)
-            if values.get(theirs, text) != text:
-                hows[key] = f"that is {text}"
-            elif theirs not in values:
-                hows[key] = f"Cura's own formula: {USUAL[theirs]}"
-    for theirs in {HOLDS[theirs][0] for theirs in HOLDS if theirs in values}:
-        entries.pop(theirs, None)
+            if theirs not in values:
+                how = f"Cura's own formula: {USUAL[theirs]}"
+            elif values[theirs] != text:
+                how = f"that is {text}"
+        else:
+            continue
+        hows[key] = how
+        read |= {switch} | inputs(theirs, values)
     if (angle_deg := finite(known.get("support_angle", ""))) is not None:
         entries["support_material_threshold"] = "support_angle", f"{90.0 - angle_deg:g}"
-        hows["support_material_threshold"] = "from the vertical, as here"
+        worked = "" if values.get("support_angle") == known["support_angle"] else f"that is {angle_deg:g} "
+        hows["support_material_threshold"] = f"{worked}from the vertical, as here"
     for key, theirs, text, how in _raft(known):
         entries[key], hows[key] = (theirs, text), how
     changed = {key: values.get(theirs, text) for key, (theirs, text) in entries.items() if values.get(theirs) != text}
     own = {key: (text, hows.get(key, "")) for key, text in changed.items()}
-    unknown = tuple(f"{theirs} (a formula)" for theirs in formulas)
-    return Config(PROGRAM, without_still_fan(entries), unknown, name, name, own)
+    return Config(PROGRAM, without_still_fan(entries), tuple(unknown), name, name, own, frozenset(read))
 
 
 def _raft(values: Mapping[str, str]) -> Iterator[tuple[str, str, str, str]]:
@@ -111,8 +118,9 @@ def _raft(values: Mapping[str, str]) -> Iterator[tuple[str, str, str, str]]:
     A value that the file does not give as a number is Cura's default: the sinking is half of the gap.
     """
     if (kind := values.get("adhesion_type", "")) and not kind.startswith("="):
-        counts = [_number(values.get(key, ""), usual) for key, usual in RAFT_LAYERS.items()] if kind == "raft" else [0.0]
-        yield "raft_layers", "adhesion_type", f"{sum(counts):g}", " + ".join(f"{count:g}" for count in counts) + " layers"
+        counts = [_number(values.get(key, ""), usual) for key, usual in RAFT_LAYERS.items()] if kind == "raft" else []
+        how = " + ".join(f"{count:g}" for count in counts) + " layers" if counts else "no raft"
+        yield "raft_layers", "adhesion_type", f"{sum(counts):g}", how
     if (gap_mm := finite(values.get("raft_airgap", ""))) is not None:
         into_mm = _number(values.get("layer_0_z_overlap", ""), 0.5 * gap_mm)
         less = f"{gap_mm:g} less {into_mm:g} (layer_0_z_overlap)"

@@ -7,6 +7,7 @@ resources/definitions/fdmprinter.def.json. Only arithmetic on settings that a fi
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -36,6 +37,7 @@ USUAL = {  # formulas of its definitions for what people set by another setting
     "material_print_temperature": "default_material_print_temperature",
     "material_bed_temperature": "default_material_bed_temperature",
 }
+NAME = re.compile(r"[A-Za-z_]\w*")
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -71,6 +73,18 @@ def worked_out(values: Mapping[str, str]) -> dict[str, str]:
             except (LookupError, ArithmeticError, TypeError, ValueError, SyntaxError):
                 continue
     return worked
+
+
+def inputs(key: str, values: Mapping[str, str]) -> set[str]:
+    """The settings of a file that the value of one follows from by formulas, itself aside."""
+    found, waiting = set[str](), [key]
+    while waiting:
+        name = waiting.pop()
+        text = values.get(name, "=" + USUAL.get(name, ""))
+        named = set(NAME.findall(text)) & (values.keys() | USUAL.keys()) - found if text.startswith("=") else set[str]()
+        found |= named
+        waiting += sorted(named)
+    return (found & values.keys()) - {key}
 
 
 def _value(key: str, values: Mapping[str, str], deep: int) -> Any:

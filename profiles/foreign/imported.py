@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator
 from typing import Any, NamedTuple
 
 from profiles.errors import ProfileError
-from profiles.foreign.config import Config
+from profiles.foreign.config import OF_NOZZLE, Config
 from profiles.foreign.rules import MATERIAL_RULES, PROCESS_RULES, base_of
 from profiles.part_settings import problems_of_place
 from profiles.process import WIDTHS, Process
@@ -82,7 +82,7 @@ def _about(row: Row, said: str) -> str:
 def unused(config: Config) -> list[str]:
     """Names of theirs that no rule reads: what there is nothing like here, and what belongs to the machine."""
     keys = {source for kind in KINDS for _, source, _ in RULES[kind]} | CONDITIONS
-    read = {name for key, (name, _) in config.entries.items() if key in keys}
+    read = config.read | {name for key, (name, _) in config.entries.items() if key in keys}
     return sorted({name for name, _ in config.entries.values()} - read | set(config.unknown))
 
 
@@ -109,7 +109,11 @@ def _rows(config: Config, kind: str, base: str, sources: Collection[str] | None 
         done |= {key} if value else set()
         name, theirs = config.entries[source]
         text, worked_out = config.own.get(source, (theirs, ""))
-        yield Row(name, text, key, value, worked_out or how if value else how)
+        if value:
+            how = worked_out or how
+        elif text != theirs and not theirs.endswith(OF_NOZZLE):
+            how = f"is {theirs} here; {how}"
+        yield Row(name, text, key, value, how)
 
 
 def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str, Any], list[str]]:

@@ -12,7 +12,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.pose import about, unit
 from mdp.search.neck import find_neck
-from mdp.sweep.crossing import measure_rim
+from mdp.sweep.crossing import measure_rim, sum_chords
 from tests import shapes
 
 WAIST_MM, LENGTH_MM, ROUND = 4.0, 30.0, 40
@@ -88,3 +88,10 @@ def test_what_only_ends_has_no_neck(mesh: Mesh) -> None:
 
 def test_a_plane_that_misses_the_model_is_near_no_neck() -> None:
     assert neck(hourglass(), Plane(Z, 31.0)) is None
+
+
+def test_the_kernel_of_rims_is_compiled_once_for_cuts_and_necks() -> None:
+    mesh, plane = hourglass(), Plane(np.array([0.0, 0.0, 1.0]), 3.0)
+    rim_mm(mesh, plane)
+    neck(mesh, plane)
+    assert len(sum_chords.signatures) == 1

@@ -274,9 +274,45 @@ def test_a_width_in_percent_of_what_the_file_does_not_tell_is_left_with_the_reas
         (orcaslicer.of_values, {"hot_plate_temp": "60", "cool_plate_temp": "35"}, ["cool_plate_temp"]),
         (cura.of_values, {"support_angle": "55", "raft_airgap": "0.3", "prime_tower_size": "20"}, ["prime_tower_size"]),
         (cura.of_values, {"retraction_hop": "0.2", "retraction_hop_enabled": "True"}, []),
+        (cura.of_values, {"cool_fan_speed": "50", "cool_fan_enabled": "False"}, []),
+        (cura.of_values, {"speed_print": "80"}, []),  # four speeds follow from it
+        (cura.of_values, {"wall_thickness": "1.2", "line_width": "0.4"}, []),
     ],
 )
 def test_a_setting_that_filled_a_key_is_not_told_among_the_unused(
     made: Callable[[Mapping[str, str]], Config], values: dict[str, str], rest: list[str]
 ) -> None:
     assert unused(made(values)) == rest
+
+
+@pytest.mark.parametrize(
+    ("values", "rest"),
+    [
+        (
+            {"acceleration_print": "500", "acceleration_enabled": "False"},
+            ["acceleration_print (acceleration_enabled is False)"],
+        ),
+        (
+            {"bridge_skin_speed": "20", "bridge_settings_enabled": "False"},
+            ["bridge_skin_speed (bridge_settings_enabled is False)"],
+        ),
+        ({"retraction_hop": "=foo", "retraction_hop_enabled": "True"}, ["retraction_hop (a formula)", "retraction_hop_enabled"]),
+    ],
+)
+def test_a_setting_of_cura_that_does_not_hold_is_told_with_the_reason(values: dict[str, str], rest: list[str]) -> None:
+    assert unused(cura.of_values(values)) == rest
+
+
+def test_what_a_text_becomes_is_told_where_nothing_is_taken() -> None:
+    row = reported(cura.of_values({"support_angle": "90"}), "support_angle")
+    assert (row.text, row.taken, row.how) == ("90", False, "is 0 here; 0: found by the slicer")
+
+
+def test_a_width_below_zero_is_left_with_the_reason() -> None:
+    row = reported(orcaslicer.of_values({"outer_wall_line_width": "-10%", "nozzle_diameter": "0.4"}), "outer_wall_line_width")
+    assert (row.text, row.taken, row.how) == ("-10%", False, "is -0.04 here; is less than 0")
+
+
+def test_of_two_settings_for_one_key_the_second_keeps_its_own_reason() -> None:
+    row = reported(cura.of_values({"outer_inset_first": "=True", "inset_direction": "outside_in"}), "inset_direction")
+    assert (row.text, row.how) == ("outside_in", "")
