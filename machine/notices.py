@@ -74,7 +74,7 @@ def as_notices() -> Iterator[Report]:
 
 @dataclass(frozen=True)
 class FrontEnd:
-    """Who is told: each notice, and the progress of work as long as that lasts."""
+    """Receives each notice, and the progress of work while that lasts."""
 
     note: Callable[[Notice], None]
     progress: Callable[[], AbstractContextManager[Report]] = as_notices
@@ -92,7 +92,7 @@ _front_end = FrontEnd(to_streams)
 
 @contextmanager
 def notices_to(front_end: FrontEnd) -> Iterator[None]:
-    """Meanwhile a front end is told all that the program tells, in whatever thread."""
+    """Send all notices, from any thread, to this front end until the block ends."""
     global _front_end
     before, _front_end = _front_end, front_end
     try:

@@ -1,4 +1,4 @@
-"""Firmwares: what each one is told, how it answers and how it is simulated; one line of the table each.
+"""Firmwares: what is sent to each, how it answers and how it is simulated; one line of the table each.
 
 `dialect_of(machine)` is what is written for a machine, `simulation_of(machine)` how its firmware is simulated, `identify(text)`
 the firmware of an answer to M115. `firmware` has what a byte and a numbered line cost on the serial line, and its rates.

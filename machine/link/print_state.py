@@ -51,8 +51,7 @@ S = PrintState
 OVER = frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.REFUSED, S.FAILED})
 UNHEARD = frozenset({S.CANCELLING, S.RECONNECTING})  # no report is taken
 AWAY = frozenset({S.PAUSING, S.PAUSED})  # the tip, from the print
-_LIVE = frozenset({S.PRINTING, S.PAUSING, S.PAUSED, S.RESUMING, S.RECONNECTING, S.FINISHING})
-ACTIVE = _LIVE | {S.CANCELLING}
+ACTIVE = frozenset({S.PRINTING, S.PAUSING, S.PAUSED, S.RESUMING, S.RECONNECTING, S.FINISHING, S.CANCELLING})
 _ANY = ACTIVE | OVER  # a server tells of its print now and then, so these follow in any order; a cancel may be refused
 
 TABLE: Mapping[PrintState, frozenset[PrintState]] = {

@@ -70,11 +70,6 @@ class Server:
     name: str
 
     @property
-    def title(self) -> str:
-        """The name in a title."""
-        return self.name
-
-    @property
     def url(self) -> str:
         """Without a slash at its end."""
         host = f"[{self.host}]" if ":" in self.host else self.host

@@ -132,7 +132,7 @@ def describe_answer(answer: Answer, baud: int) -> str:
 
 @dataclass(frozen=True)
 class PortReport:
-    """A port, and what answers there at which rate; trouble: why it could not be asked, reason: the same behind its name."""
+    """A port, and what answers there at which rate. trouble: why it could not be asked; reason: that without the port's name."""
 
     device: SerialDevice
     answer: Answer | None = None
@@ -214,7 +214,7 @@ def port_json(report: PortReport) -> dict[str, Any]:
 
 @contextmanager
 def announced(description: str, path: str) -> Iterator[Callable[[str], None]]:
-    """List a simulated printer while it runs; call what is given with a new path of it."""
+    """List a simulated printer while it runs; yields a function to call when its path changes."""
     try:
         text = (_folder() / str(os.getpid())).open("w", encoding="utf-8")
     except OSError:  # a full disk: it is not listed

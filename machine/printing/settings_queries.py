@@ -70,7 +70,7 @@ def _hear_out(wire: Port) -> None:
 
 
 def _pages(wire: Port, question: str) -> Iterator[str]:
-    """The lines of an answer, and of those to the same question behind where an array of RepRapFirmware's model was cut."""
+    """The lines of an answer; where RepRapFirmware cuts an array, the question is repeated from there."""
     for _ in range(MOST_PAGES):
         answer = list(_ask(wire, question))
         yield from answer

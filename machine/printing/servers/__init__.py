@@ -1,4 +1,4 @@
-"""Network: print servers (OctoPrint, Moonraker, Duet): files handed over, printed from there, followed and stopped over HTTP.
+"""Servers: print servers (OctoPrint, Moonraker, Duet): files are handed over, printed from there, followed and stopped over HTTP.
 
 `servers.open_server` is a session with a `server.PrintServer`, `follow.follow_print` has a file printed and follows it to its
 end.

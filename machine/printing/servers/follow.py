@@ -81,8 +81,7 @@ class _Follower:
         self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
     def run(self) -> PrintState:
-        """A stop that is asked for before the start leaves nothing to start, and one that comes as the following ends is given
-        all the same."""
+        """A stop asked for before the start prevents it; one that comes as the following ends is still given."""
         if self._take_requests():
             return PrintState.FAILED
         try:
@@ -172,7 +171,8 @@ class _Follower:
         )
 
     def _end_unseen(self, status: PrintStatus, waited_s: float) -> PrintState | None:
-        """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
+        """A print that was never seen running: the status may still be that of the print before, or it ended before the first
+        look."""
         if waited_s < BEGIN_S:
             return None
         if status.state is PrintState.DONE and status.file in ("", self.file):

@@ -47,7 +47,7 @@ class GcodeUpload:
         return f"{zlib.crc32(self.content):08x}"
 
     def read_by(self, sent: Sent) -> BinaryIO:
-        """The content as a file; sent() is told how much of it has been read before each piece, and at its end."""
+        """The content as a file; calls sent() with the bytes read so far, before each piece and at the end."""
         return _ReportedBytes(self.content, sent)
 
 

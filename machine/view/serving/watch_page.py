@@ -36,7 +36,7 @@ ORDERS = {
 
 
 class Watched:
-    """A running print as it is told to those who watch. follow() from the thread that prints, state() from any."""
+    """A running print as watchers see it. follow() is called from the printing thread, state() from any."""
 
     def __init__(self, page: bytes = b"") -> None:
         self.page = page

@@ -42,6 +42,17 @@ def check_model_name(name: str) -> None:
         raise MeshError(f"{name}: {kinds} may name files of the computer, so a paired device sends none: a .glb is taken")
 
 
+def check_plan(path: Path) -> None:
+    """Raises PlanError for a plan that names a mesh file, which would be read from this computer."""
+    try:
+        tables = parse(path).values()
+    except ProfileError:
+        return  # no plan: who reads it says what it is
+    rows = [row for table in tables if isinstance(table, list) for row in table]
+    if any(isinstance(row, Mapping) and "mesh" in row for row in rows):
+        raise PlanError(f"{path.name}: the plan of a paired device names no mesh file: {ON_THIS_COMPUTER}")
+
+
 def check_profile(path: Path) -> None:
     """Raises ProfileError for a profile that inherits from a file of this computer."""
     try:

@@ -101,7 +101,8 @@ class History:
     undone: tuple[Step, ...] = ()
 
     def do(self, word: str, bench: Bench) -> "History":
-        """A further step, none for the same bench; pauses go with their parts, and what was undone is forgotten."""
+        """Take a further step, none if the bench has not changed. Pauses of parts that are gone are dropped, as is what was
+        undone."""
         if bench is self.now.bench:
             return self
         before = self.now.bench if _have_one_model(self.now.bench, bench) else bench
@@ -113,7 +114,7 @@ class History:
         return History(Step(word, after, gone_in_words(word, lost)), _nearest_steps((*self.before, self.now)[-MOST_STEPS:]))
 
     def undo(self) -> "History":
-        """One step back, or the same where there is none."""
+        """One step back; unchanged where there is none."""
         if not self.before:
             return self
         return History(self.before[-1], self.before[:-1], (*self.undone, self.now))
@@ -123,7 +124,7 @@ class History:
         return replace(self, now=replace(self.now, bench=bench))
 
     def redo(self) -> "History":
-        """One step forth again, or the same where there is none."""
+        """One step forward again; unchanged where there is none."""
         if not self.undone:
             return self
         return History(self.undone[-1], (*self.before, self.now), self.undone[:-1])
@@ -182,7 +183,7 @@ def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
 def with_model_turned_as_read(bench: Bench, model: Model, turn: Floats, factor: float = 1.0) -> Bench:
     """The same model turned otherwise, (3, 3), and scaled as it is read, with its zones; its cuts were for the way before."""
     anew = replace(with_model_anew(bench, model), rotation=bench.rotation)
-    return _uncut(_with_places_of(anew, bench, factor, turn))
+    return _with_places_of(anew, _uncut(bench), factor, turn)
 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
@@ -191,7 +192,7 @@ def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
     if rows == bench.rotation:
         return bench
     turned = replace(with_model_anew(bench, bench.model), rotation=rows)
-    return _uncut(_with_places_of(turned, bench))
+    return _with_places_of(turned, _uncut(bench))
 
 
 def _uncut(bench: Bench) -> Bench:
@@ -274,7 +275,7 @@ def with_rows(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
 
 
 def rows_to_price(bench: Bench) -> list[int]:
-    """The rows of the front, by their places, whose time and plastic a person is told."""
+    """Places of the rows of the front whose time and plastic are shown."""
     return [row for row, good in enumerate(pays(bench.rows)) if good]
 
 

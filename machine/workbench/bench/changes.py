@@ -70,7 +70,7 @@ class Lay(Change):
 
 
 class Take(Change):
-    """Take the row of the front with so many parts."""
+    """Take the row of the front that has this number of parts."""
 
     do: Literal["take"] = "take"
     word: ClassVar = "take another number of parts"

@@ -51,6 +51,7 @@ def by_hand(job: PrintJob, person: AtPage) -> End:
         person.passed(describe_answer(answer, rate_of(at)))
         session = CommandSession(wire, dialect_of(machine).longest_line)
         person.interrupt = lambda word: session.order(StopError if word == Command.EMERGENCY_STOP else LeftError)
+        person.agreed = True  # from now on it may be heated and moved
         return Hand(job.profile, session, person).serve()
 
 

@@ -162,7 +162,7 @@ class AtPage:
 
     def _show(self, status: PrintStatus | None, scene: Scene) -> None:
         if status is None:
-            self.tell(state=PrintState.PRINTING, progress=None)
+            self.tell(state=PrintState.PRINTING, progress=None, told_s=time())
             return
         values: dict[str, Any] = {"progress": replace(status, message=plain_line(status.message)), "told_s": time()}
         if status.state.is_printing:  # what a server tells besides is not the end of the job yet

@@ -34,7 +34,6 @@ class JobState:
     port: str = ""
     resumes: str = ""
     key: str = ""
-    force: bool = False
     starts: bool = True
     server: bool = False
     question: str = ""
@@ -69,7 +68,6 @@ def first_state(job: PrintJob) -> JobState:
         port=job.destination.name,
         resumes=str(job.cut_off or ""),
         key=job.key,
-        force=job.force,
         starts=job.starts,
         server=isinstance(job.destination, Server),
     )

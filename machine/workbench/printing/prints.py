@@ -25,7 +25,7 @@ from machine.printing.journal_folder import ResumableJournal, resumable_journals
 from machine.printing.ports import answer_words, ask_ports, known_ports, port_json
 from machine.workbench.printing.running_print import RunningPrint
 from machine.workbench.work.observable import Observable
-from profiles.errors import OutputError, PrinterError, ServerError
+from profiles.errors import OutputError, PrinterError
 from profiles.folders import state_folder
 
 FILE = "last-printer.json"  # of the state folder
@@ -210,7 +210,7 @@ def last_printer() -> Destination | None:
     try:
         port, baud, speed = (json.loads(_path().read_bytes())[key] for key in ("port", "baud", "sim_speed"))
         return parse_destination(str(port), int(baud), float(speed))
-    except (OSError, ValueError, KeyError, TypeError, OutputError, PrinterError, ServerError):
+    except (OSError, ValueError, OverflowError, KeyError, TypeError, OutputError, PrinterError):
         return None
 
 

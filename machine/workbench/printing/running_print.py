@@ -91,6 +91,8 @@ class RunningPrint:
     async def fail(self, error: Exception) -> None:
         """A fault of this program: nobody hears the print's process any more, so it ends, and the printer is made safe."""
         self._kill()
+        if not self.asking:
+            self.state = replace(self.state, state=PrintState.CANCELLING)  # an end that it has told is not believed
         await self._end_without_process()
         self._take(replace(self.state, sentence=f"{bug_in_words(error, sys.argv)}; {self.state.sentence}"))
 

@@ -14,7 +14,7 @@ from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench, History, Step
 from machine.workbench.work.folders import Received
 from machine.workbench.work.observable import Observable
-from machine.workbench.work.worker_pool import TaskQueue, WorkerPools
+from machine.workbench.work.worker_pool import CLOSED, TaskQueue, WorkerPools
 from profiles.errors import UserError
 
 WAITING = "waiting until the work of other benches is done"
@@ -264,12 +264,14 @@ class Derived(Generic[Value]):
 
     async def wait(self) -> None:
         """Return when no task is under way any more."""
-        while self._task is not None:
+        while self._task is not None and not self._task.done():  # a task that was cancelled stays where its session is closed
             await asyncio.wait((self._task,))
 
     async def get(self) -> Value:
         """The answer for the bench as it is now, worked out once for all that ask. Raises what the task raises."""
         while (result := self.result) is None:
+            if self._session.closed:
+                raise UserError(CLOSED)
             self.begin()
             await self.wait()
             if self._error is not None:

@@ -56,7 +56,7 @@ class Demo(Command):
 
 
 class Unit(Command):
-    """What the coordinates of the model are in that waits for that."""
+    """The unit of the coordinates of the model that waits for it."""
 
     do: Literal["unit"]
     unit: str
@@ -120,7 +120,7 @@ KINDS: tuple[type[Command], ...] = (
 )
 COMMANDS = {name: kind for kind in KINDS for name in get_args(kind.model_fields["do"].annotation)}
 NEEDS = {"compare": Need.SLICES} | dict.fromkeys(
-    ("demo", "unit", "dismiss", "undo", "redo", "set", "reset", "profile", "stop"), Need.NOTHING
+    ("demo", "unit", "dismiss", "undo", "redo", "set", "reset", "profile"), Need.NOTHING
 )  # what lies on the bench for all others is a model
 
 

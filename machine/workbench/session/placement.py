@@ -84,8 +84,7 @@ def _stands_by(bench: Bench) -> tuple[object, ...] | None:
         return None
     process = bench.profile.of_part(1).process
     decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
-    brims = process.brim_mm, process.small_base_brim_mm, process.first_layer_height_mm
-    copies = (bench.copies, max(bench.parts, 1), *brims) if bench.copies > 1 else ()
+    copies = (bench.copies, bench.cuts, bench.zones, bench.profile) if bench.copies > 1 else ()
     return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, copies
 
 

@@ -264,7 +264,7 @@ class Session(SessionBase):
         await self.take_plan(_read_plan(path))
 
     async def take_plan(self, plan: PlanFile) -> None:
-        """The same for a plan that is read already."""
+        """Cut the model on the bench by a plan that has been read already."""
         self.hear_name(plan.name)
         self.hear_name(plan.model)
         bench = self.bench

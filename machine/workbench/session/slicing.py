@@ -114,6 +114,8 @@ class Comparing(Derived[tuple[Alternative, ...]]):
         return () if slices is None or others is None else (slices.sliced.cost, *others)
 
     def compare(self) -> None:
-        """Compare what is sliced, if that is not done yet."""
+        """Compare what is sliced, if that is not done yet; a comparison of earlier slices ends."""
+        if self.stale:
+            self.stop()
         if not self.rows():
             self.begin(WAITING if self._session.long.pool.full else "comparing")

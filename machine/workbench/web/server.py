@@ -131,7 +131,7 @@ def _once(file: Path, kind: str, name: str) -> Response:
 
 
 def _saved_as(name: str) -> dict[str, str]:
-    """How a browser is told a file's name, letters of all scripts as RFC 6266 has them."""
+    """The header that gives a browser a file's name, in any script (RFC 6266)."""
     plain = name.encode("ascii", "replace").decode().replace("?", "_")
     return {"content-disposition": f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name)}"}
 

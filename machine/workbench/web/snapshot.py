@@ -1,4 +1,4 @@
-"""Snapshot: what a page is told of the session, as JSON: the bench, the slices and whether they can be printed."""
+"""Snapshot: the state of a session as its pages get it, as JSON: the bench, the slices and whether they can be printed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -15,8 +15,9 @@ from starlette.responses import JSONResponse, Response
 
 from machine.pipeline.project import Project, is_project, read_folder
 from machine.pipeline.requests import Given
-from machine.workbench.access.limits import DEVICE, check_model_name, check_profile
+from machine.workbench.access.limits import DEVICE, check_model_name, check_plan, check_profile
 from machine.workbench.bench.settings import named
+from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
 from machine.workbench.work.folders import Received, folders_kept, remove_file
 from profiles.errors import PlanError, ProfileError, reason
@@ -78,6 +79,7 @@ class Uploads:
             await _receive(request, path, name, self._most_mib)
             if DEVICE in request.scope and path.suffix.lower() == TEXT_SUFFIX:
                 check_profile(path)
+                check_plan(path)
 
         if DEVICE in request.scope:
             check_model_name(name)
@@ -124,7 +126,7 @@ class Uploads:
         name = request.path_params["name"]
         folder = next((folder for folder in folders_kept() if folder.name == name), None)
         if folder is None:
-            raise PlanError("this work is not kept any more, or another page has opened it")
+            raise PlanError(OPEN_ELSEWHERE)
         project = read_folder(folder)
         word = f"open the work of {strftime('%H:%M', localtime(project.written_s))}"
         try:

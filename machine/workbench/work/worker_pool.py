@@ -14,6 +14,7 @@ from machine.workbench.work.heard import heard
 from mdp.kernels.workers import CallError, KilledError, Tell, Worker
 from profiles.errors import UserError
 
+CLOSED = "this bench is closed: nothing is worked out for it any more"
 REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
 DO, LOAD = "machine.workbench.work.tasks:do", "machine.workbench.work.tasks:load"
 
@@ -118,7 +119,7 @@ class TaskQueue:
     def check_open(self) -> None:
         """Raises UserError when its session is closed."""
         if self._closed:
-            raise UserError("this bench is closed: nothing is worked out for it any more")
+            raise UserError(CLOSED)
 
     def close(self) -> None:
         """End the processes that work for it or hold anything of it; whatever still waits for one is refused."""

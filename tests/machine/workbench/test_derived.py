@@ -3,15 +3,18 @@
 import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from machine.workbench.bench.bench import Bench
+from machine.workbench.bench.bench import Bench, Step
 from machine.workbench.session.base import Derived, SessionBase
+from machine.workbench.session.placement import standing_of
 from machine.workbench.work.worker_pool import WorkerPools
-from profiles.errors import PlanError
+from profiles.errors import PlanError, UserError
 from profiles.profile import load
+from tests.machine.workbench.models import model
 
 PROFILE = load()
 
@@ -177,3 +180,40 @@ def test_commands_are_executed_one_at_a_time_in_the_order_in_which_they_come_als
         assert session.answers == {"a": "", "b": "b cannot be done", "c": ""}
 
     run(work)
+
+
+def test_who_waits_for_a_value_is_refused_when_the_bench_is_closed() -> None:
+    async def close_meanwhile() -> None:
+        copies = Copies(by_itself=False)
+        copies.session.history = replace(
+            copies.session.history, now=replace(copies.session.history.now, bench=replace(copies.session.bench, copies=2))
+        )
+        waiting = asyncio.create_task(copies.derived.get())
+        await asyncio.sleep(0.01)
+        copies.session.closed = True
+        for task in list(copies.session._tasks):
+            task.cancel()
+        with pytest.raises(UserError, match="this bench is closed"):
+            await asyncio.wait_for(waiting, 5.0)
+
+    asyncio.run(close_meanwhile())
+
+
+@pytest.mark.parametrize("setting", ["process.raft_layers=3", "process.complete_objects=true", "process.skirt_loops=3"])
+def test_how_copies_stand_is_worked_out_again_for_what_decides_their_places(setting: str) -> None:
+    async def change_setting() -> list[Bench]:
+        bench, stood = Bench(PROFILE, model=model(), copies=3), list[Bench]()
+        session = SessionBase(bench, WorkerPools())
+
+        async def run(task: str, standing: Bench) -> SimpleNamespace:
+            stood.append(standing)
+            return SimpleNamespace(refusal="")
+
+        session.hand.run = run  # type: ignore[assignment, method-assign]
+        standing_of(session)
+        for changed in (bench, replace(bench, profile=load(settings=[setting]))):
+            session.become(replace(session.history, now=Step("", changed)))
+            await asyncio.sleep(0.01)
+        return stood
+
+    assert len(asyncio.run(change_setting())) == 2

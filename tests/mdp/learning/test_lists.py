@@ -81,6 +81,11 @@ def test_every_source_is_tested_in_exactly_one_fold_and_trains_in_at_least_two()
     assert ((sides == Side.TRAIN).sum(axis=1) >= 2).all()
 
 
+def test_what_judges_in_one_split_trains_in_the_next() -> None:
+    judges = [f"source {number}" for number in range(500) if side(f"source {number}") is Side.TEST]
+    assert {side(source, 1) for source in judges} == {Side.TRAIN}
+
+
 def test_a_larger_share_of_the_models_contains_a_smaller_one(tmp_path: Path) -> None:
     for number in range(60):
         write_record(tmp_path / f"m{number}.0.x.npz", OUTCOME)

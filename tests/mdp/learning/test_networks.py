@@ -12,7 +12,7 @@ onnxruntime = pytest.importorskip("onnxruntime", reason="onnxruntime is not inst
 from mdp.learning.command import COLUMN_SETS
 from mdp.learning.lists import RatedList, followed, read_lists, scale
 from mdp.learning.ndcg import regret
-from mdp.learning.networks import PaperNetwork, RegretNetwork, export, scaled, scores, write
+from mdp.learning.networks import PaperNetwork, RegretNetwork, contrasts, export, scaled, scores, write
 from mdp.learning.training import OBJECTIVES, SCHEDULES, Padded, train
 from mdp.mesh import Floats
 from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
@@ -25,6 +25,10 @@ pytestmark = pytest.mark.train
 CHEAP = COLUMN_SETS["cheap"]
 SMALL_SET = Path(__file__).parent / "data"
 METADATA = {"kind": "urank", "data_set": "drawn, 3 lists", "commit": "abc", "figures": "NDCG@1 .4"}
+
+
+def test_what_a_cut_saves_is_weighed_against_what_it_loses_for_ever() -> None:
+    assert contrasts(("M2", "M3", "M6")).tolist() == [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [-1.0, -4.0, -16.0]]
 
 
 def planted(seed: int, size: int = 20) -> RatedList:

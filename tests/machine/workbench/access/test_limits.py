@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from machine.workbench.access.limits import check_bench_command, check_model_name, check_print_command, check_profile
+from machine.workbench.access.limits import check_bench_command, check_model_name, check_plan, check_print_command, check_profile
 from profiles.errors import JournalError, MeshError, PlanError, PrinterError, ProfileError, UserError
 
 PORTS, JOURNALS = {"/dev/ttyACM0"}, {"/state/a.journal"}
@@ -74,3 +74,13 @@ def test_other_profiles_and_what_is_none_go_on_to_be_read(tmp_path: Path, text: 
     file = tmp_path / "mine.toml"
     file.write_text(text)
     check_profile(file)
+
+
+@pytest.mark.parametrize("table", ["support", "no_support", "modifier"])
+def test_a_device_s_plan_names_no_mesh_file(tmp_path: Path, table: str) -> None:
+    file = tmp_path / "plan.toml"
+    file.write_text(f'[[{table}]]\nmesh = "/home/somebody/secret.stl"\n')
+    with pytest.raises(PlanError, match="the plan of a paired device names no mesh file"):
+        check_plan(file)
+    file.write_text(f"[[{table}]]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n")
+    check_plan(file)

@@ -149,6 +149,7 @@ def test_the_printer_of_last_time_is_known_at_the_next_start(at: Destination) ->
 @pytest.mark.parametrize("text", [
     "", "{", "[]", "{}", "null", '{"port": "sim"}', '{"port": "sim", "baud": "fast", "sim_speed": 1}',
     '{"port": 1, "baud": "x", "sim_speed": 0}', '{"port": "/dev/ttyS0", "baud": 7, "sim_speed": 0}',
+    '{"port": "/dev/ttyS0", "baud": Infinity, "sim_speed": 0}',
 ])  # fmt: skip
 def test_a_file_that_names_no_printer_is_as_none(text: str) -> None:
     (state_folder() / FILE).write_text(text)
