@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from time import monotonic
 from typing import Protocol
 
+from profiles.messages import terminal_words
+
 # C0 and C1 controls, DEL, what turns the direction of writing around (CVE-2021-42574), line separators, halves of characters that
 # stand for bytes of a file name.
 CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
@@ -25,14 +27,19 @@ PLAIN_AGAIN_S = 60.0  # what has not changed is said again: still alive
 
 
 def plain_line(text: str) -> str:
-    """One line: controls, newlines too, as backslash escapes; the middle of what is long is left out and its length told."""
+    """One line for a terminal: controls, newlines too, as backslash escapes; of a long one the middle is left out."""
+    return marked_line(terminal_words(text))
+
+
+def marked_line(text: str) -> str:
+    """A line that keeps the marks of keys and options, and is else as plain_line() makes it."""
     words = WORD.sub(lambda word: _shortened(word[0], WORD_BEGINNING, WORD_END), text)
     return _escaped(words if len(words) <= MOST_LENGTH else _shortened(words, MOST_LENGTH - END_LENGTH, END_LENGTH))
 
 
 def plain_lines(text: str) -> str:
-    """The same for a text of several lines, tables too: newlines stay."""
-    return "\n".join(_escaped(line) for line in text.split("\n"))
+    """Several lines for a terminal, tables too: newlines stay."""
+    return _lines(terminal_words(text))
 
 
 class Report(Protocol):
@@ -43,7 +50,8 @@ class Report(Protocol):
 
 @dataclass(frozen=True)
 class Notice:
-    """Text for a person. forced: an error that --force goes past; is_result: what a command was asked for."""
+    """Text for a person, with marks (see profiles/messages.py). forced: an error that --force goes past; is_result: what a
+    command was asked for."""
 
     text: str
     forced: bool = False
@@ -83,7 +91,8 @@ class FrontEnd:
 def to_streams(notice: Notice) -> None:
     """A result on stdout, all else on stderr."""
     stream = sys.stdout if notice.is_result else sys.stderr
-    stream.write(f"{notice.text.rstrip()}; going on because of --force\n" if notice.forced else notice.text)
+    text = terminal_words(notice.text)
+    stream.write(f"{text.rstrip()}; going on because of --force\n" if notice.forced else text)
     stream.flush()
 
 
@@ -103,22 +112,26 @@ def notices_to(front_end: FrontEnd) -> Iterator[None]:
 
 def say(text: str, *, forced: bool = False) -> None:
     """A notice of one line. forced: it is what --force goes past."""
-    _front_end.note(Notice(f"{plain_line(text)}\n", forced))
+    _front_end.note(Notice(f"{marked_line(text)}\n", forced))
 
 
 def say_lines(text: str) -> None:
     """A notice of several lines."""
-    _front_end.note(Notice(f"{plain_lines(text)}\n"))
+    _front_end.note(Notice(f"{_lines(text)}\n"))
 
 
 def show(text: str) -> None:
     """A result."""
-    _front_end.note(Notice(plain_lines(text), is_result=True))
+    _front_end.note(Notice(_lines(text), is_result=True))
 
 
 def reporting() -> AbstractContextManager[Report]:
     """What shows the progress of the work inside."""
     return _front_end.progress()
+
+
+def _lines(text: str) -> str:
+    return "\n".join(_escaped(line) for line in text.split("\n"))
 
 
 def _escaped(text: str) -> str:

@@ -127,7 +127,7 @@ class Decomposition:
     def __post_init__(self) -> None:
         whole, together = self.mesh.volume_mm3, self.volume_mm3
         if abs(together - whole) > VOLUME_TOLERANCE * whole + self.folded_mm3:
-            raise UserError(f"the parts of {self.name} add up to {together:.6g} mm3, the model has {whole:.6g} mm3")
+            raise UserError(f"the parts of {self.name} add up to {together:.6g} mm³, the model has {whole:.6g} mm³")
         self._check_order()
 
     @property

@@ -20,6 +20,7 @@ from mdp.repair.repair import repair
 from mdp.topology.components import vertex_components
 from mdp.zone import NO_ZONES, Zones
 from profiles.errors import MeshError
+from profiles.messages import advice, key_name, option
 
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
@@ -93,7 +94,7 @@ def read_in_place(path: Path) -> Mesh:
     try:
         solid, _ = repair(printed(_read_build(path))[0])
     except MeshError as error:
-        text = str(error)
+        text = f"{error}"
         raise MeshError(text if text.startswith(str(path)) else f"{path}: {text}") from None
     return Mesh(solid.vertices, solid.faces.astype(np.int32))
 
@@ -106,13 +107,16 @@ def small(mesh: Mesh, suffix: str, turned: bool) -> tuple[str, ...]:
         return ()
     longest = f"its longest side is {size_mm:.3g} mm: "
     if suffix not in (".glb", ".gltf"):
-        return (f"{longest}if its coordinates are inches, give --set process.scale={INCH_MM:g}",)
-    turn = "" if turned else " and --set process.rotate_deg=[90,0,0]"
+        return (f"{longest}if its coordinates are inches, {advice('set', f'process.scale={INCH_MM:g}', 'give')}",)
+    turn = "" if turned else f" and {option('set', 'process.rotate_deg=[90,0,0]')}"
     if size_mm * METRE_MM <= MOST_MM:
-        return (f"{longest}if its coordinates are metres with y up, as glTF has them, give --set process.scale=1000{turn}",)
+        return (
+            f"{longest}if its coordinates are metres with y up, as glTF has them, "
+            f"{advice('set', 'process.scale=1000', 'give')}{turn}",
+        )
     return (
-        f"{longest}metres with y up, as glTF has them, would be more than {MOST_MM:g} mm; for a tenth of that give "
-        f"--set process.scale=100{turn}",
+        f"{longest}metres with y up, as glTF has them, would be more than {MOST_MM:g} mm; for a tenth of that "
+        f"{advice('set', 'process.scale=100', 'give')}{turn}",
     )
 
 
@@ -159,7 +163,7 @@ def _read_build(path: Path, plate: int | None = None) -> Build:
 def _check_size(surfaces: list[Surface], scale: float) -> None:
     """Refuses what is too small or too large, naming the scale of the unit that would bring it nearest to a common size."""
     if not scale > 0 or not np.isfinite(scale):
-        raise MeshError(f"cannot be scaled by {scale:g}; process.scale must be above 0")
+        raise MeshError(f"cannot be scaled by {scale:g}; {key_name('process.scale')} must be above 0")
     corners = np.concatenate([surface.vertices[surface.faces.ravel()] for surface in surfaces])
     with np.errstate(over="ignore"):
         size_mm = scale * float(np.ptp(corners, axis=0).max())
@@ -172,7 +176,8 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
     fitting.sort(key=lambda unit: abs(np.log(size_mm * unit / TYPICAL_MM)))
     extent, likeliest = f"its largest extent is {size_mm:.4g} mm, {bound}", fitting[0]
     raise SizeError(
-        f"{extent}; if its coordinates are {OTHER_UNITS[likeliest]}, give --set process.scale={scale * likeliest:g}",
+        f"{extent}; if its coordinates are {OTHER_UNITS[likeliest]}, "
+        f"{advice('set', f'process.scale={scale * likeliest:g}', 'give')}",
         f"{extent}: which unit are its coordinates in?",
         {OTHER_UNITS[unit]: scale * unit for unit in fitting},
     )

@@ -20,13 +20,22 @@ UserError                         message (one sentence: thing, value, what is a
 Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, exit 130.
 """
 
+from profiles.messages import terminal_words
+
 
 class UserError(Exception):
-    """Something the person at the keyboard can fix; str() is the full sentence. forcible: --force goes past it."""
+    """Something the person at the keyboard can fix; str() is the full sentence for a terminal, f"{error}" keeps the marks of keys
+    and options (see messages.py). forcible: --force goes past it."""
 
     def __init__(self, *sentence: object, forcible: bool = False) -> None:
         super().__init__(*sentence)
         self.forcible = forcible
+
+    def __str__(self) -> str:
+        return terminal_words(super().__str__())
+
+    def __format__(self, spec: str) -> str:
+        return format(super().__str__(), spec)
 
 
 def reason(error: OSError) -> str:

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
+from profiles.messages import key_name, option, phrase
 from profiles.problems import not_of_mended, table_problems, unfit_for_nozzle
 from profiles.process import Process
 from profiles.settings.support import Plate, Support
@@ -106,7 +107,7 @@ def parse_part_settings(text: str) -> PartSettings:
     known = colon and number.strip().isascii() and number.strip().isdigit() and 1 <= int(number.strip()[:9]) <= MOST_PARTS
     if not known or not all(key.strip() and equals and value.strip() for key, equals, value in pairs):
         raise ProfileError(
-            f"--part {text}: PART:KEY=VALUE,... is expected, as 2:walls=4,infill_density=0.4; PART is 1 to {MOST_PARTS}"
+            f"{option('part', text)}: PART:KEY=VALUE,... is expected, as 2:walls=4,infill_density=0.4; PART is 1 to {MOST_PARTS}"
         )
     values = {key.strip().removeprefix("process."): read_value(value.strip()) for key, _, value in pairs}
     return PartSettings(part=int(number), process=values)
@@ -138,9 +139,11 @@ def process_of_part(process: Process, own: dict[str, Any]) -> Process:
 def _problems(process: Process, part: int, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
     for key in own:
         if key in OF_THE_PRINT:
-            yield f"process.{key} holds for the whole print: --set process.{key}=... sets it"
+            yield (
+                f"{key_name(f'process.{key}')} holds for the whole print: {phrase('for all', f'--set process.{key}=... sets it')}"
+            )
         elif part == 1 and key in OF_PARTS_ON_PLASTIC:
-            yield f"process.{key} holds for parts that stand on plastic: part 1 stands on the platform"
+            yield f"{key_name(f'process.{key}')} holds for parts that stand on plastic: part 1 stands on the platform"
     yield from _value_problems(process, own, nozzle_mm)
 
 
@@ -149,11 +152,12 @@ def problems_of_place(process: Process, own: dict[str, Any], nozzle_mm: float) -
     for key in own:
         if key in Process.model_fields and key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
             yield (
-                f"process.{key} holds for a whole part: {', '.join(OF_A_PLACE)} and the speeds of walls, gaps, skins, ironing, "
+                f"{key_name(f'process.{key}')} holds for a whole part: {', '.join(OF_A_PLACE)} and the speeds of walls, "
+                "gaps, skins, ironing, "
                 "bridges and infill are allowed"
             )
     if own.get("walls") == 0:
-        yield "process.walls is 0: at least 1 is allowed"
+        yield f"{key_name('process.walls')} is 0: at least 1 is allowed"
     yield from _value_problems(process, own, nozzle_mm)
 
 

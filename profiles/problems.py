@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from profiles.frozen import KEY_BY_KEY
 from profiles.machine import Machine
 from profiles.material import Material
+from profiles.messages import key_name, terminal_words
 from profiles.process import WIDTHS, Process
 from profiles.search import Search
 from profiles.wording import sentences
@@ -43,7 +44,7 @@ def not_of_mended(problems: Iterable[str], mended: frozenset[str]) -> list[str]:
 
 
 def _tells_of(sentence: str, mended: frozenset[str]) -> bool:
-    named = [f".{word}." for word in sentence.replace(":", " ").split()]
+    named = [f".{word}." for word in terminal_words(sentence).replace(":", " ").split()]
     return any(f".{key}." in word or word == f".{key.rpartition('.')[2]}." for word in named for key in mended)
 
 
@@ -96,16 +97,19 @@ def too_hot(material: Material, machine: Machine) -> Iterable[str]:
     for key in NOZZLE_TEMPERATURES:
         temperature_c = getattr(material, key)
         if temperature_c is not None and temperature_c > machine.nozzle_limit_c:
-            yield f"material.{key} is {temperature_c:g}: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C"
+            yield (
+                f"{key_name(f'material.{key}')} is {temperature_c:g}: {machine.name} allows at most {machine.nozzle_limit_c:g} °C"
+            )
     if material.bed_c > machine.bed_limit_c > 0:
-        yield f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C"
+        yield f"{key_name('material.bed_c')} is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} °C"
 
 
 def lifted_twice(process: Process, search: Search) -> Iterable[str]:
     """A raft under a model that a pedestal lifts already."""
     if process.raft_layers and search.pedestal_mm > 0.0:
         yield (
-            f"process.raft_layers is {process.raft_layers}: 0 is allowed with a pedestal (search.pedestal_mm is "
+            f"{key_name('process.raft_layers')} is {process.raft_layers}: 0 is allowed with a pedestal "
+            f"({key_name('search.pedestal_mm')} is "
             f"{search.pedestal_mm:g}), which is printed like a raft"
         )
 
@@ -117,14 +121,21 @@ def unfit_for_nozzle(process: Process, nozzle_mm: float) -> Iterable[str]:
         least_mm = LEAST_WIDTH * nozzle_mm
         most_mm = (MOST_INTERFACE_WIDTH if key == "interface_line_width_mm" else MOST_WIDTH) * nozzle_mm
         if width_mm is not None and not least_mm <= width_mm <= most_mm:
-            yield f"process.{key} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of {least_mm:g} to {most_mm:g} mm"
+            yield (
+                f"{key_name(f'process.{key}')} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
+                f"{least_mm:g} to {most_mm:g} mm"
+            )
     apart_mm = process.pin_width_nozzles * nozzle_mm + 2.0 * process.line_width_mm
     if process.interlock == "pins" and process.pin_spacing_mm < apart_mm - 1e-9:
         yield (
-            f"process.pin_spacing_mm is {process.pin_spacing_mm:g}: pins of {process.pin_width_nozzles:g} nozzles of "
+            f"{key_name('process.pin_spacing_mm')} is {process.pin_spacing_mm:g}: pins of {process.pin_width_nozzles:g} "
+            "nozzles of "
             f"{nozzle_mm:g} mm with a wall round each are at least {apart_mm:g} mm apart"
         )
     for key in process.heights:
         height_mm = getattr(process, key)
         if height_mm > nozzle_mm:
-            yield f"process.{key} is {height_mm:g}: a {nozzle_mm:g} mm nozzle prints layers of at most {nozzle_mm:g} mm"
+            yield (
+                f"{key_name(f'process.{key}')} is {height_mm:g}: a {nozzle_mm:g} mm nozzle prints layers of at most "
+                f"{nozzle_mm:g} mm"
+            )

@@ -10,6 +10,7 @@ from profiles.errors import ProfileError
 from profiles.frozen import Frozen
 from profiles.machine import Machine
 from profiles.material import Material
+from profiles.messages import option
 from profiles.part_settings import PartSettings, merge_part_settings, process_of_part
 from profiles.places import (
     KINDS,
@@ -99,7 +100,7 @@ def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[st
         _apply(whole, setting)
         if setting.partition(".")[0].strip() not in OF_KIND[kind]:
             own_keys = " and ".join(f"{section}." for section in OF_KIND[kind])
-            raise ProfileError(f"--set {setting}: {name} is a {kind} profile, whose keys begin with {own_keys}")
+            raise ProfileError(f"{option('set', setting)}: {name} is a {kind} profile, whose keys begin with {own_keys}")
     problems = [problem for name in OF_KIND[kind] for problem in _section_problems(name, whole[name])]
     if problems:
         raise ProfileError("; ".join(problems))
@@ -136,14 +137,14 @@ def check_file(path: Path) -> list[str]:
     try:
         kind, document = kind_in(path), parse(path)
     except ProfileError as error:
-        return [str(error)]
+        return [f"{error}"]
     sound = tables(kind, DEFAULTS[kind])
     problem = strangers(kind, str(path), document)
     problems = [problem] if problem else []
     try:
         base = inherited(kind, str(path), document, (str(path.resolve()),))
     except ProfileError as error:
-        problems.append(str(error))
+        problems.append(f"{error}")
         base = sound
     if misspelt_parent(document):  # what it would inherit is not missing
         base = sound
@@ -173,7 +174,7 @@ def _apply(whole: dict[str, Any], setting: str) -> None:
     steps = key.strip().split(".")
     if not equals or len(steps) < 2 or steps[0] not in SECTIONS or not all(steps):
         begins = ", ".join(f"{section}." for section in SECTIONS)
-        raise ProfileError(f"--set {setting}: KEY=VALUE is expected, where KEY begins with one of {begins}")
+        raise ProfileError(f"{option('set', setting)}: KEY=VALUE is expected, where KEY begins with one of {begins}")
     value = read_value(text.strip())
     table = whole
     for step in steps[:-1]:

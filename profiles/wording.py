@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
@@ -10,7 +10,10 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from profiles.messages import key_name, phrase
+
 LONGEST_VALUE = 60
+KEY = re.compile(r"\b[a-z][a-z0-9]*_\w+")
 ONE_OF, NAME_OF = re.compile(r"\^\[(\w+)\]\$"), re.compile(r"\^\[([^\]]+)\]\*\$")
 KINDS = (("A-Za-z", "letters"), ("0-9", "digits"))
 
@@ -46,19 +49,31 @@ def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> st
     key = (prefix + ".".join(str(step) for step in steps)).rstrip(".")
     if problem["type"] == "value_error":
         table = _table(root, steps)
-        dot = "." if key and table is not None and text.split(" ")[0].split(".")[0].rstrip(":") in table.model_fields else ": "
-        return f"{key}{dot}{text}" if key else text
+        fields = () if table is None else table.model_fields
+        word = text.split(" ")[0].rstrip(":")
+        if not key:
+            return text
+        if word.split(".")[0] in fields:
+            return f"{key_name(f'{key}.{word}')}{_with_marks(text[len(word) :], key, fields)}"
+        return f"{key_name(key)}: {_with_marks(text, key, fields)}"
     if problem["type"] == "extra_forbidden":
         near = nearest(key, [name for name, _ in keys(root, prefix)])
-        return f"{key} is not a key of a profile" + (f": did you mean {near}?" if near else " (`profiles show` lists them)")
+        return f"{key} is not a key of a profile" + (
+            f": did you mean {key_name(near)}?" if near else f" ({phrase('settings', '`profiles show`')} lists them)"
+        )
     if problem["type"] == "missing" and not isinstance(steps[-1], int):
         field = _field(root, steps)
-        return f"{key} is missing" + (f": {allowed(field)} is expected" if field else "")
+        return f"{key_name(key)} is missing" + (f": {allowed(field)} is expected" if field else "")
     field = _field(root, steps)
     while steps and isinstance(steps[-1], int) and problem["type"] == "missing":
         steps, key = steps[:-1], key.rpartition(".")[0]
     expected = allowed(field) if field else "a table of keys"
-    return f"{key} is {_shown(problem['input'])}: it must be {expected}"
+    return f"{key_name(key)} is {_shown(problem['input'])}: it must be {expected}"
+
+
+def _with_marks(text: str, table: str, fields: Collection[str]) -> str:
+    """The text with its keys of a table marked, but for those that are plain words as well, as "walls"."""
+    return KEY.sub(lambda word: key_name(f"{table}.{word[0]}", word[0]) if word[0] in fields else word[0], text)
 
 
 def nearest(key: str, known: list[str]) -> str | None:

@@ -16,6 +16,7 @@ from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices, Ints, Mesh
 from profiles.errors import SliceError
+from profiles.messages import key_name
 from profiles.process import Process
 from profiles.profile import Profile
 
@@ -161,7 +162,7 @@ def _check(top_mm: float, process: Process) -> None:
     layer = getattr(process, name)
     if top_mm > MOST_LAYERS * layer:
         raise SliceError(
-            f"a part {top_mm:.6g} mm high needs {top_mm / layer:.0f} layers of process.{name} "
+            f"a part {top_mm:.6g} mm high needs {top_mm / layer:.0f} layers of {key_name(f'process.{name}')} "
             f"{layer:g} mm: at most {MOST_LAYERS} are allowed"
         )
 

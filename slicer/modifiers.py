@@ -17,6 +17,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import MeshVolume, Volume
 from profiles.errors import SliceError
+from profiles.messages import key_name
 from profiles.part_settings import process_of_part
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, clean, closing, offset, rectangle, union, unite_layers
@@ -51,9 +52,13 @@ def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -
     for own, modifiers in groupby(part.modifiers, key=lambda modifier: modifier.process):
         settings = process_of_part(process, own).model_dump(include=set(own))
         if process.spiral_vase:
-            raise SliceError("process.spiral_vase is one wall all the way up: a [[modifier]] of the plan changes nothing in it")
+            raise SliceError(
+                f"{key_name('process.spiral_vase')} is one wall all the way up: a [[modifier]] of the plan changes nothing in it"
+            )
         if process.walls == 0 and "walls" in settings:
-            raise SliceError("process.walls is 0: a [[modifier]] of the plan can only change the walls of a part that has some")
+            raise SliceError(
+                f"{key_name('process.walls')} is 0: a [[modifier]] of the plan can only change the walls of a part that has some"
+            )
         sections = [volume_sections(part, modifier.volume, cuts_mm) for modifier in modifiers]
         places.append(Place(settings, [union(layer) ^ window for layer in zip(*sections, strict=True)]))
     return [place for place in places if any(not area.is_empty() for area in place.areas)]

@@ -22,6 +22,7 @@ from mdp.decomposition import Part
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Floats
 from profiles.errors import SliceError
+from profiles.messages import key_name, phrase
 from profiles.profile import Profile
 from slicer.bead import BEFORE_WALLS, FILL, LAST, OUTSIDE, Bead
 from slicer.fill.ends import CARRYING, Plastic, cut_anchors, hold_ends, plastic_of
@@ -82,10 +83,11 @@ def slice_parts(
         return ()
     models = sum(part.on_platform for part in parts)
     if profile.process.spiral_vase and models > 1:
-        raise SliceError(f"process.spiral_vase climbs round one model, {models} are on the plate")
+        raise SliceError(f"{key_name('process.spiral_vase')} climbs round one model, {models} are on the plate")
     if profile.process.spiral_vase and len(parts) > 1:
         raise SliceError(
-            f"process.spiral_vase climbs round a model in one part, this one is in {len(parts)}: --parts 1 prints it in one piece"
+            f"{key_name('process.spiral_vase')} climbs round a model in one part, this one is in {len(parts)}: "
+            f"{phrase('one part', '--parts 1 prints it in one piece')}"
         )
     sections = section_parts(parts, profile)
     overhangs = [find_overhangs(layers) for layers in sections]
@@ -306,18 +308,20 @@ def _check_printed(sections: Sections, layers: Sequence[Layer]) -> None:
         x, y, z = high - low
         if process.walls == 0 and process.infill_density == 0:
             raise SliceError(
-                f"part {part.index} gives no path at all: process.walls and process.infill_density are 0, and "
+                f"part {part.index} gives no path at all: {key_name('process.walls')} and "
+                f"{key_name('process.infill_density')} are 0, and "
                 f"{process.bottom_layers} bottom and {process.top_layers} top layers give no skin"
             )
         raise SliceError(
             f"part {part.index} gives no path at all: it measures {x:.3g} x {y:.3g} x {z:.3g} mm and no place of it is wider "
-            f"than half of process.line_width_mm ({0.5 * process.line_width_mm:g} mm is the least): "
-            "a larger process.scale or a finer nozzle prints it"
+            f"than half of {key_name('process.line_width_mm')} ({0.5 * process.line_width_mm:g} mm is the least): "
+            f"a larger {key_name('process.scale')} or a finer nozzle prints it"
         )
     first = next(layer for layer in layers if not layer.is_of(Kind.SKIRT).all())
     if sections.on_platform and process.walls and first.z_mm - first.height_mm > ON_PLATE_MM:
-        support = "" if process.support == "auto" else ", or process.support = auto"
+        support = "" if process.support == "auto" else f", or {key_name('process.support')} = auto"
         raise SliceError(
             f"part {part.index} would begin in air, {first.z_mm - first.height_mm:.2f} mm above the plate: what lies below is "
-            f"too thin for lines of {process.line_width_mm:g} mm: a larger process.scale or a finer nozzle prints it{support}"
+            f"too thin for lines of {process.line_width_mm:g} mm: a larger {key_name('process.scale')} or a finer "
+            f"nozzle prints it{support}"
         )

@@ -81,7 +81,7 @@ def _left_on(program: ParsedProgram) -> Iterator[Finding]:
         events = [e for e in program.events if e.code in codes]
         if events and events[-1].value > 0:
             severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
-            message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing{unless}"
+            message = f"the {name} heater stays at {events[-1].value:g} °C after the end: {off} is missing{unless}"
             yield at_event(program, events[-1], severity, "heater-on", message)
 
 
@@ -104,7 +104,7 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
     if not own:
         usual = min(float(np.median(wanted[beads])), machine.nozzle_limit_c)
         least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
-    message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
+    message = f"the nozzle is at {{value}} °C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
     cool, hot = (np.flatnonzero(beads & wrong) for wrong in (wanted < least, wanted > most))
     return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted[rows], message, code="temperature")]
 
@@ -183,7 +183,7 @@ def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
     for some in pieces(len(flow)):
         flow[some] = program.e_mm[some] * area / (program.ways_mm(some) + ROUNDING_MM) * program.feed[some] / 60.0
     most = material.volumetric_limit_mm3_s
-    message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
+    message = f"{{value}} mm³/s are asked for, {material.name} allows {most:g} mm³/s (moves: {{count}})"
     much = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (flow > most * SLACK))
     return per_part(program, much, flow[much], message, code="flow", severity="warning")
 
@@ -198,7 +198,7 @@ def _profile(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     for place in program.unsupported:
         where = f", most of them in layer {place.layer}" if place.layer else ""
         why = f": {place.reason}" if place.reason else ""
-        message = f"{place.mm2:g} mm2 of risky faces of part {place.part} could be given no support{where}{why}"
+        message = f"{place.mm2:g} mm² of risky faces of part {place.part} could be given no support{where}{why}"
         yield Finding("warning", "unsupported", place.line, place.part, place.layer, message)
 
 

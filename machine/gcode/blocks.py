@@ -17,6 +17,7 @@ from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.errors import GcodeError, MoveError, ProfileError
 from profiles.machine import Blocks, Machine
+from profiles.messages import key_name
 from profiles.places import shipped_of_dialect
 from profiles.profile import Profile
 
@@ -34,11 +35,13 @@ def block_problems(profile: Profile, *blocks: str) -> list[str]:
     problems, refused = list[str](), dict[str, list[str]]()
     for block in blocks or tuple(Blocks.model_fields):
         try:
-            lines = fill_block(getattr(machine.gcode, block), f"machine.gcode.{block}", block_values(profile, block), dialect)
+            lines = fill_block(
+                getattr(machine.gcode, block), f"{key_name(f'machine.gcode.{block}')}", block_values(profile, block), dialect
+            )
             refused[block] = list(refused_lines(lines, dialect))
             problems += _moving(lines, dialect) if block == BEFORE_LAYER else ()
         except ProfileError as error:
-            problems.append(str(error))
+            problems.append(f"{error}")
     return [*problems, *_foreign(machine, {block: lines for block, lines in refused.items() if lines})]
 
 
@@ -54,7 +57,8 @@ def _moving(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
     for line in lines:
         if not stands_still(line, dialect):
             yield (
-                f"machine.gcode.{BEFORE_LAYER}: {line!r} may move an axis or change a mode: over the print only commands are "
+                f"{key_name(f'machine.gcode.{BEFORE_LAYER}')}: {line!r} may move an axis or change a mode: over the "
+                "print only commands are "
                 "allowed that are known to do neither, macros are not"
             )
 
@@ -65,11 +69,12 @@ def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator
         return
     lines = list(dict.fromkeys(line for block in refused.values() for line in block))
     shown = ", ".join(repr(line) for line in lines[:MOST_QUOTED]) + (", ..." if len(lines) > MOST_QUOTED else "")
-    blocks = " and ".join(f"machine.gcode.{block}" for block in refused)
+    blocks = " and ".join(f"{key_name(f'machine.gcode.{block}')}" for block in refused)
     known = ", ".join(shipped_of_dialect(machine.dialect))
     inherit = f"use or inherit a machine of that dialect ({known}), or " if known else ""
     yield (
-        f"machine.dialect is {machine.dialect}, but {blocks} {'are' if len(refused) > 1 else 'is'} written for another firmware: "
+        f"{key_name('machine.dialect')} is {machine.dialect}, but {blocks} {'are' if len(refused) > 1 else 'is'} "
+        "written for another firmware: "
         f"{dialect_of(machine).firmware} does not take {shown}; {inherit}write {blocks} in its words"
     )
 
@@ -102,7 +107,8 @@ def cold_block(lines: Sequence[str], dialect: Dialect) -> tuple[list[str], list[
     for index, (line, heat) in enumerate(zip(lines, heats, strict=True)):
         if (heat is Heat.UNSURE and index <= last) or (heat is Heat.HEATS and index in homing):
             raise MoveError(
-                f"machine.gcode.start: {line!r} may heat ({heat.value}), and the machine is not homed before it: a machine that "
+                f"{key_name('machine.gcode.start')}: {line!r} may heat ({heat.value}), and the machine is not homed "
+                "before it: a machine that "
                 "is to stay cold cannot be homed by this block"
             )
     kept, unsure = ([line for line, own in zip(lines, heats, strict=True) if own is heat] for heat in (Heat.COLD, Heat.UNSURE))

@@ -17,6 +17,7 @@ from machine.planning.limits import stroke_filament_mm_s, wipe_filament_mm_s
 from machine.planning.moves import TRAVEL, WIPE, BeginLayer, BeginPart, MachineProgram, Mark, Pause, Reorient, straight_moves
 from mdp.mesh import Floats
 from mdp.pose import level
+from profiles.messages import key_name
 from profiles.profile import Profile
 from slicer.estimate.timing import move_times
 from slicer.paths import KINDS, NUMBER, Kind
@@ -106,7 +107,7 @@ def _ended(lines: Iterable[str]) -> str:
 
 def _block(name: str, pen: Pen, **values: object) -> list[str]:
     """The lines of one of the profile's blocks."""
-    return fill_block(getattr(pen.machine.gcode, name), f"machine.gcode.{name}", pen.values | values, pen.dialect)
+    return fill_block(getattr(pen.machine.gcode, name), f"{key_name(f'machine.gcode.{name}')}", pen.values | values, pen.dialect)
 
 
 def _dialect_line(word: str, pen: Pen, **values: object) -> list[str]:

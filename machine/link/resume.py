@@ -28,22 +28,26 @@ from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import FirmwareError, JournalError, SilenceError
 from profiles.machine import Machine
+from profiles.messages import key_name, option, phrase
 from profiles.profile import Profile
 
 TOO_LITTLE = "hardly anything was printed: the program begins anew"
 PARKED = (PAUSED, LEFT)  # states in which the journal's pose is where the tip has been taken
 MOVING = ("pausing", "resuming")
 HOME_IT = (
-    "write into machine.gcode.resume of a profile of this machine how it is homed with a print on it (docs/serial.md), and name "
-    "that profile with --machine"
+    f"write into {key_name('machine.gcode.resume')} of a profile of this machine how it is homed with a print on it "
+    "(docs/serial.md), and name "
+    f"that profile {phrase('homed as in', 'with --machine')}"
 )
+AGAIN = phrase("again", "resume can be tried again")
 NO_ANSWER = (
-    "the printer did not answer when it was asked where it stands: is it switched on, is --baud the firmware's rate, does it "
-    "still heat or move? Nothing was changed: when it has come to rest, resume can be tried again"
+    f"the printer did not answer when it was asked where it stands: is it switched on, is {option('baud')} the "
+    "firmware's rate, does it "
+    f"still heat or move? Nothing was changed: when it has come to rest, {AGAIN}"
 )
 FAULTY = (
     "the printer does not say where it stands, but reports: {}. Nothing was changed: when that is put right (Klipper's "
-    "FIRMWARE_RESTART, another firmware's reset), resume can be tried again"
+    f"FIRMWARE_RESTART, another firmware's reset), {AGAIN}"
 )
 UNSURE_MM = 0.005
 SAME = 0.02  # mm or deg: M114 reports hundredths
@@ -157,12 +161,12 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
 def _check_begun(status: PrinterStatus, begun: bool, profile: Profile) -> None:
     """Refuse a printer that does not stand as a restart leaves it, for it may have been homed or moved since."""
     if not begun:
-        keys = ", ".join(f"machine.{key}" for key in HOME_KEYS)
+        keys = ", ".join(f"{key_name(f'machine.{key}')}" for key in HOME_KEYS)
         raise JournalError(
             f"the printer's line numbers have begun anew, but it says that it stands at {_in_words(status)}: "
             "it was homed or moved since; switch it off and on, move nothing, and resume again. "
             "If it says the same place then, that is where its firmware "
-            f"starts: write it as {keys} into a profile of this machine and name that with --machine"
+            f"starts: write it as {keys} into a profile of this machine and name that {phrase('homed as in', 'with --machine')}"
         )
     if status.last_number and _nonzero(status):  # at 0 0 0 nothing was homed
         raise JournalError(

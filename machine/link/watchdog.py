@@ -49,7 +49,7 @@ class HeaterWatch:
             self.nearest_c, self.nearest_s = off, now_s
         elif now_s - self.nearest_s > self.off_s:
             raise PrinterError(
-                f"the {self.name} has been at {now_c:.0f} deg C for {now_s - self.nearest_s:.0f} s although {target_c:.0f} is "
+                f"the {self.name} has been at {now_c:.0f} °C for {now_s - self.nearest_s:.0f} s although {target_c:.0f} is "
                 "wanted: its heater or its sensor has failed"
             )
 
@@ -71,7 +71,7 @@ class Watchdog:
         for heater, most_c, (now_c, target_c) in zip(self._heaters, self.most_c, pairs, strict=True):
             heater.over = heater.over + 1 if now_c is not None and now_c > most_c + OVER_LIMIT_C else 0
             if heater.over >= OVER_REPORTS:
-                raise PrinterError(f"the {heater.name} is at {now_c:.0f} deg C: this machine allows at most {most_c:g}")
+                raise PrinterError(f"the {heater.name} is at {now_c:.0f} °C: this machine allows at most {most_c:g}")
             if not heater.over:
                 heater.check(now_c, target_c, now_s)
 

@@ -21,6 +21,7 @@ from mdp.overhang import step_shares
 from mdp.save import joint_values
 from mdp.search.parts import one_piece
 from profiles.errors import UserError
+from profiles.messages import terminal_words
 from profiles.profile import Profile
 from slicer.paths import Kind
 from slicer.raft import lift_mm
@@ -109,7 +110,7 @@ def _in_one_part(way: Alternative, parts: Sequence[Part], profile: Profile, repo
         plate, profile = on_one_plate([models[part] for part in parts], profile)
         program = build(plate, profile, report=report)
     except UserError as error:  # the others can still be compared
-        return replace(way, message=str(error))
+        return replace(way, message=f"{error}")
     return _figures(way, program, profile)
 
 
@@ -167,7 +168,7 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
             "findings": alternative.findings,
             "interfaces": [{"part": part, "plastic_mm3": mm3} for part, mm3 in alternative.interface_mm3.items()],
             "joints": joint_values(alternative.joints),
-            "message": alternative.message,
+            "message": terminal_words(alternative.message),
         }
         for name, alternative in zip(NAMES, alternatives, strict=True)
     ]

@@ -13,6 +13,7 @@ from machine.notices import Report, reporting, say
 from mdp.kernels.cache import is_cached, keep, trouble
 from mdp.kernels.threads import THREADS, harmless
 from mdp.kernels.workers import CallError, Worker
+from profiles.messages import phrase
 from profiles.profile import Profile
 
 JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = (
@@ -56,10 +57,10 @@ class Compilers:
             return
         if not self._announced:
             self._announced = True
-            say("compiling the kernels (only the first run that needs them does)")
+            say(phrase("compiling", "compiling the kernels (only the first run that needs them does)"))
         with nullcontext(report) if report is not None else reporting() as show:
             while not self._ready(bundles):
-                show(f"compiling the kernels: {self._kernels} done")
+                show(phrase("compiled", f"compiling the kernels: {self._kernels} done", self._kernels))
                 with self._changed:
                     self._changed.wait(LOOK_S)
 

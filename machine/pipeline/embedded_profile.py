@@ -11,6 +11,7 @@ from machine.pipeline.requests import Given
 from profiles.errors import ProfileError
 from profiles.foreign.imported import KINDS, imported
 from profiles.foreign.read import is_slicer_file, read_config, read_slicer_settings
+from profiles.messages import phrase
 from profiles.part_settings import PartSettings
 from profiles.profile import SECTIONS, Profile, sound_section, with_part_settings
 from profiles.toml_text import read_toml, value_text
@@ -124,5 +125,7 @@ def settings_inside(file: Path, name: str, kinds: Iterable[str] = KINDS) -> tupl
     found = {kind: imported(config, kind, nameless=Path(name).stem) for kind in kinds}
     counts = [f"{sum(row.taken for row in profile.rows)} of {len(profile.rows)} of the {kind}" for kind, profile in found.items()]
     settings = tuple(setting for profile in found.values() for setting in profile.settings)
-    note = f"{name}: uses the settings of {config.program} inside: {', '.join(counts)}; profiles import lists them"
+    note = (
+        f"{name}: uses the settings of {config.program} inside: {', '.join(counts)}{phrase('', '; profiles import lists them')}"
+    )
     return Given(material=found["material"].base if "material" in found else Given.material, settings=settings), note

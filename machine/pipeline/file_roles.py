@@ -9,6 +9,7 @@ from machine.pipeline.requests import STDOUT, ModelRequest, Outputs
 from mdp.model_file import DEMO
 from mdp.ranking import SUFFIX
 from profiles.errors import OutputError
+from profiles.messages import option
 from profiles.places import is_file_name
 
 PROGRAM = ".gcode"  # ends the name of a program that is kept beside its journal
@@ -26,7 +27,7 @@ def check_model_files(request: ModelRequest, written: Iterable[Role], *also_read
 def printing_files(log: Path | None, journal: Path | None) -> tuple[Role, ...]:
     """The files that a print writes."""
     program = None if journal is None else program_beside(journal)
-    return ("--log", log), ("--journal", journal), ("the program beside --journal", program)
+    return (option("log"), log), (option("journal"), journal), (f"the program beside {option('journal')}", program)
 
 
 def program_beside(journal: Path) -> Path:
@@ -59,17 +60,24 @@ def _identity(path: Path) -> object:
 
 def _read_by(request: ModelRequest) -> list[Role]:
     models = [("the model", Path(name)) for name in (request.model, *request.beside) if not name.startswith(DEMO)]
-    profiles = zip(("--machine", "--material", "--process"), request.profile_names, strict=False)
+    profiles = zip(("machine", "material", "process"), request.profile_names, strict=False)
     ranker = Path(request.ranker) if request.ranker.endswith(SUFFIX) else None
-    own = [(option, Path(name)) for option, name in profiles if name is not None and is_file_name(name)]
-    plans = [("--plan", plan) for plan in request.cuts.plans]
-    return [*models, ("the project", request.project), *plans, ("--planes", request.cuts.planes), ("--ranker", ranker), *own]
+    own = [(option(kind), Path(name)) for kind, name in profiles if name is not None and is_file_name(name)]
+    plans = [(option("plan"), plan) for plan in request.cuts.plans]
+    return [
+        *models,
+        ("the project", request.project),
+        *plans,
+        (option("planes"), request.cuts.planes),
+        (option("ranker"), ranker),
+        *own,
+    ]
 
 
 def _written(outputs: Outputs) -> list[Role]:
     names = ("gcode", "json", "html", "png", "sheet", "front", "svg", "record", "plan")
     label = {"gcode": "output", "html": "page"}
-    return [(label.get(name, f"--{name}"), getattr(outputs, name)) for name in names]
+    return [(label.get(name, option(name)), getattr(outputs, name)) for name in names]
 
 
 def _check_folder(folder: Path, read: Iterable[Role]) -> None:
@@ -79,7 +87,7 @@ def _check_folder(folder: Path, read: Iterable[Role]) -> None:
     own = {_identity(folder / name): name for name in FOLDER_FILES}
     own |= {_identity(file): file.name for file in folder.glob(PART_FILES)} if folder.is_dir() else {}
     for role, path in read:
-        if role != "--plan" and path is not None and (name := own.get(_identity(path))) is not None:
+        if role != option("plan") and path is not None and (name := own.get(_identity(path))) is not None:
             raise OutputError(
                 f"output folder {folder} gets a file {name}, but that is {role}, which is read: another is expected"
             )

@@ -17,6 +17,7 @@ from mdp.search.plan_reading import read_plan
 from mdp.search.search import check_part_count
 from mdp.zone import NO_ZONES, Modifier, Zones
 from profiles.errors import PlanError, ProfileError
+from profiles.messages import key_name, option
 from profiles.part_settings import problems_of_place
 from profiles.profile import Profile, with_part_settings
 
@@ -29,8 +30,9 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
     if request.profile.parts and len(models) > 1:
         part = request.profile.parts[0]
         raise PlanError(
-            f"--part {part.part} goes with one model, and several are given, {', '.join(names)}: settings of a part of one of "
-            "them stand in its plan, as process = {...} of its [[part]], and --plan names that"
+            f"{option('part', part.part)} goes with one model, and several are given, {', '.join(names)}: settings of a "
+            "part of one of "
+            f"them stand in its plan, as process = {{...}} of its [[part]], and {option('plan')} names that"
         )
     for file in request.cuts.plans:
         model = read_plan(file).model if len(models) > 1 else names[0]
@@ -40,7 +42,9 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
             )
         name = models[names.index(model)]
         if each[name].cuts.plans:
-            raise PlanError(f"--plan {file}: --plan {each[name].cuts.plan} cuts {model} already, and one plan cuts a model")
+            raise PlanError(
+                f"{option('plan', file)}: {option('plan', each[name].cuts.plan)} cuts {model} already, and one plan cuts a model"
+            )
         each[name] = replace(each[name], cuts=replace(request.cuts, plans=(file,)))
     return each
 
@@ -57,7 +61,7 @@ def check_number(request: ModelRequest) -> None:
     """Raise PlanError for more models than a plate may have."""
     count = request.copies * (1 + len(request.beside))
     if count > MOST_COPIES:
-        of_each = f" with --copies {request.copies}" if request.copies > 1 else ""
+        of_each = f" with {option('copies', request.copies)}" if request.copies > 1 else ""
         raise PlanError(f"{count} models are to stand on the plate{of_each}: {MOST_COPIES} at most are allowed")
 
 
@@ -68,17 +72,24 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     if cuts.parts is not None:
         check_part_count(cuts.parts)
     if cuts.plan is not None and cuts.planes is not None:
-        raise PlanError(f"--planes {cuts.planes}: --plan {cuts.plan} exists, so nothing is searched; one of them is allowed")
+        raise PlanError(
+            f"{option('planes', cuts.planes)}: {option('plan', cuts.plan)} exists, so nothing is searched; one of them is allowed"
+        )
     if cuts.plan is not None and record is not None:
-        raise PlanError(f"--record {record}: --plan {cuts.plan} exists, so nothing is searched that could be recorded")
+        raise PlanError(
+            f"{option('record', record)}: {option('plan', cuts.plan)} exists, so nothing is searched that could be recorded"
+        )
     if cuts.planes is not None and request.orient:
-        raise PlanError(f"--orient: the planes of {cuts.planes} belong to the model as it lies; process.rotate_deg turns it")
+        raise PlanError(
+            f"{option('orient')}: the planes of {cuts.planes} belong to the model as it lies; "
+            f"{key_name('process.rotate_deg')} turns it"
+        )
     if cuts.plan is not None and request.orient:
-        raise PlanError(f"--orient: the plan {cuts.plan} says how the model lies; leave one of them out")
+        raise PlanError(f"{option('orient')}: the plan {cuts.plan} says how the model lies; leave one of them out")
     file = cuts.plan or cuts.planes or _plan_of_demo(request)
     given = None if file is None else read_plan(file)
     if given is not None and given.orientation is not None and request.orient is False:
-        raise PlanError(f"--as-is: the plan {file} lays the model down by its orientation; leave one of them out")
+        raise PlanError(f"{option('as-is')}: the plan {file} lays the model down by its orientation; leave one of them out")
     return given
 
 

@@ -8,9 +8,13 @@ from mdp.decomposition import FrontRow
 from mdp.directions.orientation import in_words, side_in_words
 from mdp.mesh import Mesh
 from mdp.search.orient import Oriented
+from profiles.messages import key_name
 from profiles.profile import Profile
 
-HARDLY_HELD = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
+HARDLY_HELD = (
+    f"its base may be too small to hold it: think of a wide brim ({key_name('process.brim_mm')}) or another "
+    f"side ({key_name('process.rotate_deg')})"
+)
 
 
 def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
@@ -23,7 +27,7 @@ def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
     side, turns = side_in_words(orientation), in_words(orientation, held=True)
     where, better = f"{side} ({turns})" if side else turns, ""
     if laid is not None:
-        was = f"{oriented.upright.risky_mm2:.0f} mm2 hang over" if standing is None else _with_scars(standing)
+        was = f"{oriented.upright.risky_mm2:.0f} mm² hang over" if standing is None else _with_scars(standing)
         better = f": {_with_scars(laid)}, as it stands {was if oriented.upright_held else 'the plate would hardly hold it'}"
     return (f"it is laid down {where}{better}; {otherwise}", *warning)
 
@@ -35,7 +39,7 @@ def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
 
 def _with_scars(row: FrontRow) -> str:
     taking = "" if row.time_s is None else f" in {minutes(row.time_s)}"
-    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm2 of scars{taking}"
+    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm² of scars{taking}"
 
 
 def in_parts(count: int) -> str:

@@ -14,6 +14,7 @@ from mdp.decomposition import Decomposition
 from mdp.save import FOLDER_FILES, HEADING, PART_FILES, glb, part_file, stl, threemf
 from profiles.errors import OutputError, reason
 from profiles.files import PRIVATE, SHARED, write_whole
+from profiles.messages import option
 
 LONGEST_NAME, LONGEST_SUFFIX = 150, 20  # bytes, which a disk counts
 
@@ -35,7 +36,7 @@ def plain_name(name: str) -> str:
 def check_writable(path: Path) -> None:
     """Refuse early what could not be written at the end of long work."""
     if path == STDOUT:
-        raise OutputError("output -: a file name is expected; --json, and -o of export, can go to standard output")
+        raise OutputError(f"output -: a file name is expected; {option('json')}, and -o of export, can go to standard output")
     if isdir(path):
         raise OutputError(f"output {path} is a folder: a file name is expected")
     _check_name(path)
@@ -91,7 +92,7 @@ def _check_parent(path: Path, folder: Path) -> None:
 def check_folder(path: Path) -> None:
     """Refuse early a folder that cannot be made or written."""
     if path == STDOUT:
-        raise OutputError("output -: a folder is expected; only --json can go to standard output")
+        raise OutputError(f"output -: a folder is expected; only {option('json')} can go to standard output")
     _check_name(path)
     if exists(path) and not isdir(path):
         raise OutputError(f"output {path} is a file: a folder is expected")
@@ -120,7 +121,7 @@ def write_bytes(path: Path, content: bytes, private: bool = False) -> None:
 def refuse_to_overwrite(file: Path, replace: bool) -> None:
     """Raise OutputError for a file that exists, unless it may be replaced."""
     if file.exists() and not replace:
-        raise OutputError(f"{file} exists: --replace writes over it, another name leaves it")
+        raise OutputError(f"{file} exists: {option('replace')} writes over it, another name leaves it")
 
 
 def write_own(file: Path, text: str, replace: bool) -> None:

@@ -48,6 +48,7 @@ from mdp.search.orient import orient_and_decompose
 from mdp.search.plan_file import NO_PLAN, PlanFile, plan_of
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
+from profiles.messages import key_name, option
 from profiles.profile import Profile
 from slicer.interface.interface import pin_width_mm, room_around_mm
 from slicer.paths import SlicedPart
@@ -76,7 +77,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     """
     keep_modules()
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
-    check_copies(request.copies, "--copies")
+    check_copies(request.copies, option("copies"))
     check_number(request)
     requests = request_of_each(request)
     began = perf_counter()
@@ -116,7 +117,10 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
         asked = _Search(request, given, model, to_build and not laying, report)
         if laying:
             oriented = orient_and_decompose(mesh, profile, pricing, asked.search)
-            decomposition, notes = oriented.decomposition, orientation_in_words(oriented, "--as-is keeps it as it stands")
+            decomposition, notes = (
+                oriented.decomposition,
+                orientation_in_words(oriented, f"{option('as-is')} keeps it as it stands"),
+            )
             orientation = None if oriented.orientation is None else oriented.orientation.rotation
         else:
             decomposition, notes = asked.search(mesh), standing_in_words(mesh, profile)
@@ -238,7 +242,7 @@ def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
         elif part.too_thin:
             where = f"of part {part.index} {part.too_thin} layer(s), the first at {part.too_thin_mm:.2f} mm"
             nozzle = f"a line of a {profile.machine.head.nozzle_mm:g} mm nozzle"
-            wanted = "a larger process.scale or a finer nozzle prints them"
+            wanted = f"a larger {key_name('process.scale')} or a finer nozzle prints them"
             yield f"{where}, hold nothing wide enough for {nozzle}, so what is above them hangs: {wanted}"
 
 
@@ -255,9 +259,12 @@ def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
     """What was asked for and is not in the program."""
     if profile.process.raft_layers and profile.process.brim_mm > 0.0:
-        yield "process.brim_mm has no effect with a raft: process.raft_first_layer_expansion_mm makes that wider"
+        yield (
+            f"{key_name('process.brim_mm')} has no effect with a raft: "
+            f"{key_name('process.raft_first_layer_expansion_mm')} makes that wider"
+        )
     if profile.machine.purge_mm > 0.0 and not has_purge(program):
-        yield "no place on the plate is clear of the print for a line of machine.purge_mm: there is none"
+        yield f"no place on the plate is clear of the print for a line of {key_name('machine.purge_mm')}: there is none"
     dialect = dialect_of(profile.machine)
     if profile.material.pressure_advance is not None and not dialect.pressure_advance:
-        yield f"material.pressure_advance is left out: {dialect.firmware} has no command for it"
+        yield f"{key_name('material.pressure_advance')} is left out: {dialect.firmware} has no command for it"

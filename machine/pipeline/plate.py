@@ -22,6 +22,7 @@ from mdp.topology.cross_section import cross_sections
 from mdp.zone import Marked, Modifier, Zone, in_room
 from profiles.errors import MoveError, PlanError, UserError
 from profiles.machine import Machine
+from profiles.messages import key_name, phrase
 from profiles.part_settings import OF_A_PLACE, SPEEDS_OF_A_PLACE, PartSettings
 from profiles.process import Process
 from profiles.profile import Profile
@@ -86,10 +87,11 @@ def naming_parts(parts: Sequence[Part]) -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        named = NUMBERED.search(str(error))
+        sentence = f"{error}"
+        named = NUMBERED.search(sentence)
         part = parts[int(named[1]) - 1] if named and 1 <= int(named[1]) <= len(parts) else None
         if named and part is not None and part.of:
-            error.args = (f"{str(error)[: named.end()]} ({part.of}){str(error)[named.end() :]}",)
+            error.args = (f"{sentence[: named.end()]} ({part.of}){sentence[named.end() :]}",)
         raise
 
 
@@ -147,9 +149,9 @@ def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[
         what = f"{len(models)} copies: {what}"
     if misfit.is_met:
         others = "another one" if misfit.standing == 1 else f"{misfit.standing} others"
-        wanted = "--parts 1 prints each in one piece, all layer by layer"
+        wanted = f"{phrase('one part', '--parts 1 prints each in one piece')}, all layer by layer"
         if profile.process.complete_objects:
-            wanted = "process.complete_objects = false prints them layer by layer"
+            wanted = f"{key_name('process.complete_objects')} = false prints them layer by layer"
         return f"{what} no place beside {others} at which the head passes what stands while it prints: {wanted}"
     if alike:
         return f"{what} room for {misfit.standing} with {gap_mm:g} mm between them"
@@ -202,8 +204,10 @@ def _with_place_settings(part: Part, model: Decomposition, given: Sequence[PartS
     for key in process:
         if key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
             raise PlanError(
-                f"part 1 of {model.name}: process.{key} holds for a whole part, and the first parts of all models are one part "
-                f"of the plate: --set process.{key}=... sets it for all, process.complete_objects = true prints each model alone"
+                f"part 1 of {model.name}: {key_name(f'process.{key}')} holds for a whole part, and the first parts of "
+                "all models are one part "
+                f"of the plate: {phrase('for all', f'--set process.{key}=... sets it for all')}, "
+                f"{key_name('process.complete_objects')} = true prints each model alone"
             )
     room = _room(model.mesh)
     return replace(part, modifiers=(Modifier(room, process), *part.modifiers)) if process else part

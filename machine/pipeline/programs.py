@@ -14,6 +14,7 @@ from machine.pipeline.memory import return_large_arrays
 from machine.pipeline.requests import FORCE_GOES_ON, ModelRequest
 from machine.program import Program
 from profiles.errors import GcodeError, MoveError, PlanError
+from profiles.messages import option, phrase
 from profiles.profile import Profile
 
 
@@ -54,17 +55,21 @@ def load_program(request: ModelRequest) -> LoadedProgram:
 
 def _refuse_cuts(request: ModelRequest) -> None:
     """Raise PlanError where a G-code file is to be cut."""
-    for option, value in (("--plan", request.cuts.plan), ("--parts", request.cuts.parts)):
+    for name, value in (("plan", request.cuts.plan), ("parts", request.cuts.parts)):
         if value is not None:
-            raise PlanError(f"{option} {value}: {request.model} is G-code, which is cut already; it goes with a model")
+            raise PlanError(f"{option(name, value)}: {request.model} is G-code, which is cut already; it goes with a model")
     if request.beside:
         raise PlanError(f"{request.model} is G-code, which is a plate of its own: {request.beside[0]} cannot go beside it")
     if request.copies != 1:
-        raise PlanError(f"--copies {request.copies}: {request.model} is G-code, which is sliced already; it goes with a model")
+        raise PlanError(
+            f"{option('copies', request.copies)}: {request.model} is G-code, which is sliced already; it goes with a model"
+        )
     for stop in request.stops:
         raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
     for settings in request.profile.parts:
-        raise PlanError(f"--part {settings.part}: {request.model} is G-code, which is sliced already; it goes with a model")
+        raise PlanError(
+            f"{option('part', settings.part)}: {request.model} is G-code, which is sliced already; it goes with a model"
+        )
 
 
 def read_gcode_lines(path: Path) -> Lines:
@@ -83,7 +88,9 @@ def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
     if force:
         say(count, forced=True)
         return
-    raise MoveError(f"{count}, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})", forcible=True)
+    raise MoveError(
+        f"{count}, the first: {errors[0].message} ({phrase('', 'simulate lists all, ')}{FORCE_GOES_ON})", forcible=True
+    )
 
 
 def count_of_errors(errors: Sequence[Finding]) -> str:

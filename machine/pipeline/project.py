@@ -46,6 +46,7 @@ from mdp.zone import MeshVolume
 from profiles.errors import PlanError, first_line, reason
 from profiles.files import DAMAGED_ZIP, lock_folder, remove_locked, whole_file, write_whole
 from profiles.frozen import Vector
+from profiles.messages import option
 from profiles.places import KINDS, PARENT, is_file_name, own, shipped
 from profiles.toml_text import read_toml
 
@@ -131,14 +132,16 @@ class Project:
     def check_plate(self, plate: int | None, file: Path) -> None:
         """Raises PlanError where another plate is asked for: the parts of the project are those of one."""
         if plate is not None:
-            raise PlanError(f"--plate {plate}: {file} is a project of tiltprint, whose plan is of one plate")
+            raise PlanError(f"{option('plate', plate)}: {file} is a project of tiltprint, whose plan is of one plate")
 
     def _check_plan_goes_with(self, request: ModelRequest, file: Path) -> None:
         if request.orient or (request.orient is False and self.rotation != STANDING):
-            option = "--orient" if request.orient else "--as-is"
-            raise PlanError(f"{option}: the project {file} says how its model lies; decompose the model itself to change that")
+            laid = option("orient") if request.orient else option("as-is")
+            raise PlanError(f"{laid}: the project {file} says how its model lies; decompose the model itself to change that")
         if (record := request.outputs.record) is not None:
-            raise PlanError(f"--record {record}: the project {file} has its parts, so nothing is searched that could be recorded")
+            raise PlanError(
+                f"{option('record', record)}: the project {file} has its parts, so nothing is searched that could be recorded"
+            )
 
     @property
     def argument(self) -> str:
@@ -169,8 +172,8 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
         plan=plan is not None,
         parts=project.parts,
         locked=list(project.locked),
-        pauses=[stop.option.partition(" ")[2] for stop in project.stops if not stop.change],
-        changes=[stop.option.partition(" ")[2] for stop in project.stops if stop.change],
+        pauses=[stop.at for stop in project.stops if not stop.change],
+        changes=[stop.at for stop in project.stops if stop.change],
         copies=project.copies,
         plate=project.plate,
         marks_in_plan=project.marks_in_plan,
@@ -319,7 +322,7 @@ def _check_inside(folder: Path, project: Project) -> None:
 
         plan = read_plan(project.plan)
     except PlanError as error:
-        raise PlanError(str(error).replace(f"{folder}{os.sep}", "")) from None
+        raise PlanError(f"{error}".replace(f"{folder}{os.sep}", "")) from None
     if max(project.parts, 1) != len(plan.parts) + 1:
         raise PlanError(f"{RECORD}: parts is {project.parts}: {PLAN} has {len(plan.parts) + 1}")
     if not np.allclose(plan.orientation or STANDING, project.rotation, atol=1e-9):

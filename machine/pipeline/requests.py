@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from profiles.errors import PlanError
+from profiles.messages import phrase
 
 if TYPE_CHECKING:
     from machine.planning.stops import Stop
@@ -18,7 +19,7 @@ SIMULATED = "sim"  # the port that stands for the simulated printer
 BAUD = 115200
 UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
 MOST_COPIES = 1000  # of a model, and models on a plate
-FORCE_GOES_ON = "--force goes on"  # how a sentence says that its error is forcible
+FORCE_GOES_ON = phrase("force", "--force goes on")  # how a sentence says that its error is forcible
 
 
 def check_copies(count: int, said: str) -> None:

@@ -25,6 +25,7 @@ from mdp.plane import Plane
 from mdp.pose import Pose, least_rotation, level, poses
 from profiles.errors import MoveError
 from profiles.machine import Machine
+from profiles.messages import key_name
 from profiles.profile import Profile
 from profiles.settings.support import MIDDLE
 from slicer.interface.interface import AROUND_MM
@@ -95,8 +96,8 @@ def _shift(profile: Profile) -> Floats:
 def _advice(profile: Profile) -> str:
     x, y = profile.process.place_mm
     if (x, y) == MIDDLE:
-        return "process.scale makes the model smaller"
-    return f"process.place_mm moves it from {x:g}, {y:g} mm back towards the middle"
+        return f"{key_name('process.scale')} makes the model smaller"
+    return f"{key_name('process.place_mm')} moves it from {x:g}, {y:g} mm back towards the middle"
 
 
 def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.0) -> Decomposition:

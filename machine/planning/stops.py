@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from profiles.errors import SliceError
+from profiles.messages import option
 
 if TYPE_CHECKING:
     from slicer.paths import SlicedPart
@@ -24,9 +25,14 @@ class Stop:
 
     @property
     def option(self) -> str:
-        """What a person has written."""
-        at = f"{f'{self.height_mm:.6f}'.rstrip('0').rstrip('.')}mm" if self.layer is None else str(self.layer)
-        return f"{'--filament-change' if self.change else '--pause'} {self.part}:{at}"
+        """The option that asks for it, for messages."""
+        return option("filament-change" if self.change else "pause", self.at)
+
+    @property
+    def at(self) -> str:
+        """The value of the option: PART:LAYER or PART:HEIGHTmm."""
+        height = "" if self.height_mm is None else f"{self.height_mm:.6f}".rstrip("0").rstrip(".")
+        return f"{self.part}:{f'{height}mm' if self.layer is None else self.layer}"
 
 
 def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ...]:
@@ -35,8 +41,8 @@ def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ..
     for text, change in (*((text, False) for text in pauses), *((text, True) for text in changes)):
         match = WRITTEN.fullmatch(text.strip())
         if match is None or 0 in (int(match[1]), int(match[2] or 1)):
-            option = "--filament-change" if change else "--pause"
-            raise SliceError(f"{option} {text}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
+            written = option("filament-change" if change else "pause", text)
+            raise SliceError(f"{written}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
         part, layer, height = match.groups()
         stops.append(Stop(int(part), int(layer) if layer else None, float(height) if height else None, change))
     return tuple(stops)

@@ -24,6 +24,7 @@ from machine.printing.servers.servers import dialect_mismatch
 from machine.program import Program
 from profiles.errors import PrinterError, ServerError
 from profiles.machine import Machine
+from profiles.messages import key_name, phrase
 from profiles.profile import Profile
 
 CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
@@ -121,7 +122,9 @@ def check_free(server: str, status: PrintStatus) -> None:
     """Refuse a server that cannot begin a print now. Raises ServerError."""
     if status.state.is_printing:
         now = f"{server} is {status.state} {status.file or 'another file'} now"
-        raise ServerError(f"{now}: wait until that is done; send without --start hands a file over meanwhile")
+        raise ServerError(
+            f"{now}: wait until that is done; {phrase('hand over', 'send without --start hands a file over meanwhile')}"
+        )
     if status.state is PrintState.OFFLINE:
         raise ServerError(f"{server} cannot print now: {status.message or 'its printer is not connected'}")
 
@@ -141,7 +144,7 @@ def firmware_mismatch(answer: Answer, machine: Machine) -> str:
     if dialects and machine.dialect not in dialects:
         return (
             f"the printer's firmware is {answer.firmware}, but {machine.name} writes for {machine.dialect}: "
-            f"machine.dialect must be {' or '.join(dialects)}"
+            f"{key_name('machine.dialect')} must be {' or '.join(dialects)}"
         )
     wanted = "XYZ" + (machine.tilt.letter + machine.turn.letter if machine.tilts else "")
     lacking = [letter for letter in wanted if letter not in answer.letters]
@@ -183,7 +186,7 @@ def machine_mismatch(recorded: Machine, chosen: Machine, file: str) -> str:
 
 
 def _changed(file: str, machine: Machine, key: str, then: object, now: object) -> str:
-    return f"{file} was made when machine.{key} of {machine.name} was {_text(then)}, but it is {_text(now)}"
+    return f"{file} was made when {key_name(f'machine.{key}')} of {machine.name} was {_text(then)}, but it is {_text(now)}"
 
 
 def _text(value: object) -> str:
@@ -201,7 +204,8 @@ def lacking_steppers(greeting: ServerIdentity, machine: Machine) -> str:
     there = ", ".join(sorted(greeting.steppers)) or "none"
     sections = " and ".join(f"[manual_stepper {name}]" for name in lacking)
     return (
-        f"{machine.name} turns its table by {sections}, which this Klipper lacks; it has {there}: machine.tilt.stepper names it"
+        f"{machine.name} turns its table by {sections}, which this Klipper lacks; it has {there}: "
+        f"{key_name('machine.tilt.stepper')} names it"
     )
 
 

@@ -96,7 +96,7 @@ class CommandSession:
             return "heaters, for a command was under way"
         self.command("M105")
         targets = (("nozzle", self.heat.nozzle_target_c), ("bed", self.heat.bed_target_c))
-        return " and ".join(f"{name} set to {target_c:.0f} deg C" for name, target_c in targets if target_c)
+        return " and ".join(f"{name} set to {target_c:.0f} °C" for name, target_c in targets if target_c)
 
     def switch_off(self) -> bool:
         """Heaters off; True when the printer's own report shows it. A command under way is broken off."""

@@ -12,6 +12,7 @@ from urllib.parse import SplitResult, urlsplit
 from machine.firmware.firmware import check_baud
 from machine.pipeline.requests import BAUD, SIMULATED
 from profiles.errors import PrinterError, ServerError
+from profiles.messages import option
 
 # The port that a server listens at where none is given: haproxy before OctoPrint (OctoPi), Moonraker's [server] port, a Duet.
 PORTS = {"octoprint": 80, "moonraker": 7125, "duet": 80}
@@ -103,7 +104,7 @@ def at_printer(destination: Destination) -> AtPrinter:
     """Refuse a print server where a line to a printer itself is needed. Raises ServerError."""
     if isinstance(destination, Server):
         raise ServerError(
-            f"--port {destination.name} is a print server, which takes whole files by print and send: "
+            f"{option('port', destination.name)} is a print server, which takes whole files by print and send: "
             "a printer's port is expected"
         )
     return destination
@@ -112,7 +113,7 @@ def at_printer(destination: Destination) -> AtPrinter:
 def check_speed(speed: float) -> None:
     """Refuse a speed at which no simulated printer can run. Raises PrinterError."""
     if not (isfinite(speed) and speed >= 0):
-        raise PrinterError(f"--sim-speed is {speed:g}: it must be 0 (as fast as possible) or a number above")
+        raise PrinterError(f"{option('sim-speed')} is {speed:g}: it must be 0 (as fast as possible) or a number above")
 
 
 def is_server_address(text: str) -> bool:

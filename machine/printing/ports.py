@@ -27,6 +27,7 @@ from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 from profiles.files import lock
 from profiles.folders import state_folder
 from profiles.machine import Machine
+from profiles.messages import advice, phrase
 
 ECHO = ("M114", "M115")
 STARTING_S, STARTING_AGAIN_S = 60.0, 5.0  # Klipper takes 5 to 20 s until its boards are connected
@@ -70,7 +71,7 @@ def identify_printer(wire: Port, baud: int, halted: bool = False) -> Answer:
 def check_answer(answer: Answer, port: str, baud: int, rate: int) -> None:
     """Refuse what is no printer, or one that answers at another rate; raises PrinterError with a sentence of what it is."""
     if answer.kind.is_printer and rate != baud:
-        raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: use --baud {rate}")
+        raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: {advice('baud', rate, 'use')}")
     if answer.kind is not Kind.PRINTER:
         error, refusal, _ = NO_PRINTERS[answer.kind]
         raise error(refusal.format(port=port, baud=baud, **_words(answer)))
@@ -110,8 +111,9 @@ NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
     Kind.RUBBISH: (
         PortError,
         "only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
-        "the firmware's settings tell its rate for --baud",
-        "rubbish at {baud} baud, and nothing at the usual other rates: --baud N tries another",
+        f"the firmware's settings tell {phrase('its baud rate', 'its rate for --baud')}",
+        f"rubbish at {{baud}} baud, and nothing at the usual other rates: "
+        f"{phrase('another baud rate', '--baud N tries another')}",
     ),
     Kind.SILENT: (
         SilenceError,
@@ -173,7 +175,7 @@ def ask_port(device: SerialDevice, baud: int, over: Event | None = None) -> Port
 
 
 def _refused(device: SerialDevice, error: PortError) -> PortReport:
-    return PortReport(device, trouble=str(error), reason=error.reason if isinstance(error, RefusedPortError) else str(error))
+    return PortReport(device, trouble=f"{error}", reason=error.reason if isinstance(error, RefusedPortError) else f"{error}")
 
 
 def describe(report: PortReport) -> str:

@@ -46,6 +46,7 @@ from machine.printing.serial_log import new_log
 from machine.printing.serial_print import report_end, stream_program
 from machine.program import Program
 from profiles.errors import JournalError, ProfileError
+from profiles.messages import key_name, phrase
 from profiles.profile import Profile, profile_of_tables
 
 RESTARTED = (
@@ -96,7 +97,9 @@ def read_resumption(job: PrintJob) -> Resumption:
     journal, at = job.cut_off, at_printer(job.destination)
     assert journal is not None
     if isinstance(at, Simulated):
-        raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
+        raise JournalError(
+            f"{phrase('', '--port sim: ')}a simulated printer ends with its print; the port of a printer is expected"
+        )
     if is_being_printed(journal):  # asked first: what is read after that does not change any more
         raise JournalError(
             f"journal {journal}: its print runs now, in another terminal or page: it can be resumed when it has ended"
@@ -191,7 +194,8 @@ def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> P
     machine = old.model_copy(update=homed | {"gcode": old.gcode.model_copy(update={"resume": new.gcode.resume})})
     if named.machine != machine:
         raise JournalError(
-            f"journal {journal} is of a print on {profile.machine.name}; --machine gives another machine ({named.machine.name}), "
+            f"journal {journal} is of a print on {profile.machine.name}; "
+            f"{phrase('homed as in names', '--machine gives')} another machine ({named.machine.name}), "
             "or one whose profile has changed since"
         )
     return profile.model_copy(update={"machine": machine})
@@ -232,7 +236,10 @@ def _question(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> str
         turns = f", {int(turn // 360)} whole turns and {turn % 360:.3f}" if abs(turn) >= 360 else ""
         tip += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"
     if machine.gcode.resume:
-        return f"{reason}\nit was cut off with the {tip}\nthen: machine.gcode.resume homes the axes, bed and nozzle heat"
+        return (
+            f"{reason}\nit was cut off with the {tip}\nthen: {key_name('machine.gcode.resume')} homes the axes, bed "
+            "and nozzle heat"
+        )
     return (
         f"{reason}\nlook first: all must stand as it was cut off, {tip}\n"
         "if anything was moved since, answer no, for only X and Y will be homed, Z and the table will not\n"

@@ -121,7 +121,7 @@ def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person:
     segments, volumes = record.deposited(loaded.profile.material.diameter_mm)
     planned = float(loaded.program.run.segment_mm3.sum())
     laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
-    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C at the end"
+    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} °C at the end"
     moves = f"{len(record.start)} moves in {duration(float(record.duration_s.sum()))}"
     show(f"simulated printer: {moves}, {laid}, {heaters}\n")
     if record.clamped or record.unknown:

@@ -18,6 +18,7 @@ from machine.printing.servers.servers import open_server
 from machine.setup.detect.found import ConfigText
 from profiles.errors import PrinterError, SilenceError
 from profiles.machine import Machine
+from profiles.messages import option
 
 ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
 OK = re.compile(r"ok\b.*")
@@ -33,7 +34,7 @@ QUESTIONS = {
     "grblHAL": ("$I", "$$"),
 }
 OTHERWISE = {
-    "Klipper": "Klipper tells its settings over the network, to --port moonraker:HOST, and in its file printer.cfg",
+    "Klipper": f"Klipper tells its settings over the network, to {option('port')} moonraker:HOST, and in its file printer.cfg",
 }
 
 

@@ -64,7 +64,7 @@ class Marks:
         try:
             return read_slicer_settings(self._path)
         except ProfileError as error:
-            said = str(error).removeprefix(f"profile {self._path}: ")
+            said = f"{error}".removeprefix(f"profile {self._path}: ")
             self._notes.append(f"{said}: those of its objects, modifiers and height ranges are left out")
             return None
 

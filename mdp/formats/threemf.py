@@ -30,6 +30,7 @@ from mdp.formats.surface import Surface, check_meshes, check_placed, check_surfa
 from mdp.mesh import NO_COLOUR, Floats, Indices, parse_colour
 from profiles.errors import MeshError, first_line
 from profiles.files import DAMAGED_ZIP
+from profiles.messages import key_name, option, phrase
 
 UNIT_MM = {"micron": 0.001, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
 MATERIAL = "{http://schemas.microsoft.com/3dmanufacturing/material/2015/02}"
@@ -49,11 +50,11 @@ HEIGHTS = ("metadata/prusa_slicer_layer_config_ranges.xml", "metadata/layer_conf
 NOT_TAKEN = {  # parts of a package, and what they would change
     **dict.fromkeys(
         ("metadata/slic3r_pe_layer_heights_profile.txt", "metadata/layer_heights_profile.txt"),
-        "its variable layer heights are not taken: process.adaptive_heights",
+        f"its variable layer heights are not taken: {key_name('process.adaptive_cusp_mm')}",
     ),
     **dict.fromkeys(
         ("metadata/prusa_slicer_custom_gcode_per_print_z.xml", "metadata/custom_gcode_per_layer.xml"),
-        "its pauses and changes of filament at heights are not taken: --pause, --filament-change",
+        f"its pauses and changes of filament at heights are not taken: {option('pause')}, {option('filament-change')}",
     ),
 }
 TAKEN_PAINT = "paints for and against support and against seams"
@@ -177,16 +178,23 @@ class _Builder:
             if len(plates) > 1:
                 first, name, _ = plates[0]
                 others = ", ".join(str(number) for number, _, _ in plates[1:])
-                self._notes.append(f"prints plate {first}{f' ({name})' if name else ''}; --plate prints another: {others}")
+                self._notes.append(
+                    f"prints plate {first}{f' ({name})' if name else ''}; "
+                    f"{phrase('another plate', '--plate prints another')}: {others}"
+                )
             return plates[0] if plates else None
         if not plates:
-            raise MeshError(f"{self._path}: has no plates: --plate {wanted} goes with a file of Bambu Studio or OrcaSlicer")
+            raise MeshError(
+                f"{self._path}: has no plates: {option('plate', wanted)} goes with a file of Bambu Studio or OrcaSlicer"
+            )
         for plate in plates:
             if plate[0] == wanted:
                 return plate
         known = ", ".join(str(number) for number, _, _ in plates)
         why = "is empty" if any(number == wanted for number, _, _ in self._plates) else "does not exist"
-        raise MeshError(f"{self._path}: --plate {wanted}: that plate {why}; plate{'s' * (len(plates) > 1)} with objects: {known}")
+        raise MeshError(
+            f"{self._path}: {option('plate', wanted)}: that plate {why}; plate{'s' * (len(plates) > 1)} with objects: {known}"
+        )
 
     def _model(self, name: str) -> Model:
         """A model part, parsed once. Raises MeshError."""

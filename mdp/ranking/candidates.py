@@ -21,6 +21,7 @@ from mdp.sweep.components import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.limbs import LimbSums
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import KeptFaces, Zone, spans_mm
+from profiles.messages import key_name, phrase
 from profiles.profile import Profile
 from profiles.search import Search
 
@@ -46,16 +47,18 @@ class Reason(IntEnum):
 
 
 REASONS = {
-    Reason.PLATFORM: "the plane would cut the platform (criterion III)",
-    Reason.FLOATING: "what remains would not stand on the platform (criterion II)",
+    Reason.PLATFORM: f"the plane would cut the platform{phrase('', ' (criterion III)')}",
+    Reason.FLOATING: f"what remains would not stand on the platform{phrase('', ' (criterion II)')}",
     Reason.REACH: "the axes do not reach the direction",
     Reason.CLEARANCE: "the head would meet the table",
-    Reason.VOLUME: "the part would be too small (search.least_volume_share)",
-    Reason.INTERFACE: "the part or a piece of it would hang on too small an area (search.least_interface_mm2)",
-    Reason.FRAGILE: "the plane would leave a sliver (search.fragile_mm)",
-    Reason.GAIN: "it would make too little safe for the seam it leaves (search.seam_mm, search.least_gain)",
-    Reason.KEEP: "the plane would pass through a zone that stays whole ([[keep]])",
-    Reason.WEAK: "the nozzle could break the part or a piece of it off its base (search.nozzle_load_n)",
+    Reason.VOLUME: f"the part would be too small ({key_name('search.least_volume_share')})",
+    Reason.INTERFACE: f"the part or a piece of it would hang on too small an area ({key_name('search.least_interface_mm2')})",
+    Reason.FRAGILE: f"the plane would leave a sliver ({key_name('search.fragile_mm')})",
+    Reason.GAIN: (
+        f"it would make too little safe for the seam it leaves ({key_name('search.seam_mm')}, {key_name('search.least_gain')})"
+    ),
+    Reason.KEEP: f"the plane would pass through a zone that stays whole{phrase('', ' ([[keep]])')}",
+    Reason.WEAK: f"the nozzle could break the part or a piece of it off its base ({key_name('search.nozzle_load_n')})",
     Reason.STANDING: "the head would meet what stands beside it",
 }
 

@@ -19,6 +19,7 @@ from mdp.ranking import SUFFIX
 from mdp.ranking.features import FEATURES, features
 from mdp.ranking.ranking import RankedCandidate
 from profiles.errors import UserError, first_line
+from profiles.messages import option
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -116,7 +117,7 @@ def ranker_named(name: str) -> LearnedRanker | None:
     if name == LEARNED:
         return shipped()
     if not name.endswith(SUFFIX):
-        raise UserError(f"--ranker {name}: {CLASSIC}, {LEARNED} or the name of an {SUFFIX} file is allowed")
+        raise UserError(f"{option('ranker', name)}: {CLASSIC}, {LEARNED} or the name of an {SUFFIX} file is allowed")
     own = LearnedRanker(Path(name))
     own.check()
     return own

@@ -40,7 +40,7 @@ def fill_holes(surface: Surface) -> tuple[Surface, list[str]]:
         if (not facet and (rim > RIM_SHARE * size or cap_area > HOLE_SHARE * area)) or total > TOTAL_SHARE * area:
             raise _too_large(loops, surface, loop, rim)
         caps.append(cap)
-    note = f"filled {len(loops)} small hole{'s' * (len(loops) > 1)} (longest rim {longest:.3g} mm, {total:.3g} mm2 in all)"
+    note = f"filled {len(loops)} small hole{'s' * (len(loops) > 1)} (longest rim {longest:.3g} mm, {total:.3g} mm² in all)"
     return Surface(surface.vertices, np.concatenate([surface.faces, *caps])), [note]
 
 

@@ -71,7 +71,7 @@ def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
     try:
         closed = [_mend(piece, size, gap, notes) for piece in pieces]
     except MeshError as error:
-        raise MeshError(f"its part {names.pop()!r} {error}" if len(names) == 1 and len(surfaces) > 1 else str(error)) from None
+        raise MeshError(f"its part {names.pop()!r} {error}" if len(names) == 1 and len(surfaces) > 1 else f"{error}") from None
     solid = _unite_shells([split_touching_fans(piece) for piece in closed if len(piece.faces)], size, notes)
     lost = np.abs(_bounds(solid) - before).max()
     if lost > SHRINK * size:
@@ -110,11 +110,11 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
     same = abs(taken_mm3 - enclosed_mm3) <= MOST_CHANGED * taken_mm3 and len(cleaned.faces) > 0
     if not same or np.abs(_bounds(cleaned) - box).max() > SHRINK * (box[1] - box[0]).max():
         raise MeshError(
-            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm3, what can be kept of them "
-            f"{taken_mm3:.5g} mm3; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
+            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm³, what can be kept of them "
+            f"{taken_mm3:.5g} mm³; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
         )
     percent = round(100 * (taken_mm3 / enclosed_mm3 - 1), 4) + 0.0
-    changed = f"{taken_mm3:.6g} mm3 remain of {enclosed_mm3:.6g} mm3 ({percent:+g} %)"
+    changed = f"{taken_mm3:.6g} mm³ remain of {enclosed_mm3:.6g} mm³ ({percent:+g} %)"
     notes.append(f"left out folds where more than two faces share an edge: {changed}")
     return cleaned, whole
 
@@ -127,7 +127,7 @@ def _count_once(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surfa
     if mended is None or left or not 0 < shared_mm3 < SHARED * whole.volume():
         notes.append("left a body that passes through itself as it is: some of its volume may count twice")
         return solid
-    notes.append(f"united a body that passes through itself with itself: {shared_mm3:.3g} mm3 counted twice")
+    notes.append(f"united a body that passes through itself with itself: {shared_mm3:.3g} mm³ counted twice")
     return surface_of(mended)
 
 

@@ -27,6 +27,7 @@ from mdp.sweep.limbs import limb_mesh
 from mdp.sweep.sweep import gains
 from mdp.zone import FARTHEST_MM, Grown, Painted
 from profiles.errors import PlanError
+from profiles.messages import key_name, phrase
 
 EQUAL_MM2 = 1e-6
 SHIFT_MM, MOST_SHIFTS = 0.1, 10  # how the planes beside one that cannot be cut are shifted, of each lean
@@ -44,7 +45,8 @@ def check_plan(plan: PlanFile, mesh: Mesh, name: str) -> None:
     if plan.sha256 and plan.sha256 != mesh_sha256(mesh):
         raise PlanError(
             f"plan {plan.name} was made of another model: {plan.model or 'its model'} is not {name} as it is read now "
-            "(the file has changed, or process.scale, process.rotate_deg or search.pedestal_mm; without the line sha256 the "
+            f"(the file has changed, or {key_name('process.scale')}, {key_name('process.rotate_deg')} or "
+            f"{key_name('search.pedestal_mm')}; without the line sha256 the "
             "planes are tried all the same)"
         )
     for kind in ZONE_KINDS:
@@ -259,7 +261,9 @@ def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason
     match reason:
         case Reason.PLATFORM:
             least_mm = limits.least_offset_mm[0]
-            text += f": along its normal offset_mm must be at least {least_mm:.2f}, it is {plane.offset_mm:.6g}"
+            least, offset = f"{least_mm:.2f}", f"{plane.offset_mm:.6g}"
+            bounds = phrase("least offset", f"offset_mm must be at least {least}, it is {offset}", f"{least} mm, it is {offset}")
+            text += f": along its normal {bounds}"
         case Reason.REACH:
             text += f" of its normal on {problem.machine.name}"
         case Reason.CLEARANCE:
@@ -268,8 +272,9 @@ def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason
         case Reason.INTERFACE:
             text = "a piece of it would hang in the air: it stands on nothing that is printed before"
         case Reason.FRAGILE:
-            sliver = f"its plane would leave a sliver {sliver_mm:.2g} mm thin"
-            text = f"{sliver}: {limits.fragile_mm:g} is the least (search.fragile_mm)"
+            visible = f"{sliver_mm:.2g}" if sliver_mm >= 1e-4 else "less than 0.001"
+            sliver = f"its plane would leave a sliver {phrase('thin', f'{sliver_mm:.2g}', visible)} mm thin"
+            text = f"{sliver}: {limits.fragile_mm:g} is the least ({key_name('search.fragile_mm')})"
         case Reason.KEEP:
             text = f"its plane would pass through zone {problem.zones.crossed(plane)} of [[keep]], which stays whole"
         case Reason.WEAK:
@@ -289,7 +294,7 @@ def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
         return f"nothing is left {side} its plane, the parts printed after it took it: the order is impossible"
     return (
         f"its plane misses the model: along its normal the model lies between {whole.min():.2f} and {whole.max():.2f} mm, "
-        f"offset_mm is {plane.offset_mm:.6g}"
+        f"{phrase('offset', f'offset_mm is {plane.offset_mm:.6g}', f'{plane.offset_mm:.6g}')}"
     )
 
 

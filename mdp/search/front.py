@@ -11,6 +11,7 @@ from mdp.kernels.processes import parallel_map
 from mdp.ranking.node import Node
 from mdp.sweep.limbs import limb_faces
 from profiles.errors import counted
+from profiles.messages import advice
 from profiles.profile import Profile
 
 # Costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams.
@@ -187,4 +188,4 @@ def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
         price = f"but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"but take {longer_s:.0f} s longer"
     elif more_mm >= 50.0:
         price = f"but take {more_mm / 1000.0:.1f} m more filament"
-    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm2 of scars {price}: --parts {parts}",)
+    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of scars {price}: {advice('parts', parts)}",)

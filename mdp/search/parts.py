@@ -125,7 +125,7 @@ def _notes_of_parts(folded: float, parts: Sequence[Part]) -> list[str]:
     notes = []
     if folded > 0:
         notes.append(
-            f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
+            f"the surface passes through itself: {folded:.3g} mm³ that it winds around twice or inside out are counted once"
         )
     for part in parts:
         if part.feather_share > MOST_FEATHERED:

@@ -44,6 +44,7 @@ from mdp.search.polish import make_regular, polish, refine_planes
 from mdp.search.problem import Problem, with_search
 from mdp.sweep.limbs import cylinders_cut
 from profiles.errors import PlanError
+from profiles.messages import key_name, option, phrase
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
@@ -98,7 +99,7 @@ def decompose(mesh: Mesh, name: str, profile: Profile, request: SearchRequest = 
     if plan.parts or profile.search.time_limit_s is not None:  # refused at once, or on time; else a copy is searched before
         problem = _measure(lifted, profile, request)
     if parts is not None and parts <= len(plan.parts):
-        raise PlanError(f"--parts {parts}: the planes by hand of {plan.name} alone make {len(plan.parts) + 1} parts")
+        raise PlanError(f"{option('parts', parts)}: the planes by hand of {plan.name} alone make {len(plan.parts) + 1} parts")
     copy = None
     if request.on_record is None:
         copy = coarse_copy(mesh, profile, plan.zones, request.on_phase)
@@ -254,7 +255,9 @@ def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> l
     if problem.model.risky_mm2 <= 0 and parts == 1:
         notes.append("no face needs support: the model is printed as one part")
     elif problem.late():
-        notes.append(f"search.time_limit_s = {problem.settings.time_limit_s:g} ended the search; the best so far is used")
+        notes.append(
+            f"{key_name('search.time_limit_s')} = {problem.settings.time_limit_s:g} ended the search; the best so far is used"
+        )
     elif rows > 1 or parts > 1 or request.parts == 1:
         notes += _fewer_parts(request.parts, parts, "the search found")
     else:
@@ -262,9 +265,13 @@ def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> l
         shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
         notes.append(f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}")
     if zones.no_seam.anywhere and problem.terms.seam_mm <= 0.0:
-        notes.append("[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)")
+        notes.append(
+            f"[[no_seam]] keeps no cut away where seams cost nothing ({key_name('search.objective')}, "
+            f"{key_name('search.seam_mm')})"
+        )
     if zones.no_support.anywhere and problem.terms.need is None:
-        notes.append('[[no_support]] changes no cut where all that overhangs counts (search.objective = "risky")')
+        objective = key_name("search.objective")
+        notes.append(f'[[no_support]] changes no cut where all that overhangs counts ({objective} = "risky")')
     if plan.front:
         again = "planes by hand have the others found anew, for every number of parts"
         notes.append(f"the [[front]] of {plan.name} is not kept: {again}")
@@ -274,12 +281,12 @@ def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> l
 def check_part_count(parts: int) -> None:
     """Raise PlanError for a number of parts that cannot be."""
     if not 1 <= parts <= MOST_PARTS:
-        raise PlanError(f"--parts is {parts}: 1 to {MOST_PARTS} is allowed")
+        raise PlanError(f"{option('parts')} is {parts}: 1 to {MOST_PARTS} is allowed")
 
 
 def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
     """That there are fewer parts than were wanted, where there are."""
-    return (f"--parts {wanted}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
+    return (f"{option('parts', wanted)}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
 
 
 def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest) -> Decomposition:
@@ -295,7 +302,10 @@ def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest)
     for number, part in enumerate(plan.parts, start=2):
         if part.plane is None:
             missing = "normal" if part.normal is None else "offset_mm"
-            raise PlanError(f"plan {plan.name}: part {number} has no {missing}: decompose --planes {plan.name} has it found")
+            raise PlanError(
+                f"plan {plan.name}: part {number} has no {missing}: "
+                f"{phrase('found by the search', f'decompose --planes {plan.name} has it found')}"
+            )
     mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     check_plan(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)

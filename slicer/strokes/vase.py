@@ -12,6 +12,7 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.errors import SliceError
+from profiles.messages import key_name
 from profiles.profile import Profile
 from slicer.bead import outer_wall_width_mm
 from slicer.geometry.clip import cut_line
@@ -39,8 +40,8 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
     hanging = next((k for k, area in enumerate(supported) if not area.is_empty()), None)
     if hanging is not None:
         raise SliceError(
-            f"process.spiral_vase prints no support, and at {heights.tip_mm[hanging]:.2f} mm some is needed: "
-            "process.support = none leaves it out"
+            f"{key_name('process.spiral_vase')} prints no support, and at {heights.tip_mm[hanging]:.2f} mm some is needed: "
+            f"{key_name('process.support')} = none leaves it out"
         )
     half_mm, end = 0.5 * outer_wall_width_mm(profile.process), len(outlines)
     while end > first + 1 and _is_tip(outlines[end - 1], outlines[end - 2], half_mm):
@@ -74,7 +75,8 @@ def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
     if outlines != 1 or len(loops) != 1:
         instead = f"{outlines or 'no'} outlines" if outlines != 1 else "a place too narrow for a wall"
         raise SliceError(
-            f"process.spiral_vase needs one outline without holes in every layer: the layer at {z_mm:.2f} mm has {instead}"
+            f"{key_name('process.spiral_vase')} needs one outline without holes in every layer: the layer at {z_mm:.2f} "
+            f"mm has {instead}"
         )
     return close_loop(loops[0])
 
@@ -89,7 +91,8 @@ def _check_step(loop: Floats, below: Polygons, half_mm: float, *, lowest: bool, 
     lengths = np.hypot(*np.diff(points, axis=0).T)
     if lengths[~within].sum() > min(MOST_IN_AIR * lengths.sum(), MOST_IN_AIR_MM):
         raise SliceError(
-            f"process.spiral_vase lays every turn on the one below, and at {z_mm:.2f} mm the model steps in or out by more than "
+            f"{key_name('process.spiral_vase')} lays every turn on the one below, and at {z_mm:.2f} mm the model steps "
+            "in or out by more than "
             f"a wall's width, {2.0 * half_mm:g} mm: {lengths[~within].sum():.0f} mm of wall would be laid on air"
         )
 

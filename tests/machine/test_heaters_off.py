@@ -166,7 +166,7 @@ def test_heaters_that_are_to_stay_on_go_off_when_letting_go_fails(monkeypatch: M
     whole, printer, keeping = Steps(), VirtualPrinter(PROFILE.machine), HandCommand(HandDoes.LET_GO, keep_heat=True)
     ended = in_hand(whole, printer, monkeypatch, HEAT, keeping)
     assert targets_c(printer) == (215.0, 60.0)
-    assert ended.sentence == "let go of; nozzle set to 215 deg C and bed set to 60 deg C stays on"
+    assert ended.sentence == "let go of; nozzle set to 215 °C and bed set to 60 °C stays on"
     for step in range(1, whole.count + 1):
         printer = VirtualPrinter(PROFILE.machine)
         with pytest.raises(RuntimeError):

@@ -139,11 +139,11 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
             "process.outer_wall_line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm",
         ),
         ("process.line_width_mm=2", "process.line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm"),
-        ("material.nozzle_c=400", "material.nozzle_c is 400: generic A/C table allows at most 300 deg C"),
-        ("material.homing_nozzle_c=310", "material.homing_nozzle_c is 310: generic A/C table allows at most 300 deg C"),
+        ("material.nozzle_c=400", "material.nozzle_c is 400: generic A/C table allows at most 300 °C"),
+        ("material.homing_nozzle_c=310", "material.homing_nozzle_c is 310: generic A/C table allows at most 300 °C"),
         ("material.homing_nozzle_c=1e400", "material.homing_nozzle_c is inf: it must be a number from 0 to 450"),
-        ("material.standby_c=310", "material.standby_c is 310: generic A/C table allows at most 300 deg C"),
-        ("material.bed_c=150", "material.bed_c is 150: generic A/C table allows at most 110 deg C"),
+        ("material.standby_c=310", "material.standby_c is 310: generic A/C table allows at most 300 °C"),
+        ("material.bed_c=150", "material.bed_c is 150: generic A/C table allows at most 110 °C"),
     ],
 )
 def test_a_wrong_value_is_refused_with_key_value_and_what_is_allowed(setting: str, sentence: str) -> None:
@@ -176,7 +176,7 @@ def test_what_keys_must_be_together_is_told_with_what_each_must_be_and_what_the_
         "process.walls is -1: it must be a whole number from 0 to 50",
         "process.layer_height_mm is 0.5 mm: at most 0.9 of line_width_mm (0.405 mm) is allowed",
         "process.interlock_mm is 1 mm: at most line_width_mm less layer_height_mm (0 mm) is filled by one bead",
-        "material.nozzle_c is 400: generic A/C table allows at most 300 deg C",
+        "material.nozzle_c is 400: generic A/C table allows at most 300 °C",
         "process.layer_height_mm is 0.5: a 0.4 mm nozzle prints layers of at most 0.4 mm",
     ]
     assert refusal("process.infill_line_width_mm=0.2").split("; ") == [

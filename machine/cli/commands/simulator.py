@@ -124,5 +124,5 @@ def summary(record: Record) -> str:
     if record.lost_bytes:
         lines.append(f"{record.lost_bytes} bytes lost by a full receive ring")
     lines += [f"at {seconds:.1f} s: {trouble}" for seconds, trouble in record.troubles]
-    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C"
+    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} °C"
     return "".join(f"{line}\n" for line in [*lines, heaters])

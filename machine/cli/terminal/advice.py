@@ -41,7 +41,7 @@ def _without_front(decomposition: Decomposition) -> list[FrontRow]:
 def _ways_table(ways: Sequence[tuple[str, FrontRow]]) -> str:
     """Each way with what needs support then, how much less that is than in the first one, its seams, time and filament."""
     first_mm2 = ways[0][1].support_area_mm2
-    rows = [["print it", "support mm2", "less", "seams mm", "stairs mm2", "about", "filament m"]]
+    rows = [["print it", "support mm²", "less", "seams mm", "stairs mm²", "about", "filament m"]]
     for number, (name, row) in enumerate(ways):
         less = 1.0 - row.support_area_mm2 / first_mm2 if first_mm2 > 0.0 else 0.0
         share = f"{round(100 * less, 1) + 0.0:.1f} %" if number else ""

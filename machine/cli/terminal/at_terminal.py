@@ -203,7 +203,7 @@ def _heat(status: PrintStatus) -> Text:
     heat = status.temperature
     old = [f"as last known {status.heat_age_s:.0f} s ago:"] if status.heat_is_old and heat.words else []
     phrases = [
-        f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " deg C"
+        f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " °C"
         for name, now_c, target_c in (("nozzle", heat.nozzle_c, heat.nozzle_target_c), ("bed", heat.bed_c, heat.bed_target_c))
         if now_c is not None
     ]

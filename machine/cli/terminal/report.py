@@ -38,7 +38,7 @@ def parts_table(decomposition: "Decomposition", angle_deg: float = 45.0, count_p
     """
     from machine.view.parts import risky_before_mm2
 
-    rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm3", "share", "risky before", "after mm2"]]
+    rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm³", "share", "risky before", "after mm²"]]
     for part in decomposition.parts:
         angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
         share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
@@ -61,7 +61,7 @@ def joints_table(joints: "Sequence[Joint]") -> str:
         return ""
     sliced = any(joint.contact_share is not None for joint in joints)
     laid = ["contact %", "plastic / room %"] if sliced else []
-    rows = [["joint of part", "area mm2", *laid, "seam mm", "arm mm", "breaks at N", "pulled off at N"]]
+    rows = [["joint of part", "area mm²", *laid, "seam mm", "arm mm", "breaks at N", "pulled off at N"]]
     for joint in joints:
         shares = [percent(joint.contact_share, 1), percent(joint.plastic_over_room)] if sliced else []
         lengths = [f"{joint.seam_mm:.0f}", f"{joint.arm_mm:.1f}"]
@@ -75,7 +75,7 @@ def joints_table(joints: "Sequence[Joint]") -> str:
 
 def front_table(front: "Sequence[FrontRow]") -> str:
     """The best decomposition for every number of parts, the one taken marked and why."""
-    rows = [["in parts", "needs support mm2", "seams mm", "stairs mm2", "costs mm2", "about", "filament m"]]
+    rows = [["in parts", "needs support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "filament m"]]
     rows += [
         [
             str(row.parts),
@@ -196,7 +196,7 @@ def _count(number: int, things: str) -> str:
 def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     """The alternatives for a person."""
     rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
-    rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm2"] for way in alternatives]
+    rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm²"] for way in alternatives]
     head, *lines = table(rows).splitlines()
     notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
     return "\n".join(["", head, *lines, *notes]) + "\n"

@@ -24,6 +24,7 @@ from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.errors import JournalError
 from profiles.machine import Machine
+from profiles.messages import key_name
 from profiles.profile import Profile
 from slicer.estimate.timing import speeds_of
 
@@ -187,7 +188,7 @@ def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequ
     machine, dialect = profile.machine, dialect_of(profile.machine)
     height = _clear_z_mm(profile, printed, way.start)
     values = resume_placeholders(machine, way.at_mm, way.start, height)
-    named = "machine.gcode.resume"
+    named = key_name("machine.gcode.resume")
     if machine.gcode.resume:
         homing = fill_block(machine.gcode.resume, named, values, dialect)
     else:

@@ -104,7 +104,7 @@ class Pause:
                 self.exchange.settle()  # whatever heats is waited for
                 if self._is_cold():
                     nozzle_c = self.reports.temperature.nozzle_c
-                    refused = f"not sent: {command[:40]!r}: the nozzle has only {nozzle_c:.0f} deg C: heat it first (M109)"
+                    refused = f"not sent: {command[:40]!r}: the nozzle has only {nozzle_c:.0f} °C: heat it first (M109)"
                     continue
             self.exchange.send(command)
             self.off = self.off and row.heats not in ("nozzle", "named")
@@ -129,7 +129,7 @@ class Pause:
 
     def _heating(self) -> str:
         filled = " and filled where the tip waits: take the drop off" if self.aside else ""
-        return f"heated to {self.modal.nozzle_c:g} deg C{filled}"
+        return f"heated to {self.modal.nozzle_c:g} °C{filled}"
 
     def _send(self, commands: Iterable[str]) -> None:
         for command in commands:

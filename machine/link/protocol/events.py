@@ -18,7 +18,7 @@ class Temperature:
     def words(self) -> str:
         """How hot it is, for a person; "" where the line does not report it."""
         degrees = (("nozzle", self.nozzle_c), ("bed", self.bed_c))
-        return ", ".join(f"{name} {now_c:.0f} deg C" for name, now_c in degrees if now_c is not None)
+        return ", ".join(f"{name} {now_c:.0f} °C" for name, now_c in degrees if now_c is not None)
 
 
 @dataclass(frozen=True, slots=True)

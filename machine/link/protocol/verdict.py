@@ -4,6 +4,7 @@ from machine.firmware.firmware import BAUDS
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.window import GREETING_LINES
 from profiles.errors import FirmwareError, PrinterError, SilenceError
+from profiles.messages import advice
 
 SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
 RUBBISH_TRIES = 2  # boot loaders speak at rates of their own; what comes after that is the firmware's
@@ -15,7 +16,7 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: s
     at = "this baud rate" if baud is None else f"{baud} baud"
     if tries >= RUBBISH_TRIES and decoder.rubbish:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
-        return PrinterError(f"what comes at {at} is rubbish: the printer speaks at another rate, try --baud {others}")
+        return PrinterError(f"what comes at {at} is rubbish: the printer speaks at another rate, {advice('baud', others, 'try')}")
     if tries < SYNC_TRIES:
         return None
     if decoder.foreign:

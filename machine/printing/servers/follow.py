@@ -249,4 +249,4 @@ class _Follower:
                     order()
                     self._message = ""
                 except ServerError as error:
-                    self._message = str(error)
+                    self._message = f"{error}"

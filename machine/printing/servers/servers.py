@@ -11,6 +11,7 @@ from machine.printing.servers.http import HttpSession, Tell
 from machine.printing.servers.moonraker import Moonraker
 from machine.printing.servers.octoprint import OctoPrint
 from machine.printing.servers.server import PrintServer
+from profiles.messages import phrase
 from profiles.places import shipped, tables
 
 KINDS: Mapping[str, Callable[[HttpSession], PrintServer]] = {"octoprint": OctoPrint, "moonraker": Moonraker, "duet": Duet}
@@ -31,7 +32,8 @@ def dialect_mismatch(address: Server, machine: str, dialect: str) -> str:
     named = ", ".join(name for name in shipped("machine") if _dialect(name) in allowed)
     server = NAMES[address.kind]
     return (
-        f"{machine} writes for {dialect}, but {server} prints {' or '.join(allowed)}: --machine must be one of those, as {named}"
+        f"{machine} writes for {dialect}, but {server} prints {' or '.join(allowed)}: "
+        f"{phrase('machine of those', '--machine must be one of those')}, as {named}"
     )
 
 

@@ -25,6 +25,7 @@ from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation, unit
 from profiles.errors import ProfileError
 from profiles.machine import Machine
+from profiles.messages import option
 
 PADS = 4
 LEAST_LEAN_DEG = 10.0
@@ -130,7 +131,9 @@ def parse_readings(text: str) -> Floats:
     """
     pads = text.split()
     if len(pads) != PADS:
-        raise ProfileError(f"--readings {text!r} tells of {len(pads)} pads: {PADS} are expected, with a space between them")
+        raise ProfileError(
+            f"{option('readings')} {text!r} tells of {len(pads)} pads: {PADS} are expected, with a space between them"
+        )
     return np.array([parse_pad(pad, number) for number, pad in enumerate(pads, start=1)])
 
 

@@ -22,6 +22,7 @@ from mdp.pose import UP, Pose, level, rotation
 from profiles.errors import MoveError, PrinterError
 from profiles.frozen import Vector
 from profiles.machine import Machine
+from profiles.messages import option
 
 ROUNDS = 30
 SETTLED_MM = 1e-9
@@ -78,7 +79,7 @@ def ball_centre(contacts_mm: Floats, radius_mm: float, flat_mm: float = 0.0, see
         if np.abs(step).max() < SETTLED_MM:
             return numbers[:3]
     raise PrinterError(
-        f"the contacts are not those of a ball {2.0 * radius_mm:g} mm in diameter: is it --ball-mm, firm and clean?"
+        f"the contacts are not those of a ball {2.0 * radius_mm:g} mm in diameter: is it {option('ball-mm')}, firm and clean?"
     )
 
 

@@ -11,6 +11,7 @@ from itertools import product
 from typing import Any
 
 from profiles.errors import ProfileError
+from profiles.messages import option
 from profiles.part_settings import PartSettings, part_keys
 from profiles.process import Process
 from profiles.profile import Profile, with_part_settings
@@ -44,17 +45,21 @@ def factors(profile: Profile, given: Sequence[str] = ()) -> tuple[Factor, ...]:
         usual = {key: next(value for value in values if value != getattr(process, key)) for key, values in USUAL.items()}
         return _checked(profile, usual)
     if len(given) > MOST_FACTORS:
-        raise ProfileError(f"--vary is given {len(given)} times: {JOINTS} bars can tell {MOST_FACTORS} settings apart at most")
+        raise ProfileError(
+            f"{option('vary')} is given {len(given)} times: {JOINTS} bars can tell {MOST_FACTORS} settings apart at most"
+        )
     asked = {}
     for text in given:
         key, equals, value = text.partition("=")
         key = key.strip().removeprefix("process.")
         if not equals or not value.strip():
-            raise ProfileError(f"--vary {text}: KEY=VALUE is expected, as interface_flow=1.15")
+            raise ProfileError(f"{option('vary', text)}: KEY=VALUE is expected, as interface_flow=1.15")
         if key not in part_keys():
-            raise ProfileError(f"--vary {text}: {key} cannot differ from bar to bar; interlock and `interface_` keys can")
+            raise ProfileError(
+                f"{option('vary', text)}: {key} cannot differ from bar to bar; interlock and `interface_` keys can"
+            )
         if key in asked:
-            raise ProfileError(f"--vary {text}: {key} is given twice")
+            raise ProfileError(f"{option('vary', text)}: {key} is given twice")
         asked[key] = read_value(value.strip())
     return _checked(profile, asked)
 
@@ -63,11 +68,13 @@ def _checked(profile: Profile, asked: dict[str, Any]) -> tuple[Factor, ...]:
     try:
         settled = with_part_settings(profile.of_all_parts, [PartSettings(part=2, process=asked)]).of_part(2).process
     except ProfileError as error:
-        raise ProfileError(str(error).replace("part 2: ", "--vary: ")) from None
+        raise ProfileError(f"{error}".replace("part 2: ", f"{option('vary')}: ")) from None
     found = tuple(Factor(key, getattr(profile.process, key), getattr(settled, key)) for key in asked)
     alike = next((factor for factor in found if factor.own == factor.other), None)
     if alike is not None:
-        raise ProfileError(f"--vary {alike.key}={alike.other}: the process has that value itself, so the bars would be alike")
+        raise ProfileError(
+            f"{option('vary', f'{alike.key}={alike.other}')}: the process has that value itself, so the bars would be alike"
+        )
     _check_heat(profile, settled)
     return found
 
@@ -77,8 +84,8 @@ def _check_heat(profile: Profile, hottest: Process) -> None:
     nozzle_c = profile.material.nozzle_c + hottest.interface_temperature_add_c
     if nozzle_c > machine.nozzle_limit_c:
         raise ProfileError(
-            f"a bar would be printed at {nozzle_c:g} deg C: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C; "
-            "--vary interface_temperature_add_c=... with less"
+            f"a bar would be printed at {nozzle_c:g} °C: {machine.name} allows at most {machine.nozzle_limit_c:g} °C; "
+            f"{option('vary')} interface_temperature_add_c=... with less"
         )
 
 

@@ -23,6 +23,7 @@ from mdp.plane import PLATFORM, Plane
 from mdp.pose import least_rotation, level, poses, rotation, shift
 from profiles.errors import MoveError
 from profiles.machine import Machine
+from profiles.messages import key_name
 from profiles.profile import Profile
 
 LEANS_DEG = (45.0, 40.0, 35.0, 30.0, 25.0, 20.0)
@@ -108,7 +109,9 @@ def _ring(shape: Shape, profile: Profile) -> Ring:
     leans = [lean for lean in LEANS_DEG if lean <= profile.process.self_supporting_angle_deg]
     if not leans:
         allowed = f"at least {LEANS_DEG[-1]:g} deg, by which bars lean, is allowed"
-        raise MoveError(f"process.self_supporting_angle_deg is {profile.process.self_supporting_angle_deg:g}: {allowed}")
+        raise MoveError(
+            f"{key_name('process.self_supporting_angle_deg')} is {profile.process.self_supporting_angle_deg:g}: {allowed}"
+        )
     reached = [lean for lean in leans if all(poses(machine, Ring(radians(lean), *FLAT).base(k).normal) for k in range(JOINTS))]
     if not reached:
         raise MoveError(

@@ -50,7 +50,7 @@ def read(config: ConfigText) -> Found:
     capabilities = set(CAPABILITY.findall(config.text))
     settings, remarks = _corner(words), []
     if words.get("M200", {}).get("S", 0.0) > 0.0:
-        remarks.append("the printer counts filament in mm3 (M200 S1): its speed is left as it is")
+        remarks.append("the printer counts filament in mm³ (M200 S1): its speed is left as it is")
     else:
         filament = axes.get("E", {})
         settings |= {key: filament[word] for key, word in EXTRUDER.items() if word in filament}

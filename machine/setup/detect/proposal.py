@@ -12,6 +12,7 @@ from machine.setup.detect import grblhal, klipper, linuxcnc, marlin, reprapfirmw
 from machine.setup.detect.found import ACCELERATION, LIMITS, PRINTING, SPEED, ConfigText, Found, Reading, rounded
 from profiles.errors import ProfileError
 from profiles.machine import Machine
+from profiles.messages import option
 from profiles.places import shipped
 from profiles.profile import load_one
 from profiles.toml_text import value_text
@@ -140,7 +141,7 @@ def _pair(found: Found, named: Machine | None, remarks: list[str]) -> str:
     """
     if named is not None and {named.tilt.letter, named.turn.letter} <= {*found.rotary, *found.doubtful}:
         return named.tilt.letter + named.turn.letter
-    way = "--base NAME names a machine, or a file of yours, whose machine.tilt.letter and machine.turn.letter say it"
+    way = f"{option('base')} NAME names a machine, or a file of yours, whose machine.tilt.letter and machine.turn.letter say it"
     others = found.rotary.replace("C", "")
     if len(found.rotary) == 2 and len(others) == 1:
         remarks.append(f"{others} is taken for the tilt and C for the turn: move both once and look")
@@ -149,7 +150,9 @@ def _pair(found: Found, named: Machine | None, remarks: list[str]) -> str:
     for why in found.doubtful.values():
         raise ProfileError(f"{why}, so it is not known which two axes tilt and turn the table: {way}")
     if len(found.rotary) < 2:
-        raise ProfileError(f"{found.firmware} tells of {found.rotary or 'no axis'} that turns, the base of two: leave out --base")
+        raise ProfileError(
+            f"{found.firmware} tells of {found.rotary or 'no axis'} that turns, the base of two: leave out {option('base')}"
+        )
     letters = " ".join(found.rotary)
     raise ProfileError(f"{found.firmware} has the rotary axes {letters}, and nothing says which tilts and which turns: {way}")
 
@@ -219,7 +222,8 @@ def _reader(config: ConfigText) -> Reader:
     if SOURCE.search(config.text):
         raise ProfileError(
             f"{config.name}: it is source that a firmware is built from (Configuration.h, platformio.ini, config.ini), not what "
-            "the printer has stored: the answers to M115, M503 and M211 are expected, saved as a log, or asked for by --port"
+            "the printer has stored: the answers to M115, M503 and M211 are expected, saved as a log, or asked for by "
+            f"{option('port')}"
         )
     known = [reader.text for reader in READERS.values()]
     raise ProfileError(f"{config.name}: it is no firmware's configuration: {', '.join(known[:-1])} or {known[-1]} is expected")

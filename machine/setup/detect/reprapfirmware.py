@@ -31,6 +31,7 @@ from machine.setup.detect.found import (
     limits,
 )
 from profiles.errors import ProfileError
+from profiles.messages import option
 
 OWN = re.compile(r"^\s*M(?:566|584|574|950|563|143|669)\b", re.MULTILINE)  # commands that no other firmware has
 MODEL = re.compile(r'^\s*\{"key":\s*"', re.MULTILINE)
@@ -212,7 +213,7 @@ def _read_commands(config: ConfigText) -> Found:
     if missing:
         board.remarks.append(f"{', '.join(missing)} is not beside it: what stands there is not known")
     if unread:
-        board.remarks.append(f"what it has in braces ({unread}) only the board works out: --port duet:HOST asks it")
+        board.remarks.append(f"what it has in braces ({unread}) only the board works out: {option('port')} duet:HOST asks it")
     return board.found(config.name, "M669", "M566", "M143")
 
 

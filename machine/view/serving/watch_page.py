@@ -20,6 +20,7 @@ from machine.view.page import print_page
 from machine.view.serving.browser import lead_browser
 from machine.view.serving.guard import HOST, UNKNOWN, Guard
 from profiles.errors import OutputError, reason
+from profiles.messages import option
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
@@ -92,7 +93,7 @@ def serve(page: bytes, port: int = 0, control: Control | None = None) -> Iterato
     try:
         own = socket.create_server((HOST, port))
     except OSError as error:
-        raise OutputError(f"--watch-port {port} cannot be used: {reason(error)}") from None
+        raise OutputError(f"{option('watch-port', port)} cannot be used: {reason(error)}") from None
     there = own.getsockname()[1]
     watched.address = f"http://{HOST}:{there}/{watched.token}/"
     guarded = Guard(_application(watched, control), watched.token, there)

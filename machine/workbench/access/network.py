@@ -14,6 +14,7 @@ from pathlib import Path
 
 from machine.view.serving.guard import HOST, own_hosts
 from profiles.errors import OutputError, reason
+from profiles.messages import option
 
 ELSEWHERE = "198.51.100.1"  # of documentation, RFC 5737: nobody is there, and nothing is sent
 SIOCGIFADDR = 0x8915  # Linux, netdevice(7)
@@ -84,7 +85,7 @@ def listen(port: int, host: str = HOST) -> socket.socket:
         own.close()
         why = reason(error) if isinstance(error, OSError) else str(error)
         where = "" if host == HOST else f" at {host}"
-        raise OutputError(f"--port {port} cannot be used{where}: {why}; without it any free one is taken") from None
+        raise OutputError(f"{option('port', port)} cannot be used{where}: {why}; without it any free one is taken") from None
     return own
 
 
@@ -103,7 +104,7 @@ def listen_at_all(port: int, hosts: Iterable[str]) -> tuple[socket.socket, list[
             if port:
                 raise
             if not left:
-                raise OutputError(f"--lan: no port is free at all of {', '.join((HOST, *hosts))}") from None
+                raise OutputError(f"{option('lan')}: no port is free at all of {', '.join((HOST, *hosts))}") from None
         else:
             return own, others
     raise AssertionError("the last try returns or raises")
@@ -144,19 +145,21 @@ def open_lan(chain: Path | None, key: Path | None) -> Lan:
     certificate = None if chain is None and key is None else _checked(chain, key)
     addresses = network_addresses()
     if not addresses:
-        raise OutputError("--lan: this computer has no address in a private network: join one, or leave --lan out")
+        raise OutputError(
+            f"{option('lan')}: this computer has no address in a private network: join one, or leave {option('lan')} out"
+        )
     return Lan(addresses, host_names(), certificate)
 
 
 def _checked(chain: Path | None, key: Path | None) -> Certificate:
     if chain is None or key is None:
-        given, other = ("--key", "--certificate") if chain is None else ("--certificate", "--key")
+        given, other = (option("key"), option("certificate")) if chain is None else (option("certificate"), option("key"))
         raise OutputError(f"{given} needs {other}, too: a certificate and its key, each a PEM file")
-    for option, file in (("--certificate", chain), ("--key", key)):
+    for name, file in (("certificate", chain), ("key", key)):
         try:
             file.read_bytes()
         except OSError as error:
-            raise OutputError(f"{option} {file} cannot be read: {reason(error)}") from None
+            raise OutputError(f"{option(name, file)} cannot be read: {reason(error)}") from None
     _check_pair(chain, key)
     return Certificate(chain, key)
 
@@ -174,9 +177,10 @@ def _check_pair(chain: Path, key: Path) -> None:
         context.load_cert_chain(chain, key, password)
     except (ssl.SSLError, ValueError) as error:
         if asked:
-            raise OutputError(f"--key {key} is encrypted by a password: one without is needed") from None
+            raise OutputError(f"{option('key', key)} is encrypted by a password: one without is needed") from None
         if getattr(error, "reason", "") == "KEY_VALUES_MISMATCH":
-            raise OutputError(f"--key {key} does not belong to --certificate {chain}") from None
+            raise OutputError(f"{option('key', key)} does not belong to {option('certificate', chain)}") from None
         raise OutputError(
-            f"--certificate {chain} and --key {key} cannot be used: both must be PEM files, of an X.509 certificate and its key"
+            f"{option('certificate', chain)} and {option('key', key)} cannot be used: both must be PEM files, of an "
+            "X.509 certificate and its key"
         ) from None

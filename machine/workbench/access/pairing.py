@@ -20,6 +20,7 @@ from starlette.responses import HTMLResponse
 from machine.view.page import hash_source
 from machine.workbench.work.observable import Observable
 from profiles.errors import PlanError
+from profiles.messages import option
 
 LETTERS = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"  # without I, L, O, 0 and 1, which look alike
 CODE_LENGTH = 8
@@ -146,7 +147,10 @@ class Door(Observable):
         """Say what to do."""
         self._say(f"open to the network, too: a device that opens {' or '.join(self._addresses)} asks for a code: {self._code}")
         if not self.encrypted:
-            self._say("whoever is in this network can read along: use --lan in a network of your own only, or with --certificate")
+            self._say(
+                f"whoever is in this network can read along: use {option('lan')} in a network of your own only, or with "
+                f"{option('certificate')}"
+            )
 
     def attempt(self, typed: str, user_agent: str) -> tuple[Verdict, str]:
         """Judge a code that was typed on a device; its cookie where it is paired now, else ""."""

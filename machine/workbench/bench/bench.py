@@ -109,7 +109,7 @@ class History:
         stops, gone = renumbered_stops(bench.stops, before.cuts or (), bench.cuts or ())
         after = bench if stops == bench.stops else replace(bench, stops=stops)
         lost = [(stop.part, stop.option) for stop in gone] + [
-            (own.part, f"--part {option(own)}") for own in _gone(self.now.bench, bench)
+            (own.part, f"its own {option(own).partition(':')[2]}") for own in _gone(self.now.bench, bench)
         ]
         return History(Step(word, after, gone_in_words(word, lost)), _nearest_steps((*self.before, self.now)[-MOST_STEPS:]))
 

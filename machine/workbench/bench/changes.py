@@ -20,6 +20,7 @@ from machine.workbench.bench.values import Command, Direction, Rotation, check_n
 from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.errors import PlanError
+from profiles.messages import option
 from profiles.profile import Profile
 
 TURN_DIGITS = 15  # so that quarter turns are exact
@@ -160,7 +161,7 @@ class Copies(Change):
     count: int
 
     def change(self, bench: Bench) -> Bench:
-        count = check_number("--copies", self.count, 1, MOST_COPIES)  # as the option is refused
+        count = check_number(option("copies"), self.count, 1, MOST_COPIES)  # as the option is refused
         return bench if count == bench.copies else replace(bench, copies=count)
 
 

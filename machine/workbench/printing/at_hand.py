@@ -129,7 +129,7 @@ class Hand:
         except PrinterError:
             raise
         except UserError as error:  # a start block that cannot be filled in, too
-            self._problem = str(error)
+            self._problem = f"{error}"
         else:
             self._problem = ""
             for line in lines:

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 from machine.cli.terminal.interrupts import stopping
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
-from machine.notices import Notice, plain_line
+from machine.notices import Notice, marked_line, plain_line
 from machine.printing.job import Scene, Show
 from machine.printing.serial_log import SerialLog
 from machine.workbench.printing.job_state import JobState
@@ -129,7 +129,7 @@ class AtPage:
 
     def passed(self, sentence: str) -> None:
         """Add a passed check."""
-        self._add(Notice(plain_line(sentence)))
+        self._add(Notice(marked_line(sentence)))
 
     def hear_notice(self, notice: Notice) -> None:
         """Add a notice of the program; an error that --force goes past is a check, too."""

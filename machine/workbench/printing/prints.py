@@ -63,12 +63,6 @@ class Prints(Observable):
         """Journals that were found here."""
         return {str(journal.path) for journal in self._journals or ()}
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names that people have chosen, among all that is shown here."""
-        journals = (name for journal in self._journals or () for name in (str(journal.path), journal.name, journal.machine))
-        return (*(name for job in self.prints for name in job.names), *sorted(self.ports_known), *journals)
-
     def snapshot(self) -> dict[str, Any]:
         """The state of all prints for every page."""
         return {

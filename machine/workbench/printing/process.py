@@ -52,7 +52,7 @@ def carry_out(job: PrintJob, person: AtPage) -> tuple[End, bool]:
     try:
         return _carried_out(job, person), False
     except UserError as error:
-        return End(PrintState.FAILED if person.agreed else PrintState.REFUSED, str(error)), error.forcible
+        return End(PrintState.FAILED if person.agreed else PrintState.REFUSED, f"{error}"), error.forcible
     except KeyboardInterrupt:
         sentence = "ended at once: whether the heaters are off is not known, look at the printer"
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file; the stream has left the printer safe

@@ -39,14 +39,6 @@ class RunningPrint:
         self._ended = False  # by this program, on purpose
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names that people have chosen: of the model, the machine, the port, and their files."""
-        state, profile = self.state, self.job.profile
-        told = (state.name, state.machine, state.port, state.resumes, state.journal, state.log)
-        further = (profile.machine.name, profile.material.name, profile.process.name) if profile else ()
-        return (*told, *further, server_name(state.name))
-
-    @property
     def over(self) -> bool:
         """Whether nothing of it goes on."""
         return self.state.state.is_over

@@ -99,7 +99,7 @@ class SessionBase(Observable):
 
     def refuse(self, error: Exception) -> str:
         """Tell the page that wanted it what could not be done, a bug with the log that it got; the sentence."""
-        sentence = str(error) if isinstance(error, UserError) else bug_in_words(error, sys.argv)
+        sentence = f"{error}" if isinstance(error, UserError) else bug_in_words(error, sys.argv)
         if len(sentence) > LONGEST_SENTENCE:
             sentence = f"{sentence[:LONGEST_SENTENCE]} ..."
         self._tell_problem(sentence)

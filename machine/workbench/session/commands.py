@@ -129,9 +129,6 @@ def obey(session: Session, asked: Asked) -> None:
     command; why it cannot be done the page is told later, by the name `ask` of its command."""
     session.forget_problem()
     session.stopped = ""
-    for named in (asked.get("name"), asked.get("ranker")):
-        if isinstance(named, str):
-            session.hear_name(named)
     name = asked.get("do")
     kind = COMMANDS.get(name) if isinstance(name, str) else None
     if kind is None:

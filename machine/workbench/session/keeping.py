@@ -118,7 +118,7 @@ class Keeping:
         except OSError as error:
             return reason(error)
         except UserError as error:
-            return str(error)
+            return f"{error}"
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
             return bug_in_words(error, sys.argv)
         return ""

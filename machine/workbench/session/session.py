@@ -28,13 +28,13 @@ from machine.workbench.bench.bench import (
 )
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.settings import check_block, profile_as_given, with_given, with_typed
-from machine.workbench.session.base import LONGEST_SENTENCE, Derived, SessionBase, asking
+from machine.workbench.session.base import Derived, SessionBase, asking
 from machine.workbench.session.finding import Finding, prices_of
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.placement import Readiness, resting_of, standing_of
 from machine.workbench.session.planes import PlaneTrials
 from machine.workbench.session.slicing import Comparing, Slicing
-from machine.workbench.work.folders import NAMES_KEPT, files_in, new_folder
+from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import locate, plan_beside
@@ -98,23 +98,6 @@ class Session(SessionBase):
         self.benches: tuple[OpenBench, ...] = ()
         self.unscaled: OfUnknownUnit | None = None
         self.settings_note = ("", "")
-        self._named: tuple[str, ...] = ()
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """What people have named themselves: models, plans, profiles, and their files."""
-        bench = self.bench
-        profile, given = bench.profile, bench.given
-        of_model = (
-            () if bench.model is None else (bench.model.name, bench.model.name.removeprefix("demo:"), str(bench.model.path))
-        )
-        of_profile = (profile.machine.name, profile.material.name, profile.process.name)
-        return (*of_model, *of_profile, given.machine, given.material, given.process, *self.received.names, *self._named)
-
-    def hear_name(self, name: str) -> None:
-        """Something is asked for by a name, which messages may repeat."""
-        if name not in self._named and len(name) <= LONGEST_SENTENCE:
-            self._named = (*self._named, name)[-NAMES_KEPT:]
 
     async def close(self) -> str:
         """End all work, tell the pages, and keep the last change. Then the files that pages have sent go; where the change could
@@ -143,8 +126,6 @@ class Session(SessionBase):
 
         Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
         """
-        self.hear_name(name)
-        self.hear_name(str(path))
         self.readiness.load()
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self.resting.stop()  # it would be waited for
@@ -237,7 +218,6 @@ class Session(SessionBase):
 
     async def _bench_of(self, project: Project) -> Bench:
         """A bench with a project on it. Raises UserError."""
-        self.hear_name(project.name)
         self.readiness.load()
         profile = profile_as_given(project.given, self.bench.profile.of_all_parts)
         check_block(profile, "")
@@ -260,13 +240,10 @@ class Session(SessionBase):
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""
-        self.hear_name(str(path))
         await self.take_plan(_read_plan(path))
 
     async def take_plan(self, plan: PlanFile) -> None:
         """Cut the model on the bench by a plan that has been read already."""
-        self.hear_name(plan.name)
-        self.hear_name(plan.model)
         bench = self.bench
         if bench.model is None:
             wanted = plan.model or "its model"
@@ -361,7 +338,7 @@ def _read_plan(path: Path) -> PlanFile:
     try:
         return read_plan(path)
     except PlanError as error:
-        raise PlanError(str(error).replace(str(path), path.name)) from None
+        raise PlanError(f"{error}".replace(str(path), path.name)) from None
 
 
 def _reads(profile: Profile) -> tuple[object, ...]:

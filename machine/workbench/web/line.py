@@ -10,6 +10,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from machine.workbench.access.limits import DEVICE, check_bench_command
 from machine.workbench.access.pairing import Door
+from machine.workbench.bench.page_words import in_page_words, page_words
 from machine.workbench.bench.values import Asked
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey
@@ -73,12 +74,12 @@ async def receive(socket: WebSocket) -> str:
 
 
 async def tell(source: Observable, state: Callable[[], dict[str, Any]], socket: WebSocket) -> None:
-    """The newest state whenever there is one, put into words once for all pages; what came in between while a slow page was
-    reading is left out."""
+    """The newest state whenever there is one, in the page's words and encoded once for all pages; what came in between while a
+    slow page was reading is left out."""
     while not source.closed:
         seen, text = _states.get(source, (-1, ""))
         if seen != source.version:
-            seen, text = _states[source] = source.version, json.dumps(state())
+            seen, text = _states[source] = source.version, json.dumps(in_page_words(state()))
         await send(socket, text)
         await source.changed(seen)
     await socket.close(CLOSED_CODE, CLOSED)
@@ -124,7 +125,7 @@ async def _hear_devices(door: Door, socket: WebSocket) -> None:
         try:
             _obey_door(door, parsed(text, MOST_OF_DEVICES))
         except UserError as error:
-            await send(socket, json.dumps({"problem": str(error)}))
+            await send(socket, json.dumps({"problem": page_words(f"{error}")}))
 
 
 def _obey_door(door: Door, asked: Asked) -> None:

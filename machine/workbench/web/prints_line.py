@@ -5,7 +5,6 @@ import json
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,7 @@ from starlette.websockets import WebSocket
 from machine.crash import bug_in_words, log_bug
 from machine.printing.servers.http import fetch_picture
 from machine.workbench.access.limits import DEVICE, check_print_command
-from machine.workbench.bench.page_words import page_words, with_page_words
-from machine.workbench.bench.values import Asked
+from machine.workbench.bench.page_words import page_words
 from machine.workbench.printing.commands import PageOfPrints, Work, obey
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.session import Workbench
@@ -26,7 +24,6 @@ from machine.workbench.web.sessions_thread import SessionsThread
 from profiles.errors import PrinterError, ServerError, UserError
 
 MOST_COMMAND = 10_000  # characters
-SENTENCES = ("sentence", "question", "checks", "figures", "said")  # of a print's state
 
 
 def prints_line(prints: Prints, workbench: Workbench, sessions: SessionsThread) -> Callable[[WebSocket], Awaitable[None]]:
@@ -68,11 +65,9 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 
 
 def _told(prints: Prints) -> dict[str, Any]:
-    """What every page is told, in the page's own words; what the printer says stays."""
-    state, names = prints.snapshot(), prints.names
-    jobs = [with_page_words(job, SENTENCES, names) | {"webcam": bool(job["webcam"])} for job in state["prints"]]
-    ports = state["ports"] and [with_page_words(port, ("words", "trouble"), names) for port in state["ports"]]
-    return state | {"ports": ports, "prints": jobs}
+    """What every page is told."""
+    state = prints.snapshot()
+    return state | {"prints": [job | {"webcam": bool(job["webcam"])} for job in state["prints"]]}
 
 
 def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
@@ -99,7 +94,7 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
         while True:
             text = await receive(socket)
             asked = dict[str, Any]()
-            async with _refusals(socket, partial(_names, page, asked)):
+            async with _refusals(socket):
                 asked |= parsed(text, MOST_COMMAND)
                 if DEVICE in socket.scope:
                     check_print_command(asked, page.prints.ports_known, page.prints.journals_known)
@@ -108,25 +103,20 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
                     with_bench.close()
                     raise PrinterError("what this page has ordered last still waits for its bench: wait for that first")
                 if with_bench is not None:
-                    ordering = tasks.create_task(_order(socket, page, with_bench))
+                    ordering = tasks.create_task(_order(socket, with_bench))
 
 
-async def _order(socket: WebSocket, page: PageOfPrints, with_bench: Work) -> None:
-    async with _refusals(socket, lambda: page.on_bench(lambda: page.session.names)):
+async def _order(socket: WebSocket, with_bench: Work) -> None:
+    async with _refusals(socket):
         await with_bench
 
 
-async def _names(page: PageOfPrints, asked: Asked) -> tuple[str, ...]:
-    return (*page.prints.names, *(str(asked[key]) for key in ("port", "journal", "machine") if key in asked))
-
-
 @asynccontextmanager
-async def _refusals(socket: WebSocket, names: Callable[[], Awaitable[tuple[str, ...]]]) -> AsyncIterator[None]:
-    """Tell the page why what it has asked for cannot be done. names: what people have named themselves, for page_words()."""
+async def _refusals(socket: WebSocket) -> AsyncIterator[None]:
+    """Tell the page why what it has asked for cannot be done."""
     try:
         yield
     except UserError as error:
-        problem = page_words(str(error), await names())
-        await send(socket, json.dumps({"problem": problem, "forcible": error.forcible}))
+        await send(socket, json.dumps({"problem": page_words(f"{error}"), "forcible": error.forcible}))
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
         await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

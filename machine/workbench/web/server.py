@@ -166,7 +166,7 @@ def bench_routes(workbench: Workbench) -> list[Route]:
         try:
             number = workbench.open(workbench.sessions.get(int(like)) if is_small_number(like) else None)
         except PlanError as error:
-            return JSONResponse({"problem": page_words(str(error))}, status_code=422)
+            return JSONResponse({"problem": page_words(f"{error}")}, status_code=422)
         return JSONResponse({"number": number})
 
     async def closed(request: Request) -> Response:
@@ -270,7 +270,7 @@ def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request]
         except ClientDisconnect:  # the page has gone while it sent a file
             return Response(status_code=400)
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
-            return JSONResponse({"problem": page_words(session.refuse(error), session.names)}, status_code=422)
+            return JSONResponse({"problem": page_words(session.refuse(error))}, status_code=422)
 
     return answer
 

@@ -12,7 +12,6 @@ from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.model import Model
-from machine.workbench.bench.page_words import in_page_words, page_words, with_page_words
 from machine.workbench.bench.planes import Cuts
 from machine.workbench.session.commands import Need, lacking
 from machine.workbench.session.placement import pedestal_key
@@ -27,11 +26,6 @@ from profiles.profile import Profile
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # that a page draws
-# The keys of the state that hold sentences.
-SENTENCES = (
-    *("problem", "problems", "answers", "busy", "stopped", "lacking", "notes", "standing", "resting", "copies_told"),
-    *("search", "trial", "refused", "slicing", "sliced", "comparing", "compared"),
-)
 
 
 @dataclass(frozen=True)
@@ -79,7 +73,7 @@ def verdict_of(findings: Sequence[Finding], profile: Profile, hanging_mm2: float
         return Verdict("problem", f"{count}: {findings[errors[0]].message}", errors[0], _remedy(findings[errors[0]], profile))
     process = profile.process
     if process.support == "none" and not process.spiral_vase and hanging_mm2 > process.support_least_mm2:
-        return Verdict("ready", f"Ready to print, but {hanging_mm2:.0f} mm2 hang over without support", remedy=SUPPORT_ON)
+        return Verdict("ready", f"Ready to print, but {hanging_mm2:.0f} mm² hang over without support", remedy=SUPPORT_ON)
     warnings = f"; {len(findings)} warning{'s' * (len(findings) > 1)} below" if findings else ""
     return Verdict("ready", f"Ready to print{warnings}")
 
@@ -167,11 +161,7 @@ def _sliced(session: Session) -> dict[str, Any] | None:
 
 
 def snapshot(session: Session) -> dict[str, Any]:
-    """Everything but the triangles, in the page's own words; small enough to be told whole whenever anything changes."""
-    return with_page_words(_state(session), SENTENCES, session.names)
-
-
-def _state(session: Session) -> dict[str, Any]:
+    """Everything but the triangles; small enough to be told whole whenever anything changes."""
     bench, history, search = session.bench, session.history, session.finding.progress
     standing = session.standing.result
     best = None if search is None else search.best
@@ -272,10 +262,10 @@ def _model(model: Model, session: Session) -> dict[str, Any]:
         "faces": model.faces,
         "size_mm": model.size_mm,
         "volume_mm3": model.volume_mm3,
-        "notes": in_page_words(model.notes, session.names),
+        "notes": model.notes,
         "plates": [{"number": number, "name": name, "taken": number == plate} for number, name in model.plates.items()],
         "has_settings": model.has_settings,
-        "settings_note": page_words(note, session.names) if key == model.key else "",
+        "settings_note": note if key == model.key else "",
         "drawn": model.faces <= MOST_FACES,
     }
 

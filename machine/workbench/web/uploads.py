@@ -21,6 +21,7 @@ from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
 from machine.workbench.work.folders import Received, folders_kept, remove_file
 from profiles.errors import PlanError, ProfileError, reason
+from profiles.messages import option
 from profiles.places import KINDS, kind_in
 
 TEXT_SUFFIX = ".toml"  # of plans and profiles
@@ -45,7 +46,7 @@ class ProfileFiles:
             await session.take_given(f"take {path.name}", lambda given: named(given, kind, copy))
         except ProfileError as error:
             remove_file(Path(copy))
-            raise ProfileError(str(error).replace(f"{Path(copy).parent}{os.sep}", "")) from None
+            raise ProfileError(f"{error}".replace(f"{Path(copy).parent}{os.sep}", "")) from None
         return True
 
     def copied(self, given: Given, own_names: dict[str, str]) -> Given:
@@ -181,5 +182,5 @@ def _check_size(name: str, size: int, most_mib: int) -> None:
     if size > most_mib * MIB:
         raise PlanError(
             f"{name}: has more than the {most_mib} MiB that a page may send: a model of fewer faces is needed, or"
-            " tiltprint edit with the file's name, or with a larger --upload-mib"
+            f" tiltprint edit with the file's name, or with a larger {option('upload-mib')}"
         )

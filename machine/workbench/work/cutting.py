@@ -216,7 +216,7 @@ def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
     try:
         check_parts(parts, profile)
     except MoveError as error:
-        return str(error)
+        return f"{error}"
     return ""
 
 

@@ -30,18 +30,16 @@ BEGUN_S = 60.0  # an empty folder as new as this may be of a program that starts
 KEPT_S = 24 * 3600.0  # what lay on the benches of a program that was killed: nobody else may have it
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
-NAMES_KEPT = 20
 FOLDER = "benches"
 MOST_KEPT = 10  # the newest ones
 
 
 class Received:
-    """A folder that is locked as long as its program lives, and in it one for each file. names: of the files that came last."""
+    """A folder that is locked as long as its program lives, and in it one for each file."""
 
     def __init__(self) -> None:
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
         self._lock = lock_folder(self.path)
-        self.names: tuple[str, ...] = ()
         self._numbers = itertools.count(1)
         self._at_exit = finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
@@ -50,9 +48,7 @@ class Received:
         folder = self.path / str(next(self._numbers))
         folder.mkdir()
         plain = UNSAFE.sub("_", name.encode("ascii", "replace").decode())  # a disk counts bytes, so letters have one each
-        file = folder / (plain[-LONGEST_NAME:].strip(". ") or "model")
-        self.names = (*self.names, name, file.name)[-2 * NAMES_KEPT :]
-        return file
+        return folder / (plain[-LONGEST_NAME:].strip(". ") or "model")
 
     def remove(self) -> None:
         """Remove the folder with all files."""

@@ -60,10 +60,10 @@ def read_model(
     try:
         read = read_model_file(path, profile.process.scale, profile.process.rotate_deg, plate)
     except SizeError as error:
-        sentence, question = (text.replace(str(path), name) for text in (str(error), error.question))
+        sentence, question = (text.replace(str(path), name) for text in (f"{error}", error.question))
         return Unscaled(sentence, question, error.units)
     except MeshError as error:
-        raise MeshError(str(error).replace(str(path), name)) from None
+        raise MeshError(f"{error}".replace(str(path), name)) from None
     return Model.stored(name, path, read, mesh_file, plate, has_settings(path))
 
 
@@ -122,7 +122,7 @@ def stand(tell: Tell, bench: Bench) -> Standing:
             pedestal = b"".join(mesh_blocks(pedestal_under(mesh, height_mm)))
             mesh = on_pedestal(mesh, height_mm)
         except MeshError as error:
-            pedestal, refusal = b"", str(error)
+            pedestal, refusal = b"", f"{error}"
     risky = risky_upright(mesh, profile.process.self_supporting_angle_deg)
     problem = out_of_reach((one_piece(mesh, profile.machine),), profile)
     copies_mm, none = _copies(mesh, bench)
@@ -141,5 +141,5 @@ def _copies(mesh: Mesh, bench: Bench) -> tuple[tuple[Place, ...], str]:
             printed = Decomposition(bench.model.name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
         places, _ = places_of([printed] * bench.copies, bench.profile)
     except PlanError as error:
-        return (MIDDLE,), str(error)
+        return (MIDDLE,), f"{error}"
     return tuple((at_x - x, at_y - y) for at_x, at_y in places), ""

@@ -59,6 +59,6 @@ def do(task: str, *given: Any) -> tuple[Any, str]:
     try:
         return TASKS[task](tell, *given), ""
     except UserError as error:
-        return None, str(error)
+        return None, f"{error}"
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence, and the workbench goes on
         return None, bug_in_words(error, sys.argv)

@@ -195,7 +195,7 @@ def test_a_cancel_while_the_tip_is_parked_leaves_it_there() -> None:
 def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() -> None:
     watcher = watched({150: Command.EMERGENCY_STOP})
     written: list[bytes] = []
-    known = "nozzle 200 deg C, bed 60 deg C as last known, [0-5] s before"
+    known = "nozzle 200 °C, bed 60 °C as last known, [0-5] s before"
     with pytest.raises(FirmwareError, match=f"emergency stop: the printer has halted; .*; {known}$"):
         watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written))
     assert watcher.shown[-1].heat_is_old
@@ -342,7 +342,7 @@ def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:
 
 def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
     watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=1e6))
-    known = "nozzle 200 deg C, bed 60 deg C as last known, 12[0-9] s before"
+    known = "nozzle 200 °C, bed 60 °C as last known, 12[0-9] s before"
     with pytest.raises(PortError, match=f"did not come back within 120 s; its heaters may still be on, .*; {known}"):
         watcher.run(PROGRAM)
     assert watcher.printer.now_s < 1000.0

@@ -45,5 +45,5 @@ def test_the_temperatures_of_a_server_that_does_not_answer_grow_old(monkeypatch:
     assert progress.at(first, "").heat_age_s == 0.0
     now_s += 20.0
     assert (progress.at(first, "no answer").heat_age_s, progress.at(first, "no answer").heat_is_old) == (20.0, True)
-    assert progress.last_known == "; nozzle 210 deg C, bed 60 deg C as last known, 20 s before"
+    assert progress.last_known == "; nozzle 210 °C, bed 60 °C as last known, 20 s before"
     assert (progress.at(second, "").heat_age_s, progress.at(second, "").heat_is_old) == (0.0, False)

@@ -40,10 +40,10 @@ def test_a_heater_that_is_or_comes_near_its_target_is_left_alone(course: Callabl
 
 
 @pytest.mark.parametrize(("course", "words"), [
-    (lambda s: 200.0 if s < 100 else 150.0, r"nozzle has been at 150 deg C for 6\d s although 200 is wanted"),
-    (lambda s: 20.0, "nozzle has been at 20 deg C"),
+    (lambda s: 200.0 if s < 100 else 150.0, r"nozzle has been at 150 °C for 6\d s although 200 is wanted"),
+    (lambda s: 20.0, "nozzle has been at 20 °C"),
     (lambda s: min(200.0 + 0.5 * s, 260.0), "nozzle has been at 2"),
-    (lambda s: 320.0, "nozzle is at 320 deg C: this machine allows at most 300"),
+    (lambda s: 320.0, "nozzle is at 320 °C: this machine allows at most 300"),
 ], ids=["fell off", "never warm", "runs away", "too hot"])  # fmt: skip
 def test_a_heater_that_stays_away_from_its_target_ends_the_print(course: Callable[[float], float], words: str) -> None:
     with pytest.raises(PrinterError, match=words):
@@ -63,7 +63,7 @@ def test_a_cold_bed_is_noticed_too() -> None:
     watchdog = Watchdog()
     for second in range(180):
         watchdog.check(Temperature(200.0, 200.0, 20.0, 60.0), float(second))
-    with pytest.raises(PrinterError, match="the bed has been at 20 deg C for 181 s although 60 is wanted"):
+    with pytest.raises(PrinterError, match="the bed has been at 20 °C for 181 s although 60 is wanted"):
         watchdog.check(Temperature(200.0, 200.0, 20.0, 60.0), 181.0)
 
 

@@ -1,131 +1,159 @@
-"""Page words: what a terminal is told by options and keys, a page is told by its own fields and labels."""
+"""Page words: what a terminal names by options and keys, a page names by its own fields and labels."""
 
+import ast
 import re
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
 
-from machine.pipeline.requests import Given
+import machine.pipeline.requests
+from machine.pipeline.requests import FORCE_GOES_ON, Given
+from machine.printing import ports
 from machine.workbench.bench.bench import Bench, History, Step
-from machine.workbench.bench.page_words import LABELS, RULES, in_page_words, page_words, with_page_words
+from machine.workbench.bench.page_words import OPTIONS, PHRASES, in_page_words, page_words
 from machine.workbench.session.session import Session
 from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work.worker_pool import WorkerPools
+from mdp.ranking.candidates import REASONS, Reason
+from profiles.errors import PlanError, ProfileError
+from profiles.messages import advice, key_name, option, phrase, terminal_words
+from profiles.part_settings import parse_part_settings
 from profiles.profile import load
 from tests.machine.workbench.models import model
 
 PAIRS = [
-    ("--copies is 0: 1 to 1000 is allowed", "Copies is 0: 1 to 1000 is allowed"),
-    ("--ranker x: classic, learned or the name", "Ranked as x: classic, learned or the name"),
-    (
-        "cut: taken away with part 3: --pause 3:15, --part 3:ironing=true (Undo brings them back)",
-        "cut: taken away with part 3: the pause at 3:15, its own ironing=true (Undo brings them back)",
-    ),
-    ("--filament-change 1:x: PART:LAYER or", "1:x under Copies and pauses: PART:LAYER or"),
-    (
-        "part 2: process.scale holds for the whole print: --set process.scale=... sets it",
-        "part 2: Scale of the model holds for the whole print: set it for all parts",
-    ),
-    (
-        "if its coordinates are inches, give --set process.scale=25.4",
-        "if its coordinates are inches, set Scale of the model to 25.4",
-    ),
-    (
-        "the dry run found 1 error, the first: X (simulate lists all, --force goes on)",
-        "the dry run found 1 error, the first: X (tick Go on all the same to print it nevertheless)",
-    ),
-    (
-        "what remains would not stand on the platform (criterion II)",
-        "what remains would not stand on the platform",
-    ),
-    ("a sliver 3.8e-07 mm thin: 0.3 mm is the least", "a sliver less than 0.001 mm thin: 0.3 mm is the least"),
-    ("machine.tilt.limits_deg is [5, 3]", "Tilt axis: Range is [5, 3]"),
-    ("machine.gcode.end: placeholder {nozzle_c} is not known", "G-code blocks: End G-code: placeholder {nozzle_c} is not known"),
-    ("layer_height_mm is 0.5 mm: at most 0.9 of line_width_mm", "Layer height is 0.5 mm: at most 0.9 of Line width"),
-    ("--parts 9: the search found no more than 3", "9 parts were asked for: the search found no more than 3"),
-    (
-        "wait until that is done; send without --start hands a file over meanwhile",
-        "wait until that is done; tick Only hand the file over meanwhile",
-    ),
-    ("rubbish at 9600 baud, and nothing at the usual other rates: --baud N tries another", None),
-    (
-        "the model lies between 0.00 and 116.36 mm, offset_mm is -50",
-        "the model lies between 0.00 and 116.36 mm, the offset is -50 mm",
-    ),
-    (
-        "along its normal offset_mm must be at least 0.60, it is 0.2",
-        "along its normal the offset must be at least 0.60 mm, it is 0.2 mm",
-    ),
-    ("the printer has halted; nozzle 240 deg C, bed 80 deg C", "the printer has halted; nozzle 240 °C, bed 80 °C"),
-    ("and name that profile with --machine", "and name that profile under Homed as in"),
+    (f"{option('copies')} is 0: 1 to 1000 is allowed", "Copies is 0: 1 to 1000 is allowed"),
+    (f"{option('copies', 3)}: a.gcode is G-code", "3 copies: a.gcode is G-code"),
+    (f"{option('ranker', 'x')}: classic, learned or the name", "ranked as x: classic, learned or the name"),
+    (f"{option('filament-change', '1:x')}: PART:LAYER or", "the filament change at 1:x: PART:LAYER or"),
+    (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 25.4"),
+    (f"{option('set', 'process.walls=4')} and", "Walls = 4 and"),
+    (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Go on all the same to print it nevertheless)"),
+    (f"{key_name('machine.tilt.limits_deg')} is [5, 3]", "Tilt axis: Range is [5, 3]"),
+    (f"{key_name('machine.gcode.end')}: placeholder {{nozzle_c}}", "G-code blocks: End G-code: placeholder {nozzle_c}"),
+    (f"at most 0.9 of {key_name('process.line_width_mm', 'line_width_mm')}", "at most 0.9 of Line width"),
+    (f"{option('parts', 9)}: the search found no more than 3", "the number of parts 9: the search found no more than 3"),
+    (f"would save 3 mm²: {advice('parts', 4)}", "would save 3 mm²: take 4 under In how many parts"),
+    (f"a sliver{phrase('', ' (criterion II)')}", "a sliver"),
+    (f"{option('certificate', 'a.pem')} cannot be read", "--certificate a.pem cannot be read"),
 ]
 
 
-@pytest.mark.parametrize(("sentence", "said"), PAIRS)
-def test_a_sentence_names_what_the_page_has(sentence: str, said: str | None) -> None:
-    words = page_words(sentence)
-    assert said is None or words == said
-    assert re.search(r"(^|\s)--\w", words) is None
+@pytest.mark.parametrize(("message", "page"), PAIRS)
+def test_a_message_names_what_the_page_has(message: str, page: str) -> None:
+    assert page_words(message) == page
 
 
-def test_what_is_no_key_and_no_option_stays() -> None:
-    for text in ("demo:tree", "my process.stl", "/home/me/process.walls.toml", "a--b.stl", "2.5 mm", "part 1, tilt 30°"):
-        assert page_words(text) == text
+def test_a_terminal_has_the_options_and_the_keys() -> None:
+    sentence = (
+        f"{key_name('process.walls')} is 0: {option('parts', 4)}, {advice('set', 'process.walls=2', 'give')} ({FORCE_GOES_ON})"
+    )
+    assert terminal_words(sentence) == "process.walls is 0: --parts 4, give --set process.walls=2 (--force goes on)"
 
 
-def test_sentences_in_lists_and_tables_are_said_so_and_numbers_and_other_keys_stay() -> None:
-    state = {"problem": "--copies is 0", "name": "--copies is 0", "given": {"settings": ["process.walls=4"]}, "n": 3}
-    assert with_page_words(state, ("problem", "lacking")) == {**state, "problem": "Copies is 0"}
-    assert in_page_words([{"a": ["--copies is 0"]}, 2, None]) == [{"a": ["Copies is 0"]}, 2, None]
+def test_an_error_keeps_its_marks_where_another_message_holds_it() -> None:
+    error = PlanError(f"{option('parts')} is 0")
+    assert str(error) == "--parts is 0"
+    assert page_words(f"a.stl: {error}") == "a.stl: the number of parts is 0"
+    assert str(PlanError(f"a.stl: {error}")) == "a.stl: --parts is 0"
 
 
-KEYS = sorted({word for key in LABELS for word in (key, key.rpartition(".")[2])})
-OPTIONS = sorted({word for pattern, _ in RULES for word in re.findall(r"--[a-z-]+", pattern)})
-PHRASES = ("(criterion II)", "compiling the kernels", "deg C", "mm2", "offset_mm is 3", "(--force)", "= 3", "1", ":", "goes on")
-NAMES = st.builds(
-    lambda words, between, suffix: between.join(words) + suffix,
-    st.lists(st.sampled_from([*KEYS, *OPTIONS, *PHRASES]), min_size=1, max_size=4),
-    st.sampled_from([" ", "_", "-", ""]),
-    st.sampled_from([".stl", ".toml", ".gcode", ""]),
-)
-SAID = (
-    "reading {}",
-    "{}: has more than the 1 MiB that a page may send",
-    "plan tee.toml: there is no model on the workbench to cut by it: open {} first",
-    "uploading {}: 1.0 of 2.0 MB",
-    "{} goes on printing on octoprint:printer: this page follows it no more",
-    "{}: process.walls is -3: it must be a whole number from 0 to 50 (--force goes on)",
-)
-
-
-@given(NAMES, st.sampled_from(SAID))
-def test_a_name_that_a_person_gave_is_never_rewritten_and_all_around_it_is(name: str, said: str) -> None:
-    assert name in page_words(said.format(name), [name])
-    assume(not any(own in said for own in (name, name.rpartition(".")[0]) if own))  # else the message's own words stay, too
-    assert page_words(said.format(name), [name]) == page_words(said).replace("{}", name)
-
-
-@pytest.mark.parametrize(("sentence", "own"), [
-    ("process.infill_pattern is 'infill_density': 'grid' is allowed", "'infill_density'"),
-    ('the printer says "machine.tilt.limits_deg --force goes on"', '"machine.tilt.limits_deg --force goes on"'),
-    ("--ranker infill_density: no such ranker", "infill_density"),
-    ("--set machine.name=infill_density", "infill_density"),
-    ("open infill_density.stl first", "infill_density.stl"),
+@pytest.mark.parametrize(("settings", "page"), [
+    (["process.walls=-3"], "Walls is -3: it must be a whole number from 0 to 50"),
+    (["process.layer_height_mm=0.5"], "Layer height is 0.5 mm: at most 0.9 of Line width"),
+    (["machine.tilt.limits_deg=[5, 3]"], "Tilt axis: Range is [5.0, 3.0]"),
+    (["process.infill_pattern=infill_density"], 'Infill pattern is "infill_density"'),
+    (["process.infil_density=1"], "did you mean Infill density?"),
+    (["material.nozzle_c=900"], "Nozzle"),
 ])  # fmt: skip
-def test_what_is_quoted_or_given_as_a_value_or_is_a_file_stays(sentence: str, own: str) -> None:
-    assert own in page_words(sentence)
+def test_a_profile_that_is_wrong_is_told_by_labels(settings: list[str], page: str) -> None:
+    with pytest.raises(ProfileError) as refused:
+        load(settings=settings)
+    assert page in page_words(f"{refused.value}")
 
 
-def test_a_page_is_told_the_names_of_its_bench_as_they_are() -> None:
+def test_the_program_s_own_sentences_have_no_option_on_the_page() -> None:
+    with pytest.raises(ProfileError) as refused:
+        parse_part_settings("2")
+    sentences = [*REASONS.values(), *(text for _, *texts in ports.NO_PRINTERS.values() for text in texts), f"{refused.value}"]
+    for sentence in sentences:
+        assert re.search(r"(^|\s)--\w|\bsearch\.", page_words(sentence)) is None
+    assert page_words(REASONS[Reason.PLATFORM]) == "the plane would cut the platform"
+
+
+def test_what_is_not_marked_stays_whatever_its_name_is() -> None:
+    for text in ("demo:tree", "process.walls.toml", "--copies is 3.stl", "infill_density 2.stl: part 1, tilt 30°", "a \ufdd0 b"):
+        assert page_words(text) == text.replace("\ufdd0", "")
+    assert page_words(f"{option('plan', '--copies 3.toml')} exists") == "the plan --copies 3.toml exists"
+
+
+def test_texts_in_lists_and_tables_are_said_so_and_numbers_stay() -> None:
+    state = {"problem": f"{option('copies')} is 0", "n": 3, "rows": [{"a": [f"{key_name('process.walls')}"]}, 2, None]}
+    assert in_page_words(state) == {"problem": "Copies is 0", "n": 3, "rows": [{"a": ["Walls"]}, 2, None]}
+
+
+def test_a_page_gets_the_names_of_its_bench_as_they_are() -> None:
     profile = load(settings=["machine.name=line_width_mm"])
     session = Session(profile, Given(), WorkerPools())
     sent = session.received.new_file("walls --copies 3 infill_density.stl")
     session.history = History(Step("", Bench(profile, replace(model(), name="infill_density", path=sent))))
     session.busy = "reading infill_density on line_width_mm"
-    session.problems = {"": "walls --copies 3 infill_density.stl is empty; process.walls is -3"}
-    state = snapshot(session)
+    session.problems = {"": f"walls --copies 3 infill_density.stl is empty; {key_name('process.walls')} is -3"}
+    state = in_page_words(snapshot(session))
     assert state["busy"] == "reading infill_density on line_width_mm"
     assert state["problems"] == {"": "walls --copies 3 infill_density.stl is empty; Walls is -3"}
     session.received.remove()
+
+
+ROOT = Path(machine.pipeline.requests.__file__).parents[2]
+# Files whose options are no part of a message, or of one that only a terminal shows.
+UNMARKED = {
+    "machine/cli": "messages of commands, which no page shows",
+    "machine/notices.py": "what the terminal's front end adds to a forced error",
+    "machine/view/parts.py": "a command to copy",
+    "machine/workbench/bench/page_words.py": "the names of marks",
+    "machine/workbench/bench/settings.py": "a command to copy",
+    "mdp/learning": "tools of their own, whose options these are",
+    "profiles/messages.py": "the marks themselves",
+    "profiles/search.py": "the description of a key, which --help and the page show alike",
+}
+
+
+def _texts(file: Path) -> Iterator[str]:
+    """The texts of a file that are neither docstrings nor arguments of a mark."""
+    tree = ast.parse(file.read_text())
+    left_out = set[int]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            left_out.add(id(node.value))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "phrase":
+            left_out |= {id(inner) for inner in ast.walk(node)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in left_out:
+            yield node.value
+
+
+def test_no_message_has_an_option_that_is_not_marked() -> None:
+    bare = [
+        f"{file.relative_to(ROOT)}: {text}"
+        for package in ("profiles", "mdp", "slicer", "machine")
+        for file in sorted((ROOT / package).rglob("*.py"))
+        if not file.relative_to(ROOT).as_posix().startswith(tuple(UNMARKED))
+        for text in _texts(file)
+        if re.search(r"(?<![\w-])--[a-z]", text)
+    ]
+    assert bare == []
+
+
+def test_every_phrase_of_the_program_is_known_to_the_page() -> None:
+    used = set[str]()
+    for package in ("profiles", "mdp", "slicer", "machine"):
+        for file in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "phrase":
+                    assert isinstance(node.args[0], ast.Constant)
+                    used.add(str(node.args[0].value))
+    assert used == set(PHRASES)
+    assert all(bare or with_value for bare, with_value in OPTIONS.values())

@@ -223,7 +223,7 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
         await asyncio.sleep(0)
 
     session = when_done(work)
-    assert [stop.option for stop in session.bench.stops] == ["--pause 1:3"]
+    assert [stop.at for stop in session.bench.stops] == ["1:3"]
     assert session.problem.startswith(
         "turn the model: taken away with part 2: --pause 2:8.4mm (Undo brings it back); slicing has ended"
     )

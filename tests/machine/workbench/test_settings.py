@@ -26,6 +26,7 @@ from machine.workbench.bench.settings import (
 from mdp.pose import UP, about, turned_by
 from mdp.search.plan_file import PlannedPart
 from profiles.errors import PlanError, ProfileError
+from profiles.messages import terminal_words
 from profiles.part_settings import OF_PARTS_ON_PLASTIC
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys
@@ -155,7 +156,7 @@ def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
 ) -> None:
     steps = History(Step("", replace(BENCH, stops=parse_stops(["1:3", "3:15"], ["9:1"]))))
     after = steps.do("cut", with_cuts(steps.now.bench, cuts))
-    assert " ".join(stop.option for stop in after.now.bench.stops) == stops
+    assert " ".join(terminal_words(stop.option) for stop in after.now.bench.stops) == stops
     assert after.now.lost == lost
     assert after.undo().now.bench.stops == steps.now.bench.stops
 

@@ -174,7 +174,7 @@ def begin_cold(session: ProbingSession, mover: PrinterMover, machine: Machine) -
         if not session.switch_off():
             raise PrinterError("the printer did not confirm that its heaters are off: measuring is done cold")
     if (nozzle_c := session.nozzle_c()) > HOT_C:
-        say(f"the nozzle is {nozzle_c:.0f} deg C hot: plastic that hangs from it falsifies every contact")
+        say(f"the nozzle is {nozzle_c:.0f} °C hot: plastic that hangs from it falsifies every contact")
     mover.start()
     mover.rise(machine.z.limits_mm[1])
 

@@ -106,13 +106,13 @@ def test_heaters_are_switched_off_on_leaving_and_that_is_said(done: Done, capsys
     code, record = done("M104 S200\nM140 S60\n")
     assert (code, record.nozzle_target_c, record.bed_target_c) == (0, 0.0, 0.0)
     assert record.happened("nozzle 200")
-    assert "switched off: nozzle set to 200 deg C and bed set to 60 deg C" in capsys.readouterr().err
+    assert "switched off: nozzle set to 200 °C and bed set to 60 °C" in capsys.readouterr().err
 
 
 def test_heaters_stay_on_when_that_is_asked_for(done: Done, capsys: Capsys) -> None:
     code, record = done("M104 S200\n", "--leave-heaters")
     assert (code, record.nozzle_target_c) == (0, 200.0)
-    assert "left on: nozzle set to 200 deg C" in capsys.readouterr().err
+    assert "left on: nozzle set to 200 °C" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("line", ["/stop", "M112", "M112 ; now"])
@@ -198,9 +198,9 @@ def test_a_person_is_asked_about_heaters_that_are_on() -> None:
         person.press("M104 S200\n")
         person.see("ok")
         person.press("/quit\n")
-        person.see("nozzle set to 200 deg C: switch off? [Y/n] ")
+        person.see("nozzle set to 200 °C: switch off? [Y/n] ")
         person.press("n\n")
-        person.see("left on: nozzle set to 200 deg C")
+        person.see("left on: nozzle set to 200 °C")
         assert person.end() == 0
 
 

@@ -20,7 +20,7 @@ CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, stairs_mm2=6.0, time_s=3600.0, filament
 def test_what_was_chosen_is_advised() -> None:
     decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="the least cost")))
     assert advice(decomposition, PROFILE).splitlines() == [
-        "print it      support mm2    less  seams mm  stairs mm2  about  filament m",
+        "print it      support mm²    less  seams mm  stairs mm²  about  filament m",
         "in one piece        300.0                 0         125  1h 2m         4.0",
         "in 3 parts           30.0  90.0 %        80           6  1h 0m         3.9",
         "advice: print it in 3 parts",

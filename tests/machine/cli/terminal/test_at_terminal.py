@@ -36,7 +36,7 @@ def test_a_moment_of_a_print_is_drawn_whole() -> None:
     head, position, heat, bar, times, keys = lines(MOMENT)
     assert head.split() == ["tree.gcode", "to", "/dev/ttyACM0", "printing"]
     assert position == "part 1 of 2   layer 1 of 2   tilt A 0.0 deg   turn C 0.0 deg"
-    assert heat == "nozzle 209.8 / 210 deg C   bed 60.1 / 60 deg C   feed 100 %   flow 100 %"
+    assert heat == "nozzle 209.8 / 210 °C   bed 60.1 / 60 °C   feed 100 %   flow 100 %"
     assert bar.endswith(" 62 %")
     assert bar.count("━") == pytest.approx(0.62 * 95, abs=1.0)
     assert times == "12m 34s so far   1h 12m 15s left   done at 13:12   line 12 of 14"
@@ -59,7 +59,7 @@ def test_what_is_not_known_is_left_out() -> None:
 def test_temperatures_that_may_be_true_no_more_are_marked_with_their_age(old: dict[str, Any]) -> None:
     moment = replace(MOMENT, **old)
     mark = f"as last known {old['heat_age_s']:.0f} s ago"
-    assert lines(moment)[2].startswith(f"{mark}:   nozzle 209.8 / 210 deg C   bed 60.1 / 60 deg C")
+    assert lines(moment)[2].startswith(f"{mark}:   nozzle 209.8 / 210 °C   bed 60.1 / 60 °C")
     assert f"nozzle 210 C, bed 60 C {mark}, " in status_line(moment)
     for fresh in (replace(MOMENT, heat_age_s=14.0), replace(moment, temperature=Temperature())):
         assert not any("as last known" in line for line in (*lines(fresh), status_line(fresh)))

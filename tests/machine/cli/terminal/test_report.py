@@ -22,7 +22,7 @@ def part(index: int, mesh: Mesh, base: Plane, pose: Pose, risky_mm2: float = 0.0
 
 
 def tee_in_parts() -> Decomposition:
-    """A tee with its arms cut off sideways, 300 mm2 of underside that hang printed straight up; 30 of them stay risky."""
+    """A tee with its arms cut off sideways, 300 mm² of underside that hang printed straight up; 30 of them stay risky."""
     right, left = Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0)
     left_arm, rest = cut(solid_of(tee()), left)
     right_arm, stem = cut(rest, right)
@@ -37,7 +37,7 @@ def tee_in_parts() -> Decomposition:
 def test_the_parts_of_a_tee_stand_in_print_order_with_what_they_save() -> None:
     lines = parts_table(tee_in_parts()).splitlines()
     assert lines == [
-        "part  tilt deg  turn deg  base mm  volume mm3   share  risky before  after mm2",
+        "part  tilt deg  turn deg  base mm  volume mm³   share  risky before  after mm²",
         "1          0.0       0.0      0.0        4000  57.1 %           0.0        0.0",
         "2         90.0      90.0      5.0        1500  21.4 %         150.0       30.0",
         "3         90.0     -90.0      5.0        1500  21.4 %         150.0        0.0",
@@ -54,7 +54,7 @@ def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
         FrontRow(planes, 30.0, 80.0, 78.0, chosen=True, reason="the least cost"),
     )
     assert front_table(rows).splitlines() == [
-        "in parts  needs support mm2  seams mm  stairs mm2  costs mm2  about  filament m",
+        "in parts  needs support mm²  seams mm  stairs mm²  costs mm²  about  filament m",
         "1                     300.0         0          12      312.0  1h 2m         4.0",
         "2                     150.0        40           0      174.0      -           -",
         "3                      30.0        80           0       78.0      -           -  taken: the least cost",
@@ -65,7 +65,7 @@ def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
 def test_the_joints_stand_in_print_order_and_the_weakest_is_named() -> None:
     joints = (Joint(2, 70.18, 21.16, 36.585, 842.19, 31.2), Joint(3, 111.33, 29.13, 19.529, 12605.3, 40.0))
     assert joints_table(joints).splitlines() == [
-        "joint of part  area mm2  seam mm  arm mm  breaks at N  pulled off at N",
+        "joint of part  area mm²  seam mm  arm mm  breaks at N  pulled off at N",
         "2                  70.2       31    21.2           37              840",
         "3                 111.3       40    29.1           20            13000",
         "weakest: the joint of part 3, by estimate it breaks at 20 N sideways at the far end",
@@ -78,7 +78,7 @@ def test_a_joint_that_is_sliced_has_its_contact_and_its_plastic_one_that_is_not_
     sliced = Joint(2, 70.18, 21.16, 36.585, 842.19, 31.2, contact_share=0.9712, plastic_over_room=1.024)
     lines = joints_table((sliced, Joint(3, 111.33, 29.13, 19.529, 12605.3, 40.0))).splitlines()
     assert lines[:3] == [
-        "joint of part  area mm2  contact %  plastic / room %  seam mm  arm mm  breaks at N  pulled off at N",
+        "joint of part  area mm²  contact %  plastic / room %  seam mm  arm mm  breaks at N  pulled off at N",
         "2                  70.2       97.1               102       31    21.2           37              840",
         "3                 111.3          -                 -       40    29.1           20            13000",
     ]

@@ -95,7 +95,7 @@ def test_a_cooled_pause_says_what_will_happen_and_goes_on_to_the_same_print() ->
     assert not watcher.run(PROGRAM).cancelled
     assert watcher.shown_at(COOLS_S - 5.0).message == ""
     assert watcher.shown_at(COOLS_S + 5.0).message == (
-        "the nozzle was switched off after 2 min; when the print goes on it is heated to 200 deg C and filled where the tip "
+        "the nozzle was switched off after 2 min; when the print goes on it is heated to 200 °C and filled where the tip "
         "waits: take the drop off"
     )
     assert is_exact(watcher)
@@ -182,7 +182,7 @@ def test_filament_is_not_pushed_through_a_cold_nozzle_for_a_firmware_would_end_t
     watcher = Patience(profile_of("klipper")).after(5.0, Command.LINE, own).after(COLD_S, Command.LINE, "G1 E20 F300")
     assert not watcher.after(COLD_S + 60.0, Command.RESUME).run(PROGRAM).cancelled
     assert re.fullmatch(
-        r"not sent: 'G1 E20 F300': the nozzle has only \d\d deg C: heat it first \(M109\)",
+        r"not sent: 'G1 E20 F300': the nozzle has only \d\d °C: heat it first \(M109\)",
         watcher.shown_at(COLD_S + 5.0).message,
     )
     assert "G1 E20 F300" not in watcher.lines()

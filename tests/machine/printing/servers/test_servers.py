@@ -343,7 +343,7 @@ def dies_and_comes_back(job: Job, message: str) -> None:
 
 
 HAPPENINGS = [
-    (KINDS, dies_and_comes_back, r"no longer prints box\.gcode \(ready\); last known: .*nozzle 210 deg C, bed 60 deg C"),
+    (KINDS, dies_and_comes_back, r"no longer prints box\.gcode \(ready\); last known: .*nozzle 210 °C, bed 60 °C"),
     (("octoprint", "moonraker"), cancelled_there, r"no longer prints box\.gcode"),
     (("octoprint", "moonraker"), another_is_printed, r"prints other\.gcode now: what became of box\.gcode is not known"),
 ]

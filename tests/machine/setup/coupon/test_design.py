@@ -53,5 +53,5 @@ def test_what_bars_cannot_be_printed_with_is_refused(given: list[str], said: str
 
 
 def test_a_bar_hotter_than_the_nozzle_may_be_is_refused() -> None:
-    with pytest.raises(ProfileError, match=r"printed at 230 deg C: generic A/C table allows at most 225 deg C"):
+    with pytest.raises(ProfileError, match=r"printed at 230 °C: generic A/C table allows at most 225 °C"):
         factors(load(settings=["machine.nozzle_limit_c=225"]))

@@ -366,9 +366,7 @@ class Attended:
 def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
     monkeypatch.setattr(follow, "POLL_S", 0.05)
-    stopped = (
-        "emergency stop: {0} has taken it; restart the printer before the next print; nozzle 210 deg C, bed 60 deg C as last"
-    )
+    stopped = "emergency stop: {0} has taken it; restart the printer before the next print; nozzle 210 °C, bed 60 °C as last"
     left = "hour goes on printing on {0}: this page follows it no more"
     with stand_in("duet") as (job, address):
         job.steps = 10_000

@@ -1,0 +1,58 @@
+"""Messages: sentences for a person in which keys and options are marked, so that each front end names them in its own way.
+
+A message is a str. A mark in it holds a name, a value, and the words of the terminal: `terminal_words` puts these in its place,
+and the workbench shows the label of the key, or the field that does what the option does. The delimiters of a mark are
+noncharacters, which Unicode keeps for the inside of programs: no proper text has them. A UserError keeps the marks where an
+f-string puts it into another message; its str() is for the terminal.
+"""
+
+import re
+from collections.abc import Callable
+
+_BEGIN, _BETWEEN, _END = "\ufdd0", "\ufdd1", "\ufdd2"
+_INSIDE = f"([^{_BEGIN}-{_END}]*)"
+_MARK = re.compile(f"{_BEGIN}{_INSIDE}{_BETWEEN}{_INSIDE}{_BETWEEN}{_INSIDE}{_END}")
+_LEFT_OVER = re.compile(f"[{_BEGIN}-{_END}]")  # of a mark that was cut through
+
+
+def key_name(key: str, shown: str = "") -> str:
+    """A key of the profile, as "process.walls". shown: what a terminal shows of it, as "walls"; else all of it."""
+    return _mark(key, "", shown or key)
+
+
+def option(name: str, value: object = "") -> str:
+    """An option as a noun: "--parts 4", on the page "the number of parts 4"."""
+    return _mark(f"--{name}", f"{value}", f"--{name} {value}".rstrip())
+
+
+def advice(name: str, value: object = "", verb: str = "") -> str:
+    """An option that the person may give: "--parts 4", on the page "take 4 under In how many parts". verb: as "give" """
+    return _mark(f"advice --{name}", f"{value}", f"{verb} --{name} {value}".strip())
+
+
+def phrase(name: str, terminal: str, value: object = "") -> str:
+    """Words of the terminal in place of which the page has others, which it knows by a name; "": it has none. value: what is in
+    these others."""
+    return _mark(name, f"{value}", terminal)
+
+
+def terminal_words(message: str) -> str:
+    """The message as a terminal shows it."""
+    return rendered(message, lambda name, value, terminal: terminal)
+
+
+def rendered(message: str, words: Callable[[str, str, str], str]) -> str:
+    """The message without marks. words: what takes the place of one, by its name, its value and the words of the terminal.
+
+    >>> rendered(f"{option('parts', 0)}: 1 is the least", lambda name, value, terminal: f"{name}={value}")
+    '--parts=0: 1 is the least'
+    """
+    if _BEGIN not in message and _END not in message:
+        return message
+    return _LEFT_OVER.sub("", _MARK.sub(lambda mark: words(*mark.groups()), message))
+
+
+def _mark(name: str, value: str, terminal: str) -> str:
+    """A mark; a mark inside of it, as of a message that is a value, is put into the words of the terminal."""
+    fields = (terminal_words(field) for field in (name, value, terminal))
+    return f"{_BEGIN}{_BETWEEN.join(fields)}{_END}"
