@@ -40,7 +40,7 @@ CONFINED = {
     "pydantic": ("profiles/", "machine/pipeline/project_record.py", "machine/workbench/"),
     "rich": ("machine/cli/", "machine/pipeline/", "mdp/batch/"),
     "prompt_toolkit": ("machine/cli/",),
-    "PIL": ("machine/pipeline/pictures.py", "machine/pipeline/residual_picture.py"),
+    "PIL": ("machine/pipeline/pictures.py",),
     "tomlkit": ("machine/setup/", "mdp/search/plan_writing.py"),
     "platformdirs": ("profiles/folders.py",),
     "torch": ("mdp/learning/",),

@@ -12,7 +12,7 @@ from functools import partial
 from time import process_time
 from typing import TypeVar
 
-from machine.pipeline.pricing import pricing
+from machine.pipeline.choice import pricing
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import in_words
 from mdp.model_file import locate

@@ -26,9 +26,9 @@ from machine.dryrun.balance.interfaces import AT_THE_EDGE, NO_PART, interfaces
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import shift, workpiece_points
+from machine.pipeline.choice import pricing
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.pipeline import build
-from machine.pipeline.pricing import pricing
 from mdp.mesh import Floats, Indices
 from mdp.model_file import locate
 from mdp.pose import Pose, rotation

@@ -13,7 +13,7 @@ from time import process_time
 
 from compare_prints import files, mesh_of
 
-from machine.pipeline.pricing import pricing
+from machine.pipeline.choice import pricing
 from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load

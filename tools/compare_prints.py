@@ -15,9 +15,9 @@ from statistics import median
 
 import numpy as np
 
+from machine.pipeline.choice import pricing
 from machine.pipeline.comparison import best_lying, in_parts, straight_up
 from machine.pipeline.pipeline import build
-from machine.pipeline.pricing import pricing
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
 from mdp.search.orient import orient_and_decompose

@@ -12,8 +12,8 @@ import numpy as np
 
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode.writer import write_gcode
+from machine.pipeline.choice import pricing
 from machine.pipeline.pictures import best_view, floor_of, parts_apart
-from machine.pipeline.pricing import pricing
 from machine.pipeline.raster import Image, draw
 from machine.planning.plan import plan
 from machine.view.parts import part_colours, residual_faces
@@ -86,7 +86,7 @@ def head_over_table(axes: "Axes", machine: Machine) -> None:
 def mesh_with_overhangs(axes: "Axes", mesh: Mesh, profile: Profile) -> None:
     """The model, with what needs support red if it is printed straight up."""
     risky = needing_upright(mesh, profile)
-    show_image(axes, draw([floor_of(mesh), mesh], [FLOOR, GREY], reds=[None, risky], view=best_view(mesh, risky), size=SIZE))
+    show_image(axes, draw([floor_of(mesh), mesh], [FLOOR, GREY], reds=[None, risky], axes=best_view(mesh, risky), size=SIZE))
 
 
 def parts_moved_apart(axes: "Axes", decomposition: Decomposition, profile: Profile) -> None:
@@ -95,7 +95,7 @@ def parts_moved_apart(axes: "Axes", decomposition: Decomposition, profile: Profi
     reds = [residual_faces(part, profile) for part in parts]
     view = best_view(mesh, needing_upright(mesh, profile))
     colours = [FLOOR, *part_colours(len(parts))]
-    show_image(axes, draw([floor_of(mesh), *parts_apart(parts)], colours, reds=[None, *reds], view=view, size=SIZE))
+    show_image(axes, draw([floor_of(mesh), *parts_apart(parts)], colours, reds=[None, *reds], axes=view, size=SIZE))
 
 
 def show_image(axes: "Axes", image: Image) -> None:

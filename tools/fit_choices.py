@@ -24,7 +24,7 @@ import numpy as np
 from judge_parts import scaled
 from offer_parts import sheet_name
 
-from machine.pipeline.pricing import pricing
+from machine.pipeline.choice import pricing
 from mdp.cost.cost import weight_of_stairs
 from mdp.cost.footing import BuildPlate
 from mdp.directions.orientation import diameter_mm, standing_still

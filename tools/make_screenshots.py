@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 
 from machine.pipeline.pipeline import build, decompose_model
-from machine.pipeline.requests import Cuts, ModelRequest
+from machine.pipeline.requests import ModelRequest
 from machine.view.page import print_page
 from profiles.profile import load
 from tests.machine.browser import Browser
@@ -48,7 +48,7 @@ SHOTS = {
 def content(demo: str, parts: int | None) -> bytes:
     """The page of a demo model, sliced for the usual machine."""
     profile = load()
-    decomposed = decompose_model(ModelRequest(f"demo:{demo}", profile, cuts=Cuts(parts=parts)))
+    decomposed = decompose_model(ModelRequest(f"demo:{demo}", profile, parts=parts))
     return print_page(f"demo:{demo}", build(decomposed.decomposition, profile), profile)
 
 

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from judge_parts import scaled
 
+from machine.pipeline.choice import pricing
 from machine.pipeline.pictures import FLOOR, best_view, floor_of, parts_apart, write_png, write_text
-from machine.pipeline.pricing import pricing
-from machine.pipeline.raster import Image, View, draw
+from machine.pipeline.raster import Image, camera, draw
 from machine.view.parts import part_colours, residual_faces
 from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, FrontRow
@@ -190,9 +190,9 @@ def frame(letter: str, one: Decomposition, profile: Profile) -> Image:
     meshes, colours = parts_apart(one.parts), part_colours(len(one.parts))
     reds = [residual_faces(part, profile) for part in one.parts]
     view = best_view(one.mesh, needing_upright(one.mesh, profile))
-    floor, low = floor_of(one.mesh), View(view.toward * np.array([1.0, 1.0, 0.0]) - np.array([0.0, 0.0, 0.7]), view.up)
-    above = draw([floor, *meshes], [FLOOR, *colours], reds=[None, *reds], view=view, size=(PIXELS, PIXELS))
-    below = draw(meshes, colours, reds=reds, view=low, size=(PIXELS, PIXELS))
+    floor, low = floor_of(one.mesh), camera(view[2] * np.array([1.0, 1.0, 0.0]) - np.array([0.0, 0.0, 0.7]))
+    above = draw([floor, *meshes], [FLOOR, *colours], reds=[None, *reds], axes=view, size=(PIXELS, PIXELS))
+    below = draw(meshes, colours, reds=reds, axes=low, size=(PIXELS, PIXELS))
     image = np.concatenate([above, below], axis=1)
     image[:2], image[:, :2] = 180, 180
     text = f"{letter}: {'one piece' if len(one.parts) == 1 else f'{len(one.parts)} parts'}"

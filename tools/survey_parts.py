@@ -17,7 +17,7 @@ from typing import Any
 
 from compare_prints import files, mesh_of
 
-from machine.pipeline.pricing import pricing
+from machine.pipeline.choice import pricing
 from mdp.decomposition import Decomposition
 from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError

@@ -6,22 +6,33 @@ Exit codes: 0 done, 1 the user can fix it, 3 a bug (log file named), 130 interru
 import errno
 import os
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from difflib import get_close_matches
 from io import TextIOWrapper
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.exceptions import TyperException
 
 from machine.cli.command_line import COMMANDS, PROFILES_COMMANDS
 from machine.cli.terminal.interrupts import outside_compiler
-from machine.cli.terminal.progress import TERMINAL
-from machine.cli.terminal.usage import sentence
-from machine.notices import notices_to, plain_line
+from machine.notices import FrontEnd, Report, as_notices, notices_to, plain_line, to_streams
+from mdp.kernels.threads import harmless
 from profiles.errors import UserError, causes, notes
 
 ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by what --install-completion writes: words are wanted, no command
 FULL = (errno.ENOSPC, errno.EDQUOT)
+# Kind of a pydantic error -> what a value must be.
+EXPECTED = {
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "greater_than_equal": "at least {ge:g}",
+    "less_than_equal": "at most {le:g}",
+}
 
 app = typer.Typer(
     context_settings={"max_content_width": 120},
@@ -72,12 +83,16 @@ def _run(arguments: Sequence[str] | None) -> int:
     if ASKED_BY_SHELL in os.environ:
         command.main(given, "tiltprint")
     try:
-        with outside_compiler(), notices_to(TERMINAL), command.make_context("tiltprint", given or ["--help"]) as context:
+        with (
+            outside_compiler(),
+            notices_to(FrontEnd(to_streams, progress)),
+            command.make_context("tiltprint", given or ["--help"]) as context,
+        ):
             code = command.invoke(context)
     except typer.Exit as done:
         return done.exit_code
     except TyperException as error:
-        return _complain(sentence(error, given))
+        return _complain(_usage(error, given))
     except UserError as error:
         projects = sys.modules.get("machine.pipeline.project")
         return _complain(projects.without_folders(str(error)) if projects else str(error))
@@ -109,6 +124,71 @@ def _full() -> str:
 def _complain(message: str, code: int = 1) -> int:
     sys.stderr.write(f"tiltprint: {plain_line(message)}\n")
     return code
+
+
+def _usage(error: TyperException, given: Sequence[str]) -> str:
+    """What is wrong with the words given, in the parser's terms where there are no better ones."""
+    message = str(getattr(error, "format_message", lambda: str(error))()).strip().rstrip(".")
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return message
+    files = [word for word in given if word.startswith("-") and os.path.isfile(word)]
+    if files:
+        return f"{files[0]} begins with a dash: write ./{files[0]}"
+    command = context.command
+    if (option := getattr(error, "option_name", None)) is not None:
+        return _unknown("option", option, context.command_path, _option_names(command))
+    commands = list(getattr(command, "commands", ()))
+    words = [word for word in given if not word.startswith("-")][len(context.command_path.split()) - 1 :]
+    if commands and words and words[0] not in commands:
+        return _unknown("command", words[0], context.command_path, commands)
+    return f"{_wrong_value(error) or message.removeprefix('Invalid value: ')}; see {context.command_path} --help"
+
+
+def _unknown(what: str, word: str, command: str, known: Sequence[str]) -> str:
+    near = get_close_matches(word, known, 1)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    return f"{what} {word} is not known{hint}: {command} knows {', '.join(known)}"
+
+
+def _option_names(command: Any) -> list[str]:
+    return [option for parameter in command.params for option in parameter.opts if option.startswith("--")]
+
+
+def _wrong_value(error: TyperException) -> str:
+    """What an option is and must be, "" where the error is of another kind."""
+    option = next((name for name in getattr(getattr(error, "param", None), "opts", ()) if name.startswith("--")), "")
+    problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
+    if not option or not problems:
+        return ""
+    problem = problems[0]
+    expected = EXPECTED.get(problem["type"], problem["msg"]).format(**problem.get("ctx", {}))
+    return f"{option} is {problem['input']!r}: it must be {expected}"
+
+
+@contextmanager
+def progress() -> Iterator[Report]:
+    """What shows the progress of the work inside; the terminal is as before afterwards."""
+    from machine.cli.terminal.keys import is_terminal
+
+    if not is_terminal():
+        with as_notices() as report:
+            yield report
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        for thread in threading.enumerate():
+            if type(thread).__module__.startswith("rich."):  # it draws the bar, on a stream that a copy of this process reopens
+                harmless(thread)
+        task = progress.add_task("", total=None)
+
+        def show(text: str, share: float | None = None) -> None:
+            progress.update(task, description=plain_line(text), total=None if share is None else 1.0, completed=share or 0.0)
+
+        yield show
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from machine.cli.terminal import options, requests
-from machine.cli.terminal.option_groups import option, with_option_groups
-from machine.pipeline.requests import Outputs, PrintRequest
+from machine.cli.terminal.options import option, with_option_groups
+from machine.pipeline.requests import BAUD, Outputs
 
 
 def decompose(
@@ -84,7 +84,7 @@ def save(
 ) -> int:
     """Write a project: one 3MF with model, plan and profiles. Every command takes it, and other slicers open it."""
     options.check_model(model)
-    from machine.cli.commands.save import save
+    from machine.cli.commands.export import save
 
     return save(options.program_request([model], program, given), out)
 
@@ -111,7 +111,7 @@ def print_(
     """
     from machine.cli.commands.print import print_model
 
-    return print_model(options.program_request(models, program, given, force=asked.force), asked.at(port))
+    return print_model(options.program_request(models, program, given, force=asked.force), port, asked)
 
 
 def send(
@@ -157,11 +157,11 @@ def resume(asked: requests.ResumeOptions) -> int:
         read_journal(asked.journal)  # report an unreadable one first
         raise JournalError(f"journal {asked.journal}: at which port is the printer? --port PORT is expected")
     named = None if asked.machine is None else options.machine_profile(asked.machine)
-    return resume(asked.journal, asked.at(asked.port), named, asked.yes)
+    return resume(asked.journal, asked.port, asked, named)
 
 
 def ports(
-    baud: Annotated[int, option("--baud N", "rate tried first, bits a second")] = PrintRequest.baud,
+    baud: Annotated[int, option("--baud N", "rate tried first, bits a second")] = BAUD,
     *,
     json: Annotated[bool, option("--json", "the list as JSON")] = False,
     ask: Annotated[
@@ -169,7 +169,7 @@ def ports(
     ] = True,
 ) -> int:
     """List serial ports and what answers at each. It tells firmware, axes and rate, or why nothing answers."""
-    from machine.cli.commands.ports import ports
+    from machine.cli.commands.console import ports
 
     return ports(baud, json, ask)
 
@@ -201,7 +201,7 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
 
     out, measured, probing = asked.out, asked.measured, asked.probing
     if asked.printed:
-        if out is not None or measured is not None or probing.probe or probing.at is not None or asked.directions:
+        if out is not None or measured is not None or probing.probe or probing.port is not None or asked.directions:
             raise typer.BadParameter("--printed is a way of its own: -o, --measured, --port and --directions are for touches")
         return _read_off(asked)
     if asked.readings or asked.html is not None:
@@ -211,17 +211,19 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
 
         if out is not None or measured is not None:
             raise typer.BadParameter("--probe measures by itself: -o and --measured are for touches by hand")
-        return probe_axes(asked, probing.request(), asked.given.profile())
+        if probing.port is None:
+            raise typer.BadParameter("--probe needs --port PORT, or sim for the simulated printer")
+        return probe_axes(asked, probing.port, probing.offset_mm, asked.given.profile())
     if probing.png is not None:
         raise typer.BadParameter("--png goes with --probe")
-    if probing.at is not None:
+    if probing.port is not None:
         from machine.cli.commands.measuring.calibrate_by_keys import touch_by_keys
 
         if out is not None or measured is not None:
             raise typer.BadParameter(
                 "--port takes the machine to the touches: -o and --measured are for a program sent otherwise"
             )
-        return touch_by_keys(asked, probing.at, asked.given.profile())
+        return touch_by_keys(asked, probing.port, asked.given.profile())
     if out is not None and measured is None:
         return write_program(asked, asked.given.profile(), out)
     if measured is not None and out is None:
@@ -239,7 +241,7 @@ def _read_off(asked: requests.CalibrationRequest) -> int:
         return correct_axes(asked, asked.printed, asked.readings)
     if asked.html is None and len(asked.printed) == 1 and _is_at_terminal():
         return ask_for_readings(asked, asked.printed[0])
-    raise typer.BadParameter("--printed goes with one of --readings TEXT and --html FILE; in a terminal with neither")
+    raise typer.BadParameter("--printed goes with one of --readings TEXT and --html FILE; with neither a terminal asks")
 
 
 def _is_at_terminal() -> bool:
@@ -265,7 +267,7 @@ def coupon(asked: requests.CouponRequest) -> int:
         return evaluate_sheet(asked, measured)
     if out is None and _is_at_terminal():
         return ask_for_loads(asked)
-    raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+    raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; with neither a terminal asks")
 
 
 ProfileName = Annotated[str, typer.Argument(metavar="NAME", help="name of a profile, or a .toml file")]

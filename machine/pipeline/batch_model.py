@@ -74,7 +74,7 @@ def job_of(do: str, asked: ModelRequest, out: Path) -> Job:
         asked.profile.model_dump_json(),
         ranker,
         asked.orient,
-        asked.cuts.parts,
+        asked.parts,
         named,
     )
     names = (str(Path(name).resolve()) if name and is_file_name(name) else name for name in asked.profile_names)

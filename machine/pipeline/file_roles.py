@@ -63,12 +63,12 @@ def _read_by(request: ModelRequest) -> list[Role]:
     profiles = zip(("machine", "material", "process"), request.profile_names, strict=False)
     ranker = Path(request.ranker) if request.ranker.endswith(SUFFIX) else None
     own = [(option(kind), Path(name)) for kind, name in profiles if name is not None and is_file_name(name)]
-    plans = [(option("plan"), plan) for plan in request.cuts.plans]
+    plans = [(option("plan"), plan) for plan in request.plans]
     return [
         *models,
         ("the project", request.project),
         *plans,
-        (option("planes"), request.cuts.planes),
+        (option("planes"), request.planes),
         (option("ranker"), ranker),
         *own,
     ]

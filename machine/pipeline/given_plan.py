@@ -9,9 +9,8 @@ import numpy as np
 from machine.pipeline.requests import MOST_COPIES, ModelRequest
 from machine.planning.stops import parts_in_words
 from mdp.directions.orientation import motion_between
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Mesh
 from mdp.model_file import plan_beside
-from mdp.pose import turned_further
 from mdp.search.plan_file import PlanFile
 from mdp.search.plan_reading import read_plan
 from mdp.search.search import check_part_count
@@ -25,7 +24,7 @@ from profiles.profile import Profile, with_part_settings
 def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
     """What is asked for of each model of a plate alone, with the plan that names it. Raises PlanError."""
     models = list(dict.fromkeys((request.model, *request.beside)))
-    each = {name: replace(request, model=name, beside=(), cuts=replace(request.cuts, plans=())) for name in models}
+    each = {name: replace(request, model=name, beside=(), plans=()) for name in models}
     names = [own.name for own in each.values()]
     if request.profile.parts and len(models) > 1:
         part = request.profile.parts[0]
@@ -34,18 +33,18 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
             "part of one of "
             f"them stand in its plan, as process = {{...}} of its [[part]], and {option('plan')} names that"
         )
-    for file in request.cuts.plans:
+    for file in request.plans:
         model = read_plan(file).model if len(models) > 1 else names[0]
         if names.count(model) != 1:
             raise PlanError(
                 f'plan {file}: model is "{model}": beside other models it must be the name of one of these: {", ".join(names)}'
             )
         name = models[names.index(model)]
-        if each[name].cuts.plans:
+        if each[name].plans:
             raise PlanError(
-                f"{option('plan', file)}: {option('plan', each[name].cuts.plan)} cuts {model} already, and one plan cuts a model"
+                f"{option('plan', file)}: {option('plan', each[name].plan)} cuts {model} already, and one plan cuts a model"
             )
-        each[name] = replace(each[name], cuts=replace(request.cuts, plans=(file,)))
+        each[name] = replace(each[name], plans=(file,))
     return each
 
 
@@ -68,25 +67,25 @@ def check_number(request: ModelRequest) -> None:
 def read_given_plan(request: ModelRequest) -> PlanFile | None:
     """The plan to cut by or the planes to start from; None: all is searched. Raises PlanError, also for options that do not go
     together."""
-    cuts, record = request.cuts, request.outputs.record
-    if cuts.parts is not None:
-        check_part_count(cuts.parts)
-    if cuts.plan is not None and cuts.planes is not None:
+    plan, planes, record = request.plan, request.planes, request.outputs.record
+    if request.parts is not None:
+        check_part_count(request.parts)
+    if plan is not None and planes is not None:
         raise PlanError(
-            f"{option('planes', cuts.planes)}: {option('plan', cuts.plan)} exists, so nothing is searched; one of them is allowed"
+            f"{option('planes', planes)}: {option('plan', plan)} exists, so nothing is searched; one of them is allowed"
         )
-    if cuts.plan is not None and record is not None:
+    if plan is not None and record is not None:
         raise PlanError(
-            f"{option('record', record)}: {option('plan', cuts.plan)} exists, so nothing is searched that could be recorded"
+            f"{option('record', record)}: {option('plan', plan)} exists, so nothing is searched that could be recorded"
         )
-    if cuts.planes is not None and request.orient:
+    if planes is not None and request.orient:
         raise PlanError(
-            f"{option('orient')}: the planes of {cuts.planes} belong to the model as it lies; "
+            f"{option('orient')}: the planes of {planes} belong to the model as it lies; "
             f"{key_name('process.rotate_deg')} turns it"
         )
-    if cuts.plan is not None and request.orient:
-        raise PlanError(f"{option('orient')}: the plan {cuts.plan} says how the model lies; leave one of them out")
-    file = cuts.plan or cuts.planes or _plan_of_demo(request)
+    if plan is not None and request.orient:
+        raise PlanError(f"{option('orient')}: the plan {plan} says how the model lies; leave one of them out")
+    file = plan or planes or _plan_of_demo(request)
     given = None if file is None else read_plan(file)
     if given is not None and given.orientation is not None and request.orient is False:
         raise PlanError(f"{option('as-is')}: the plan {file} lays the model down by its orientation; leave one of them out")
@@ -95,29 +94,8 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
 
 def _plan_of_demo(request: ModelRequest) -> Path | None:
     """The plan that a demo comes with, unless the user wants it cut or laid down otherwise."""
-    otherwise = request.cuts.parts is not None or request.orient or request.outputs.record is not None
+    otherwise = request.parts is not None or request.orient or request.outputs.record is not None
     return None if otherwise else plan_beside(request.model)
-
-
-def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:
-    """Whether it is searched how the model lies: where the user asks for it, or nothing says how it lies, as a plan does."""
-    if request.orient is not None or given is not None:
-        return bool(request.orient) and given is None
-    return lies_freely(profile)
-
-
-def lies_freely(profile: Profile) -> bool:
-    """Whether a profile leaves it open how a model lies; turns and the paper's terms mean it as it is."""
-    return profile.search.effective.seam_mm > 0.0 and not any(profile.process.rotate_deg)
-
-
-def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
-    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it
-    lies; None: it was not turned."""
-    if orientation is None:
-        return profile
-    rotate_deg = turned_further(profile.process.rotate_deg, orientation)
-    return profile.model_copy(update={"process": profile.process.model_copy(update={"rotate_deg": rotate_deg})})
 
 
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:

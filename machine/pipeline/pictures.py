@@ -1,6 +1,7 @@
 """Pictures: a decomposition as images, as PNG files, and in the head of G-code.
 
-The model and its parts side by side, the print as a sheet of frames, and a frame for every number of parts that a search found.
+The model and its parts side by side, the print as a sheet of frames, a frame for every number of parts that a search found, and
+what a calibration leaves over.
 In G-code pictures have PrusaSlicer's form, base64 between comments, which Mainsail, Fluidd, RepRapFirmware and Prusa's printers
 show beside the file's name.
 """
@@ -10,6 +11,7 @@ from collections.abc import Sequence
 from io import BytesIO
 from math import ceil, sqrt
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from PIL import ImageDraw, ImageFont
 
 from machine.gcode.lines import Lines
 from machine.pipeline.output import write_bytes
-from machine.pipeline.raster import Image, View, draw, seen_from
+from machine.pipeline.raster import Image, draw, seen_from
 from machine.quantities import minutes
 from machine.view.parts import part_colours, residual_faces
 from mdp.cost.cost import needing_upright
@@ -26,9 +28,12 @@ from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
-from mdp.pose import UP, unit
+from mdp.pose import UP, Pose, unit
 from profiles.machine import Machine
 from profiles.profile import Profile
+
+if TYPE_CHECKING:  # which only calibration loads
+    from machine.setup.calibration.fit import Calibration
 
 PLAIN = (214.0, 217.0, 222.0)
 PRINTED = (196.0, 202.0, 210.0)
@@ -46,10 +51,10 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
     model, parts = decomposition.mesh, decomposition.parts
     risky = needing_upright(model, profile)
     floor, view, half = floor_of(model), best_view(model, risky), (size[0] // 2, size[1])
-    plain = draw([floor, model], [FLOOR, PLAIN], reds=[None, risky], view=view, size=half)
+    plain = draw([floor, model], [FLOOR, PLAIN], reds=[None, risky], axes=view, size=half)
     apart = parts_apart(parts)
     reds = [residual_faces(part, profile) for part in parts]
-    exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], reds=[None, *reds], view=view, size=half)
+    exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], reds=[None, *reds], axes=view, size=half)
     return np.concatenate([plain, exploded], axis=1)
 
 
@@ -64,7 +69,7 @@ def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[i
     """The parts in colour where they belong. Returns (h, w, 3), uint8; size is width and height in pixels."""
     risky = needing_upright(decomposition.mesh, profile)
     parts = [part.mesh for part in decomposition.parts]
-    return draw(parts, list(part_colours(len(parts))), view=best_view(decomposition.mesh, risky), size=size)
+    return draw(parts, list(part_colours(len(parts))), axes=best_view(decomposition.mesh, risky), size=size)
 
 
 def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:
@@ -81,7 +86,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
         printed = [earlier.mesh.transform(part.rotation) for earlier in parts[: part.index]]
         meshes = [floor.transform(part.rotation), *printed, nozzle.transform(np.eye(3), _last_point(printed[-1]))]
         paints = [FLOOR, *([PRINTED] * (part.index - 1)), colour, NOZZLE]
-        frame = draw(meshes, paints, view=view, size=(frame_pixels, frame_pixels), span_mm=span)
+        frame = draw(meshes, paints, axes=view, size=(frame_pixels, frame_pixels), span_mm=span)
         frames.append(_label(frame, part, machine))
     return add_title(tile(frames), decomposition.name, frame_pixels)
 
@@ -96,7 +101,7 @@ def _shifts(parts: Sequence[Part], gap_mm: float) -> list[Floats]:
     return shifts
 
 
-def best_view(model: Mesh, risky: NDArray[np.bool_]) -> View:
+def best_view(model: Mesh, risky: NDArray[np.bool_]) -> Floats:
     """The side that shows most of the model's outline and of its risky faces, a little from above."""
     azimuths = np.arange(-180.0, 180.0, 10.0)
     toward = np.stack([np.cos(np.radians(azimuths)), np.sin(np.radians(azimuths)), np.zeros(len(azimuths))])
@@ -107,7 +112,7 @@ def best_view(model: Mesh, risky: NDArray[np.bool_]) -> View:
     return seen_from(float(azimuths[int(np.argmax(score))]), 9.0)
 
 
-def _along_the_tilt_axis(parts: tuple[Part, ...], machine: Machine) -> View:
+def _along_the_tilt_axis(parts: tuple[Part, ...], machine: Machine) -> Floats:
     """Nearly along the tilt axis, from the side to which most of the tilted tables show their upper faces."""
     axis = unit(machine.tilt.axis)
     across = np.cross(UP, axis)
@@ -202,11 +207,11 @@ def front_picture(decomposition: Decomposition, profile: Profile, frame_pixels: 
     return add_title(tile(frames), decomposition.name, frame_pixels)
 
 
-def _frame(row: FrontRow, model: Mesh, profile: Profile, view: View, pixels: int) -> Image:
+def _frame(row: FrontRow, model: Mesh, profile: Profile, view: Floats, pixels: int) -> Image:
     parts, reds = _cut(row, model, profile)
     span = 1.25 * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     colours = [FLOOR, *part_colours(len(parts))]
-    frame = draw([floor_of(model), *parts], colours, reds=[None, *reds], view=view, size=(pixels, pixels), span_mm=span)
+    frame = draw([floor_of(model), *parts], colours, reds=[None, *reds], axes=view, size=(pixels, pixels), span_mm=span)
     left, height = pixels / 32, pixels / 24
     frame = write_text(frame, "one piece" if row.parts == 1 else f"{row.parts} parts", (left, pixels / 12), pixels / 16, 90)
     figures = f"{max(row.support_area_mm2, 0.0):.0f} mm² on support, {row.seam_mm:.0f} mm of seams"
@@ -265,3 +270,61 @@ def thumbnail(png: bytes, width: int, height: int) -> list[str]:
     text = b64encode(png).decode("ascii")
     rows = [text[k : k + ROW] for k in range(0, len(text), ROW)]
     return [f"; thumbnail begin {width}x{height} {len(text)}", *(f"; {row}" for row in rows), "; thumbnail end"]
+
+
+WIDTH, HEIGHT, EDGE = 1600, 800, 70
+INK, PALE = (70, 74, 80), (214, 217, 222)
+RINGS = 4
+
+
+def residual_picture(calibration: "Calibration", poses: Sequence[Pose], machine: Machine) -> Image:
+    """Left x and y of the residuals in the workpiece frame, right a bar a pose, a colour a tilt; (h, w, 3), uint8."""
+    picture = Pillow.new("RGB", (WIDTH, HEIGHT), "white")
+    pen = ImageDraw.Draw(picture)
+    tilts = sorted({round(pose.tilt_deg, 1) for pose in poses})
+    palette = [tuple(round(value) for value in colour) for colour in part_colours(len(tilts))]
+    colours = [palette[tilts.index(round(pose.tilt_deg, 1))] for pose in poses]
+    most = _round_up(max(calibration.residuals_mm))
+    _dots(pen, calibration, colours, most)
+    _bars(pen, calibration, colours, most)
+    for k, (tilt, colour) in enumerate(zip(tilts, palette, strict=True)):
+        left = WIDTH // 2 + 20 + k * 110
+        pen.rectangle((left, HEIGHT - 38, left + 16, HEIGHT - 22), fill=colour)
+        _write(pen, f"{machine.tilt.letter} {tilt:g}", (left + 22, HEIGHT - 23), 20)
+    title = f"{machine.name}: {calibration.rms_mm:.3f} mm off on average at {len(poses)} poses"
+    _write(pen, title, (EDGE, 44), 28)
+    return np.asarray(picture)
+
+
+def _round_up(value_mm: float) -> float:
+    """A scale's end: the next hundredth of a mm in steps that divide well."""
+    return max(0.02, 0.02 * ceil(value_mm / 0.02))
+
+
+def _dots(pen: ImageDraw.ImageDraw, calibration: "Calibration", colours: Sequence[tuple[int, ...]], most_mm: float) -> None:
+    size = HEIGHT - 3 * EDGE
+    x0, y0, scale = EDGE + size / 2, HEIGHT - EDGE - size / 2, size / 2 / most_mm
+    for ring in range(1, RINGS + 1):
+        radius = size / 2 * ring / RINGS
+        pen.ellipse((x0 - radius, y0 - radius, x0 + radius, y0 + radius), outline=PALE, width=2)
+        _write(pen, f"{most_mm * ring / RINGS:.3f}", (x0 + 4, y0 - radius - 3), 16)
+    for (x, y, _), colour in zip(calibration.errors_mm, colours, strict=True):
+        pen.ellipse((x0 + x * scale - 7, y0 - y * scale - 7, x0 + x * scale + 7, y0 - y * scale + 7), fill=colour, outline=INK)
+    _write(pen, "x and y off, mm, on the table", (EDGE, HEIGHT - 23), 20)
+
+
+def _bars(pen: ImageDraw.ImageDraw, calibration: "Calibration", colours: Sequence[tuple[int, ...]], most_mm: float) -> None:
+    left, right, top, floor = WIDTH // 2 + 20, WIDTH - EDGE, 2 * EDGE, HEIGHT - EDGE
+    for ring in range(RINGS + 1):
+        y = floor - (floor - top) * ring / RINGS
+        pen.line((left, y, right, y), fill=PALE, width=2)
+        _write(pen, f"{most_mm * ring / RINGS:.3f}", (right + 6, y + 6), 16)
+    step = (right - left) / len(colours)
+    for k, (off, colour) in enumerate(zip(calibration.residuals_mm, colours, strict=True)):
+        x = left + k * step
+        pen.rectangle((x + 0.15 * step, floor - (floor - top) * off / most_mm, x + 0.85 * step, floor), fill=colour, outline=INK)
+    _write(pen, "mm off, a bar a pose, as measured", (left, top - 20), 20)
+
+
+def _write(pen: ImageDraw.ImageDraw, text: str, at: tuple[float, float], height: int) -> None:
+    pen.text(at, text, INK, ImageFont.load_default(height), anchor="ls")

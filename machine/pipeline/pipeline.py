@@ -14,23 +14,19 @@ from machine.gcode.blocks import check_blocks
 from machine.gcode.writer import write_gcode
 from machine.notices import Report, reporting, say
 from machine.pipeline import compilers
+from machine.pipeline.choice import as_turned, lays_down, orientation_in_words, pricing, standing_in_words
 from machine.pipeline.given_plan import (
-    as_turned,
     check_modifiers,
     check_number,
     check_parts_named,
-    lays_down,
     read_given_plan,
     request_of_each,
     with_file_marks,
     with_plan_settings,
 )
-from machine.pipeline.memory import keep_modules, return_unused
-from machine.pipeline.orientation import orientation_in_words, standing_in_words
 from machine.pipeline.output import write_bytes
 from machine.pipeline.pictures import with_thumbnails
 from machine.pipeline.plate import naming, naming_parts, on_one_plate
-from machine.pipeline.pricing import pricing
 from machine.pipeline.requests import ModelRequest, check_copies
 from machine.planning.fit import check_parts, check_standing, lifted, standing_at
 from machine.planning.moves import MachineProgram
@@ -43,7 +39,7 @@ from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.ranking.ranker import ranker_named
 from mdp.read import ReadModel, read_model
-from mdp.search.front import Weights
+from mdp.search.front import Pricing, Weights
 from mdp.search.orient import orient_and_decompose
 from mdp.search.plan_file import NO_PLAN, PlanFile, plan_of
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
@@ -53,6 +49,10 @@ from profiles.profile import Profile
 from slicer.interface.interface import pin_width_mm, room_around_mm
 from slicer.paths import SlicedPart
 from slicer.slice import SlicingProgress, slice_parts
+
+Record = tuple[
+    Decomposition, list[bytes]
+]  # what a search has found, and what it saw, of which there is one where it was asked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     to_build: `build` comes next, the first run may compile what it needs meanwhile, and the rows of the front that need not be
     chosen from get no time. Raises PlanError where models have no room beside each other, and for what goes with one alone.
     """
-    keep_modules()
+    compilers.keep_modules()
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
     check_copies(request.copies, option("copies"))
     check_number(request)
@@ -114,18 +114,20 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     if to_build and not laying:
         check_standing(mesh, profile)  # a search may take minutes
     with reporting() as report:
-        asked = _Search(request, given, model, to_build and not laying, report)
+        price, records = _price(request, to_build and not laying), list[Record]()
+
+        def search(mesh: Mesh) -> Decomposition:
+            return _search(request, _plan_with_marks(request, given, model, mesh), price, report, records, mesh)
+
         if laying:
-            oriented = orient_and_decompose(mesh, profile, pricing, asked.search)
-            decomposition, notes = (
-                oriented.decomposition,
-                orientation_in_words(oriented, f"{option('as-is')} keeps it as it stands"),
-            )
+            oriented = orient_and_decompose(mesh, profile, pricing, search)
+            decomposition = oriented.decomposition
+            notes = orientation_in_words(oriented, f"{option('as-is')} keeps it as it stands")
             orientation = None if oriented.orientation is None else oriented.orientation.rotation
         else:
-            decomposition, notes = asked.search(mesh), standing_in_words(mesh, profile)
+            decomposition, notes = search(mesh), standing_in_words(mesh, profile)
     if record_file is not None:
-        write_bytes(record_file, asked.record_of(decomposition))
+        write_bytes(record_file, next(record[0] for searched, record in records if searched is decomposition))
     check_parts_named(profile, len(decomposition.parts))
     for note in (*decomposition.notes, *notes):
         say(f"{request.name}: {note}")
@@ -133,49 +135,43 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     return Decomposed(decomposition, as_turned(profile, orientation), plan, read_s, perf_counter() - began)
 
 
-class _Search:
-    """The search of one request, for a mesh that lies one way or another, or the plan that takes its place."""
+def _price(request: ModelRequest, unused: bool) -> Pricing | None:
+    """By what the search prices parts; None: by nothing. unused: only what the choice of a row needs is priced."""
+    profile = request.profile.of_all_parts
+    free = request.plan is not None or request.parts is not None or not Weights.of(profile)
+    return None if unused and free else pricing(profile)
 
-    def __init__(
-        self, request: ModelRequest, given: PlanFile | None, model: ReadModel, prices_unused: bool, report: Report
-    ) -> None:
-        self._request, self._given, self._model, self._report = request, given, model, report
-        cuts, profile = request.cuts, request.profile.of_all_parts
-        free = cuts.plan is not None or cuts.parts is not None or not Weights.of(profile)
-        self._price = None if prices_unused and free else pricing(profile)
-        self._records: list[tuple[Decomposition, list[bytes]]] = []
 
-    def search(self, mesh: Mesh) -> Decomposition:
-        """The parts of a mesh."""
-        request, cuts, given = self._request, self._request.cuts, self._with_marks(mesh)
-        asked = SearchRequest(given or NO_PLAN, cuts.parts, request.ranker, self._price)
-        if cuts.plan is not None:
-            return cut_by_plan(mesh, request.name, request.profile, asked)
-        record: list[bytes] = []
-        on_record = None if request.outputs.record is None else record.append
-        asked = replace(asked, on_stage=self._show, on_phase=self._report, on_record=on_record)
-        decomposition = decompose(mesh, request.name, request.profile, asked)
-        self._records.append((decomposition, record))
-        return decomposition
+def _search(
+    request: ModelRequest, given: PlanFile | None, price: Pricing | None, report: Report, records: list[Record], mesh: Mesh
+) -> Decomposition:
+    """The parts of a mesh that lies one way or another, searched, or cut by a plan. records: gets what the search saw."""
+    asked = SearchRequest(given or NO_PLAN, request.parts, request.ranker, price)
+    if request.plan is not None:
+        return cut_by_plan(mesh, request.name, request.profile, asked)
 
-    def _with_marks(self, mesh: Mesh) -> PlanFile | None:
-        """The plan with the marks that the model's file has, on the model as it lies now; None: there are neither."""
-        zones = self._model.zones if self._request.own_marks else self._model.zones.shapes
-        if zones == NO_ZONES:
-            return self._given
-        given = PlanFile(self._request.name) if self._given is None else self._given
-        return with_file_marks(given, zones, self._model.mesh, mesh, self._request.profile.search.pedestal_mm)
-
-    def record_of(self, decomposition: Decomposition) -> bytes:
-        """What was recorded of the search that ended with a decomposition."""
-        return next(record[0] for searched, record in self._records if searched is decomposition)
-
-    def _show(self, stage: int, beam: int, best_share: float, measure: Callable[[], FrontRow]) -> None:
+    def show(stage: int, beam: int, best_share: float, measure: Callable[[], FrontRow]) -> None:
         if stage == 0:
-            compilers.wait_for(compilers.SEARCH, self._report)
+            compilers.wait_for(compilers.SEARCH, report)
             return
         left = f"{100 * best_share:.1f} % of the risky area left"
-        self._report(f"searching parts: stage {stage}, {beam} in the beam, {left}")
+        report(f"searching parts: stage {stage}, {beam} in the beam, {left}")
+
+    record: list[bytes] = []
+    on_record = None if request.outputs.record is None else record.append
+    asked = replace(asked, on_stage=show, on_phase=report, on_record=on_record)
+    decomposition = decompose(mesh, request.name, request.profile, asked)
+    records.append((decomposition, record))
+    return decomposition
+
+
+def _plan_with_marks(request: ModelRequest, given: PlanFile | None, model: ReadModel, mesh: Mesh) -> PlanFile | None:
+    """The plan with the marks that the model's file has, on the model as it lies now; None: there are neither."""
+    zones = model.zones if request.own_marks else model.zones.shapes
+    if zones == NO_ZONES:
+        return given
+    plan = PlanFile(request.name) if given is None else given
+    return with_file_marks(plan, zones, model.mesh, mesh, request.profile.search.pedestal_mm)
 
 
 def build(
@@ -200,7 +196,7 @@ def build(
     decomposition = standing_at(decomposition, profile.process.place_mm)
     parts = decomposition.parts
     compilers.wait_for(compilers.PROGRAM, report)
-    return_unused()  # of the search
+    compilers.return_unused()  # of the search
     with naming_parts(parts), reporting() if report is None else nullcontext(report) as tell:
 
         def show(slicing: SlicingProgress) -> None:
@@ -219,7 +215,7 @@ def build(
             compilers.wait_for(compilers.PICTURES, tell)
             lines = with_thumbnails(lines, decomposition, profile)
         del program  # as large as its text, and that tells all of it
-        return_unused()
+        compilers.return_unused()
         tell("dry run")
         run = dry_run(lines, profile)
     return Program(lines, run, _with_own_figures(decomposition, run), tuple(sliced))

@@ -16,7 +16,7 @@ import numpy as np
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
-from machine.pipeline.pricing import pricing
+from machine.pipeline.choice import pricing
 from machine.pipeline.raster import draw
 from machine.planning.plan import plan
 from mdp.clearance import passes_clear

@@ -10,7 +10,6 @@ from machine.gcode.lines import GcodeFile, Lines
 from machine.notices import say
 from machine.pipeline import compilers
 from machine.pipeline.embedded_profile import in_words, read_embedded_profile
-from machine.pipeline.memory import return_large_arrays
 from machine.pipeline.requests import FORCE_GOES_ON, ModelRequest
 from machine.program import Program
 from profiles.errors import GcodeError, MoveError, PlanError
@@ -33,14 +32,17 @@ class LoadedProgram:
     machine_known: bool = True
 
 
-def load_program(request: ModelRequest) -> LoadedProgram:
-    """The program of a model or of a G-code file. Raises GcodeError for a file that cannot be read."""
-    return_large_arrays()
+def load_program(request: ModelRequest, pictures: bool = False) -> LoadedProgram:
+    """The program of a model or of a G-code file. pictures: a model's has pictures in its head, for it becomes a file.
+
+    Raises GcodeError for a file that cannot be read.
+    """
+    compilers.return_large_arrays()
     if not request.is_gcode:
         from machine.pipeline.pipeline import build, decompose_model  # a G-code file needs no search and no slicer
 
         decomposed = decompose_model(request, to_build=True)
-        program = build(decomposed.decomposition, decomposed.profile, stops=request.stops)
+        program = build(decomposed.decomposition, decomposed.profile, pictures=pictures, stops=request.stops)
         return LoadedProgram(request.name, program, decomposed.profile)
     _refuse_cuts(request)
     source = Path(request.model)
@@ -55,7 +57,7 @@ def load_program(request: ModelRequest) -> LoadedProgram:
 
 def _refuse_cuts(request: ModelRequest) -> None:
     """Raise PlanError where a G-code file is to be cut."""
-    for name, value in (("plan", request.cuts.plan), ("parts", request.cuts.parts)):
+    for name, value in (("plan", request.plan), ("parts", request.parts)):
         if value is not None:
             raise PlanError(f"{option(name, value)}: {request.model} is G-code, which is cut already; it goes with a model")
     if request.beside:

@@ -115,14 +115,14 @@ class Project:
         that do not go with it.
         """
         self.check_plate(request.plate, file)
-        own_plan = self.plan if not request.cuts.plans and request.cuts.planes is None else None
+        own_plan = self.plan if not request.plans and request.planes is None else None
         if own_plan is not None:
             self._check_plan_goes_with(request, file)
         return replace(
             request,
             model=self.argument,
             project=file,
-            cuts=request.cuts if own_plan is None else replace(request.cuts, plans=(own_plan,)),
+            plans=request.plans if own_plan is None else (own_plan,),
             own_marks=own_plan is None or not self.marks_in_plan,
             stops=request.stops or self.stops,
             copies=self.copies if copies is None else copies,

@@ -1,15 +1,15 @@
 """Raster: triangles to pixels without a display: z-buffer, smooth shading, one shadow, drawn edges, supersampling."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, radians, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints, Mesh
+from mdp.pose import UP
 
 Image = NDArray[np.uint8]
 Size = tuple[int, int]
@@ -22,26 +22,21 @@ CREASE_COSINE = cos(radians(35.0))  # faces that meet at a sharper angle get an 
 SHADOW_MAP_PIXELS = 1400
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """An orthographic camera: `toward` leads from the scene to the camera, `up` is upright in the picture."""
+def camera(toward: Floats, up: Floats = UP) -> Floats:
+    """Axes of an orthographic camera: (3, 3) rows right, up and toward the camera, unit and mutually square.
 
-    toward: Floats
-    up: Floats
-
-    @property
-    def axes(self) -> Floats:
-        """(3, 3) rows: right, up and toward the camera, unit and mutually square."""
-        toward = self.toward / np.linalg.norm(self.toward)
-        right = np.cross(self.up, toward)
-        right /= np.linalg.norm(right)
-        return np.stack([right, np.cross(toward, right), toward])
+    toward: from the scene to the camera; up: upright in the picture.
+    """
+    toward = toward / np.linalg.norm(toward)
+    right = np.cross(up, toward)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(toward, right), toward])
 
 
-def seen_from(azimuth_deg: float, elevation_deg: float) -> View:
-    """The view from a place at an azimuth (0: on +x, 90: on +y) and an elevation, z upright."""
+def seen_from(azimuth_deg: float, elevation_deg: float) -> Floats:
+    """The camera's axes at an azimuth (0: on +x, 90: on +y) and an elevation, z upright."""
     a, e = radians(azimuth_deg), radians(elevation_deg)
-    return View(np.array([cos(e) * cos(a), cos(e) * sin(a), sin(e)]), np.array([0.0, 0.0, 1.0]))
+    return camera(np.array([cos(e) * cos(a), cos(e) * sin(a), sin(e)]))
 
 
 def draw(
@@ -49,34 +44,32 @@ def draw(
     colours: Any,
     *,
     reds: Sequence[NDArray[np.bool_] | None] | None = None,
-    view: View | None = None,
+    axes: Floats | None = None,
     size: Size = (800, 800),
     span_mm: float | None = None,
 ) -> Image:
     """A picture (h, w, 3), uint8, of meshes on white.
 
-    colours: (n, 3), 0 to 255, one per mesh; reds: per mesh a mask (m,) of the faces painted red, or None;
+    colours: (n, 3), 0 to 255, one per mesh; axes: of the camera; reds: per mesh a mask (m,) of the faces painted red, or None;
     size: width and height in pixels; span_mm: what the picture's shorter side shows (absent: the scene fills it).
     """
-    view = view or seen_from(-60.0, 18.0)
+    axes = seen_from(-60.0, 18.0) if axes is None else axes
     width, height = size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING
     corners = np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes])
     normals = np.concatenate([corner_normals(mesh) for mesh in meshes])
     painted = zip(meshes, colours, reds or [None] * len(meshes), strict=True)
     paint = np.concatenate([_paint(mesh, np.asarray(colour, float), red) for mesh, colour, red in painted])
     group = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
-    axes = view.axes
     scale, middle = _framing(corners @ axes.T, width, height)
     scale = scale if span_mm is None else min(width, height) / span_mm
     screen = _to_screen(corners @ axes.T - middle, scale, (width, height))
     depth, face = z_buffer(screen, width, height)
-    to_light = view.up + 0.55 * axes[2] - 0.65 * axes[0]
-    light_axes = View(to_light, axes[0]).axes
+    to_light = UP + 0.55 * axes[2] - 0.65 * axes[0]
+    light_axes = camera(to_light, axes[0])
     light_scale, light_middle = _framing(corners @ light_axes.T, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS)
     lit = _to_screen(corners @ light_axes.T - light_middle, light_scale, (SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS))
     shadow, _ = z_buffer(lit, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS)
-    light = Light(shadow, 2.5 / light_scale, light_axes[2])
-    colour, bent = _shade(Triangles(screen, lit, normals, paint), face, light, axes)
+    colour, bent = _shade(screen, lit, normals, paint, face, shadow, 2.5 / light_scale, light_axes[2], axes)
     _draw_edges(colour, np.where(face < 0, -1, group[face]), depth, bent, 1.0 / scale)
     fine = colour.reshape(size[1], SUPERSAMPLING, size[0], SUPERSAMPLING, 3).mean(axis=(1, 3))
     image: Image = np.clip(np.rint(fine), 0, 255).astype(np.uint8)
@@ -111,23 +104,6 @@ def _framing(points: Floats, width: int, height: int) -> tuple[float, Floats]:
 def _to_screen(seen: Floats, scale: float, size: Size) -> Floats:
     """(m, 3, 3) pixel column, pixel row and depth toward the camera in mm; seen: corners in camera axes about the centre."""
     return np.stack([0.5 * size[0] + scale * seen[..., 0], 0.5 * size[1] - scale * seen[..., 1], seen[..., 2]], axis=-1)
-
-
-class Triangles(NamedTuple):
-    """screen, lit: (m, 3, 3) corners as the camera and as the light sees them; normals: (m, 3, 3); paint: (m, 4)."""
-
-    screen: Floats
-    lit: Floats
-    normals: Floats
-    paint: Floats
-
-
-class Light(NamedTuple):
-    """shadow: depths as the light sees them; bias: how much farther still counts as lit; direction: (3,) to the light."""
-
-    shadow: Floats
-    bias: float
-    direction: Floats
 
 
 @helper
@@ -191,9 +167,22 @@ def _lit_share(shadow: Floats, x: float, y: float, d: float, bias: float) -> flo
 
 
 @kernel
-def _shade(triangles: Triangles, face: Ints, light: Light, axes: Floats) -> tuple[Floats, Floats]:
-    """Colour (h, w, 3) and the normal in camera axes (h, w, 3) of every pixel."""
-    screen, lit, normals, paint = triangles
+def _shade(
+    screen: Floats,
+    lit: Floats,
+    normals: Floats,
+    paint: Floats,
+    face: Ints,
+    shadow: Floats,
+    bias: float,
+    to_light: Floats,
+    axes: Floats,
+) -> tuple[Floats, Floats]:
+    """Colour (h, w, 3) and the normal in camera axes (h, w, 3) of every pixel.
+
+    screen, lit: (m, 3, 3) corners as the camera and as the light sees them; normals: (m, 3, 3); paint: (m, 4); face: (h, w) as
+    z_buffer gives it; shadow: depths as the light sees them; bias: how much farther still counts as lit.
+    """
     height, width = face.shape
     colour = np.full((height, width, 3), 255.0)
     bent = np.zeros((height, width, 3))
@@ -211,9 +200,9 @@ def _shade(triangles: Triangles, face: Ints, light: Light, axes: Floats) -> tupl
             n = b0 * normals[f, 0] + b1 * normals[f, 1] + b2 * normals[f, 2]
             n /= max(np.sqrt(_dot(n, n)), 1e-12)
             p = b0 * lit[f, 0] + b1 * lit[f, 1] + b2 * lit[f, 2]
-            key = max(_dot(n, light.direction), 0.0)
+            key = max(_dot(n, to_light), 0.0)
             if key > 0:
-                key *= _lit_share(light.shadow, p[0], p[1], p[2], light.bias * min(1.0 / max(key, 0.08), 8.0))
+                key *= _lit_share(shadow, p[0], p[1], p[2], bias * min(1.0 / max(key, 0.08), 8.0))
             for k in range(3):
                 bent[row, column, k] = _dot(axes[k], n)
             facing = max(bent[row, column, 2], 0.0)

@@ -50,34 +50,17 @@ class Outputs:
 
 
 @dataclass(frozen=True)
-class Cuts:
-    """What a person says of the cuts; None: nothing.
-
-    plans: files whose planes are cut instead of a search, one for each model that has one; parts: the most parts;
-    planes: file of planes by hand that the search starts from.
-    """
-
-    plans: tuple[Path, ...] = ()
-    parts: int | None = None
-    planes: Path | None = None
-
-    @property
-    def plan(self) -> Path | None:
-        """The plan of the only model; None: there is none."""
-        return self.plans[0] if self.plans else None
-
-
-@dataclass(frozen=True)
 class ModelRequest:
     """A model or a G-code file and what is to be made of it.
 
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
-    model down in the cheapest orientation; None: where nothing says how it lies. compare: with the same model in one part. force:
-    go on although the dry run found errors. profile_names, settings: machine, material and process as the user has given them,
-    names or files, and KEY=VALUE over them. project: the project file that the model comes from; own_marks: the boxes that the
-    model's own file marks count beside those of the plan, which has them else. stops: where the print waits for a person. copies:
-    the number of each model on the plate; beside: the other models there. plate: of each model's slicer file; None: the first
-    that holds something.
+    model down in the cheapest orientation; None: where nothing says how it lies. plans: files whose planes are cut instead of a
+    search, one for each model that has one; parts: the most parts; planes: file of planes by hand that the search starts from.
+    compare: with the same model in one part. force: go on although the dry run found errors. profile_names, settings: machine,
+    material and process as the user has given them, names or files, and KEY=VALUE over them. project: the project file that the
+    model comes from; own_marks: the boxes that the model's own file marks count beside those of the plan, which has them else.
+    stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other models there.
+    plate: of each model's slicer file; None: the first that holds something.
     """
 
     model: str
@@ -88,7 +71,9 @@ class ModelRequest:
     outputs: Outputs = Outputs()
     compare: bool = False
     force: bool = False
-    cuts: Cuts = Cuts()
+    plans: tuple[Path, ...] = ()
+    parts: int | None = None
+    planes: Path | None = None
     profile_names: tuple[str | None, ...] = ()
     settings: tuple[str, ...] = ()
     project: Path | None = None
@@ -102,6 +87,11 @@ class ModelRequest:
     def name(self) -> str:
         """The name that files and messages carry: the file's name without its folder, of the first of several models."""
         return self.model if self.model.startswith("demo:") else Path(self.model).name
+
+    @property
+    def plan(self) -> Path | None:
+        """The plan of the only model; None: there is none."""
+        return self.plans[0] if self.plans else None
 
     @property
     def is_gcode(self) -> bool:
@@ -133,41 +123,3 @@ def _kind(setting: str) -> str:
     """Which profile a KEY=VALUE setting belongs to; those of the search go with the process."""
     section = setting.partition(".")[0].strip()
     return "process" if section == "search" else section
-
-
-@dataclass(frozen=True)
-class PrintRequest:
-    """A printer at a port, and how a print on it is recorded and watched.
-
-    sim_speed: times real time on the simulated printer, 0: as fast as possible. log: file for what is sent and received,
-    journal: for what a resume needs; None: a new one in the state folder. watch_port: serve the print's page on this port of
-    this computer, 0: on any free one; None: serve nothing. browser: open it there.
-    """
-
-    port: str
-    baud: int = BAUD
-    sim_speed: float = 0.0
-    log: Path | None = None
-    journal: Path | None = None
-    watch_port: int | None = None
-    browser: bool = True
-
-
-@dataclass(frozen=True)
-class PortRequest:
-    """A printer whose axes are measured; log as for a print."""
-
-    port: str
-    baud: int = BAUD
-    log: Path | None = None
-
-
-@dataclass(frozen=True)
-class ProbeRequest:
-    """A printer that measures a ball by itself. ball_mm: its diameter; offset_mm: from the nozzle's tip to what touches, 0 where
-    the nozzle senses; png: picture of what is left over."""
-
-    at: PortRequest
-    ball_mm: float = 20.0
-    offset_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    png: Path | None = None

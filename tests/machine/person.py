@@ -20,9 +20,9 @@ PATIENCE_S = 60.0
 HASTY = """
 import sys
 from machine.cli.cli import main
-from machine.cli.terminal import progress
+from machine import notices
 from machine.printing.servers import follow
-progress.PLAIN_EVERY_S = follow.POLL_S = 0.1
+notices.PLAIN_EVERY_S = follow.POLL_S = 0.1
 sys.exit(main(sys.argv[1:]))
 """
 

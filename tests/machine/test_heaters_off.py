@@ -19,7 +19,6 @@ from machine.cli.commands.measuring.at_port import PrinterMover, ProbingSession,
 from machine.cli.terminal.requests import ConsoleRequest
 from machine.link.medium import Medium, Wire
 from machine.link.stream import print_lines
-from machine.pipeline.requests import PortRequest
 from machine.printing import ports
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.destination import SerialPort
@@ -114,7 +113,7 @@ def measuring(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -
     medium = steps.on_wire(printer.medium)
     monkeypatch.setattr(ports, "open_port", medium.open)
     monkeypatch.setattr(at_port, "ProbingSession", partial(ProbingSession, medium=medium))
-    with cold_session(PortRequest(PATH), PROFILE.machine) as session:
+    with cold_session(SerialPort(PATH), PROFILE.machine) as session:
         mover = PrinterMover(session, calibration_pen(PROFILE))
         with tip_raised_after(mover):
             begin_cold(session, mover, PROFILE.machine)

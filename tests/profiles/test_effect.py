@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from machine.pipeline.pricing import pricing
+from machine.pipeline.choice import pricing
 from mdp.search.search import decompose
 from profiles.effect import effect_of, effect_of_change
 from profiles.frozen import Effect, Frozen

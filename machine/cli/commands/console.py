@@ -1,7 +1,8 @@
-"""Console: a person, or a pipe, talks to a printer line by line: what is typed is sent, what it says is shown."""
+"""A printer at a port without a print: the ports command lists what answers where, the console talks to one line by line."""
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import threading
@@ -13,12 +14,24 @@ from typing import TYPE_CHECKING
 from machine.cli.terminal.interrupts import calling, interrupting
 from machine.cli.terminal.requests import ConsoleRequest
 from machine.firmware import dialect_of
+from machine.firmware.firmware import check_baud
 from machine.link.protocol import events
-from machine.notices import say
+from machine.notices import say, show
 from machine.pipeline.output import check_writable
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.destination import parse_printer
-from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
+from machine.printing.ports import (
+    LONGEST_S,
+    PortReport,
+    ask_ports,
+    describe,
+    describe_answer,
+    identify_printer,
+    known_ports,
+    open_line,
+    port_json,
+    rate_of,
+)
 from machine.printing.serial_log import TappedWire, new_log
 from profiles.errors import LocalProtocolError, PrinterError
 from profiles.folders import state_folder
@@ -316,3 +329,20 @@ class Shown:
         sys.stdout.write("".join(f"{line}\n" for line in self._lines))
         sys.stdout.flush()
         self._lines.clear()
+
+
+def ports(baud: int, as_json: bool, ask: bool) -> int:
+    """List ports on stdout: those in /dev/serial/by-id first, running simulators of this user last. ask=False: none is opened.
+
+    0 also when there is none.
+    """
+    check_baud(baud)
+    devices = known_ports()
+    if not devices:
+        say("no serial port was found: plug the printer in and switch it on")
+    elif ask:
+        say(f"asking {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {LONGEST_S:.0f} s")
+    reports = ask_ports(devices, baud, threading.Event()) if ask else [PortReport(device) for device in devices]
+    text = json.dumps([port_json(report) for report in reports], indent=2) + "\n"
+    show(text if as_json else "".join(describe(report) for report in reports))
+    return 0

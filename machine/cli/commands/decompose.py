@@ -1,11 +1,12 @@
-"""The decompose command: a model's parts as files, pictures and a table."""
+"""The decompose command: a model's parts as files, pictures and a table, and which way to print it is the best."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from machine.cli.terminal.advice import advice
-from machine.cli.terminal.report import compare_table, joints_table, part_settings_lines, parts_table
+from machine.cli.terminal.report import compare_table, estimates, joints_table, part_settings_lines, parts_table, table
 from machine.notices import show
 from machine.pipeline import compilers
+from machine.pipeline.choice import in_parts
 from machine.pipeline.comparison import alternatives_json, compare_with_one_part
 from machine.pipeline.file_roles import check_model_files
 from machine.pipeline.output import PLAN, check_outputs, save_parts, write_bytes, write_json
@@ -14,9 +15,10 @@ from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.project import with_meshes
 from machine.pipeline.requests import STDOUT, ModelRequest, Outputs
 from machine.view.page import parts_page
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, FrontRow
 from mdp.joint import joints_of
 from mdp.save import json_values
+from mdp.search.front import ASKED, BY_PLAN, Weights, choose
 from mdp.search.plan_writing import plan_text
 from profiles.profile import Profile
 
@@ -37,7 +39,7 @@ def decompose(request: ModelRequest) -> int:
     if outputs.folder is not None:
         save_parts(outputs.folder, decomposition, figures)
     for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
-        if file is not None and not _is_same(file, request.cuts.plan):
+        if file is not None and not _is_same(file, request.plan):
             plan = with_meshes(decomposed.plan, file.parent) if request.project else decomposed.plan
             write_bytes(file, plan_text(plan, file.parent).encode())
     _draw(outputs, decomposition, profile)
@@ -67,3 +69,45 @@ def _draw(outputs: Outputs, decomposition: Decomposition, profile: Profile) -> N
         write_png(sheet, contact_sheet(decomposition, profile.machine))
     if front is not None:
         write_png(front, front_picture(decomposition, profile))
+
+
+def advice(decomposition: Decomposition, profile: Profile) -> str:
+    """In one piece, in the parts that were made and in those that were not asked for but cost less: what each takes; then a line
+    with the best of them."""
+    advised = _advised(decomposition, profile)
+    rows = [row for row in decomposition.front if row.parts == 1 or row.chosen or row is advised] or _without_front(decomposition)
+    ways = [(in_parts(row.parts), row) for row in rows]
+    best = f"print it {in_parts(advised.parts if advised else len(decomposition.parts))}"
+    if advised is not None and not advised.chosen:
+        best += f": --parts {advised.parts}"
+    return _ways_table(ways) + f"advice: {best}\n"
+
+
+def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
+    """The row that was chosen, or the cheapest one where a person chose; None where there is no front."""
+    chosen, front = decomposition.chosen, decomposition.front
+    if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
+        return chosen
+    search = profile.search
+    return front[choose(front, Weights.of(profile), search.least_saving).place]
+
+
+def _without_front(decomposition: Decomposition) -> list[FrontRow]:
+    """The rows of parts that come from no search."""
+    whole = FrontRow((), decomposition.risky_area_mm2, 0.0, decomposition.risky_area_mm2)
+    planes = tuple(part.base for part in decomposition.parts[1:])
+    parts = FrontRow(planes, decomposition.residual_area_mm2, 0.0, decomposition.residual_area_mm2)
+    return [whole, parts] if planes else [whole]
+
+
+def _ways_table(ways: Sequence[tuple[str, FrontRow]]) -> str:
+    """Each way with what needs support then, how much less that is than in the first one, its seams, time and filament."""
+    first_mm2 = ways[0][1].support_area_mm2
+    rows = [["print it", "support mm²", "less", "seams mm", "stairs mm²", "about", "filament m"]]
+    for number, (name, row) in enumerate(ways):
+        less = 1.0 - row.support_area_mm2 / first_mm2 if first_mm2 > 0.0 else 0.0
+        share = f"{round(100 * less, 1) + 0.0:.1f} %" if number else ""
+        rows.append(
+            [name, f"{max(row.support_area_mm2, 0.0):.1f}", share, f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", *estimates(row)]
+        )
+    return table(rows)

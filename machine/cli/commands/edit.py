@@ -1,9 +1,10 @@
 """The edit command: the workbench, served on this computer until Ctrl-C."""
 
+from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from machine.cli.terminal.requests import EditRequest
 from machine.notices import say, show
@@ -22,19 +23,12 @@ from profiles.errors import MeshError, OutputError, PlanError
 PLAN_SUFFIX = ".toml"
 
 
-@dataclass(frozen=True)
-class Opened:
-    """What lies on the workbench first: the file and name of a model, with a plan to cut it by, or of a project."""
-
-    path: Path
-    name: str
-    plan: PlanFile | None = None
-    project: bool = False
+Begin = Callable[[Session], Coroutine[Any, Any, None]]  # puts on the workbench what lies there first
 
 
 def edit(request: EditRequest) -> int:
     """Serve the page; a model that cannot be read is told in it, a file that is not there at once."""
-    opened = None if request.model is None else _find(request.model)
+    opening = None if request.model is None else _find(request.model)
     profile, given = request.given.profile(), request.given.given()
     lan = _lan(request)
 
@@ -42,8 +36,8 @@ def edit(request: EditRequest) -> int:
         return Session(profile, given, pools)
 
     def begin(session: Session) -> None:
-        if opened is not None:
-            session.command(partial(_open, session, opened))
+        if opening is not None:
+            session.command(partial(opening, session))
 
     def announce(address: str, *of_lan: str) -> None:
         show("".join(f"{each}\n" for each in (address, *of_lan)))
@@ -65,17 +59,15 @@ def _lan(request: EditRequest) -> Lan | None:
     return None
 
 
-async def _open(session: Session, opened: Opened) -> None:
-    if opened.project:
-        await session.open_project(opened.path, opened.name)
-        return
-    await session.open_model(opened.path, opened.name)
-    if opened.plan is not None:
-        await session.take_plan(opened.plan)
+async def _open_model(session: Session, path: Path, name: str, plan: PlanFile | None) -> None:
+    """Open a model, and cut it by a plan where there is one."""
+    await session.open_model(path, name)
+    if plan is not None:
+        await session.take_plan(plan)
 
 
-def _find(model: str) -> Opened:
-    """The files of a MODEL or a PLAN. Raises UserError for those that are not there."""
+def _find(model: str) -> Begin:
+    """What opens a MODEL, a PLAN or a project. Raises UserError for files that are not there."""
     if Path(model).suffix.lower() == PLAN_SUFFIX and not model.startswith(DEMO):
         return _of_plan(Path(model), read_plan(Path(model)))
     if Path(model).suffix.lower() in GCODE_SUFFIXES:
@@ -83,15 +75,16 @@ def _find(model: str) -> Opened:
     path = locate(model)
     check_file(path)
     if is_project(path):
-        return Opened(path, path.name, project=True)
-    plan = plan_beside(model)
-    return Opened(path, model if model.startswith(DEMO) else path.name, None if plan is None else read_plan(plan))
+        return lambda session: session.open_project(path, path.name)
+    file = plan_beside(model)
+    plan = None if file is None else read_plan(file)
+    return partial(_open_model, path=path, name=model if model.startswith(DEMO) else path.name, plan=plan)
 
 
-def _of_plan(file: Path, plan: PlanFile) -> Opened:
+def _of_plan(file: Path, plan: PlanFile) -> Begin:
     """The model that a plan names: one that ships, or the file of that name beside the plan."""
     path = locate(plan.model) if plan.model.startswith(DEMO) else file.parent / Path(plan.model).name
     if not plan.model or not path.is_file():
         reason = f"its model {plan.model} is not beside it" if plan.model else "it names no model"
         raise PlanError(f"plan {file}: {reason}: open the model first, then choose the plan in the page")
-    return Opened(path, plan.model, plan)
+    return partial(_open_model, path=path, name=plan.model, plan=plan)

@@ -1,20 +1,25 @@
-"""The export command: a model's G-code, dry-run first, and one layer's picture."""
+"""The commands that write what is printed: export, G-code and the picture of one layer; save, a project in one 3MF file."""
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 from machine.cli.terminal.report import compare_table, joints_table, print_price, print_table
 from machine.dryrun.dryrun import summary
 from machine.notices import say_lines, show
 from machine.pipeline.comparison import alternatives_json, compare_with_one_part
 from machine.pipeline.file_roles import check_model_files
-from machine.pipeline.output import check_outputs, write_bytes, write_json, write_lines
-from machine.pipeline.pipeline import build, decompose_model
-from machine.pipeline.programs import refuse_errors
-from machine.pipeline.requests import STDOUT, ModelRequest
-from machine.planning.stops import parts_in_words
+from machine.pipeline.output import check_outputs, check_writable, write_bytes, write_json, write_lines
+from machine.pipeline.pictures import parts_together, png_bytes
+from machine.pipeline.pipeline import Decomposed, decompose_model
+from machine.pipeline.programs import load_program, refuse_errors
+from machine.pipeline.project import PICTURE_PX, STANDING, SUFFIX, Project, figures_of, project_bytes
+from machine.pipeline.requests import STDOUT, Given, ModelRequest
+from machine.planning.stops import check_stop_parts, parts_in_words
 from machine.view.page import print_page
+from mdp.model_file import DEMO
 from profiles.errors import OutputError
+from profiles.profile import DEFAULTS
 from slicer.drawing import layer_svg
 from slicer.paths import SlicedPart
 
@@ -30,9 +35,8 @@ def export(request: ModelRequest) -> int:
     check_outputs(outputs)
     check_model_files(request, ())
     part, layer = parse_layer(outputs.layer, outputs.svg is not None)
-    decomposed = decompose_model(request, to_build=True)
-    profile = decomposed.profile
-    program = build(decomposed.decomposition, profile, pictures=True, stops=request.stops)
+    loaded = load_program(request, pictures=True)
+    program, profile = loaded.program, loaded.profile
     refuse_errors(program.run.errors, request.force)
     picture = b"" if outputs.svg is None else draw_layer(program.sliced, part, layer)
     if outputs.gcode is not None:
@@ -77,3 +81,36 @@ def draw_layer(sliced: Sequence[SlicedPart], part: int, layer: int) -> bytes:
             return layer_svg(piece, layer).encode()
     there = parts_in_words(max(p.index for p in sliced))
     raise OutputError(f"--layer {part}:{layer}: there is no part {part}, the parts are {there}")
+
+
+def save(request: ModelRequest, out: Path) -> int:
+    """Find the parts of a model, or cut it by its plan, and write the project. Raises OutputError."""
+    if out.suffix.lower() != SUFFIX:
+        raise OutputError(f"output {out}: a project is a 3MF file: a name that ends in {SUFFIX} is expected")
+    check_writable(out)
+    check_model_files(request, (("project", out),))
+    decomposed = decompose_model(request)
+    decomposition = decomposed.decomposition
+    check_stop_parts(request.stops, len(decomposition.parts))
+    picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
+    write_bytes(out, project_bytes(_project(request, decomposed), decomposed.plan, decomposition.mesh, picture))
+    count = len(decomposed.plan.parts) + 1
+    show(f"{out}: {request.name} in {count} part{'s' * (count > 1)}, with its plan and profiles\n")
+    return 0
+
+
+def _project(request: ModelRequest, decomposed: Decomposed) -> Project:
+    decomposition, orientation = decomposed.decomposition, decomposed.plan.orientation
+    names = {kind: name or DEFAULTS[kind] for kind, name in zip(DEFAULTS, request.profile_names, strict=True)}
+    return Project(
+        name=request.name,
+        model=None if request.model.startswith(DEMO) else Path(request.model),
+        given=Given(**names, settings=request.settings),
+        rotation=STANDING if orientation is None else orientation,
+        parts=len(decomposition.parts),
+        stops=request.stops,
+        copies=request.copies,
+        figures=figures_of(decomposition.chosen),
+        plate=request.plate,
+        marks_in_plan=not request.own_marks,
+    )

@@ -1,39 +1,41 @@
 """The commands print, send, follow and resume: a program on a printer or a server, what prints there, what was cut off."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 
 from machine.cli.terminal.at_terminal import AtTerminal, exit_code
 from machine.cli.terminal.report import print_table
+from machine.cli.terminal.requests import PrintOptions, ResumeOptions, WatchOptions
 from machine.notices import plain_line, say, show
 from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
 from machine.pipeline.output import check_writable
 from machine.pipeline.programs import LoadedProgram, load_program
-from machine.pipeline.requests import ModelRequest, PrintRequest
+from machine.pipeline.requests import ModelRequest
 from machine.printing.destination import Destination, Server, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
 from machine.printing.journal_folder import check_new_journal, resumable_journals
 from machine.printing.printers import check_print, open_printer, open_server_printer
 from machine.printing.resumption import print_rest, read_resumption, rest_of
 from machine.printing.server_print import file_name, running_print
-from machine.view.serving.watch_page import serve_watch_page
+from machine.view.serving.watch_page import Watched, serve_watch_page
 from profiles.errors import GcodeError, JournalError, ServerError
 from profiles.profile import Profile
 
 
-def print_model(request: ModelRequest, printing: PrintRequest) -> int:
+def print_model(request: ModelRequest, port: str, asked: PrintOptions) -> int:
     """Dry-run, then print a model or a G-code file; the printer is asked who it is before any work is done. 130 when a person has
     ended the print, or left it to its server."""
-    destination, journal = parse_destination(printing.port, printing.baud, printing.sim_speed), printing.journal
+    destination, journal = parse_destination(port, asked.baud, asked.speed), asked.journal
     if isinstance(destination, Server) and journal is not None:
-        raise ServerError(f"--journal {journal}: {printing.port} prints from a file of its own, which needs no journal here")
-    job, person = _job(request, destination, printing.log, journal), AtTerminal()
+        raise ServerError(f"--journal {journal}: {port} prints from a file of its own, which needs no journal here")
+    job, person = _job(request, destination, asked.log, journal), AtTerminal()
     with open_printer(job, person) as printer:
         loaded = check_print(job, printer)
         show(print_table(loaded.program, loaded.profile))
-        with serve_watch_page(loaded, printing.watch_port, person.commands, printing.browser) as watched:
-            person.follow = watched.follow
+        with _watched(loaded, asked.watching, person) as watched:
             end = printer.print(loaded)
             watched.end(end.state)
     return exit_code(end)
@@ -74,25 +76,32 @@ def list_resumable() -> int:
     return 0
 
 
-def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, yes: bool = False) -> int:
+def resume(journal: Path, port: str, asked: ResumeOptions, named: Profile | None = None) -> int:
     """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
 
-    named: the profile whose machine the user has named. yes: go on without asking, unless the height of the tip is in doubt or
-    the newest records may be missing. The journal of the request is a new one. Raises JournalError and other UserErrors.
+    named: the profile whose machine the user has named. asked.yes: go on without asking, unless the height of the tip is in doubt
+    or the newest records may be missing. Raises JournalError and other UserErrors.
     """
-    destination = parse_destination(printing.port, printing.baud, printing.sim_speed)
-    job = PrintJob(destination, Does.RESUME, profile=named, cut_off=journal, log=printing.log, journal=printing.journal)
-    cut_off, person = read_resumption(job), AtTerminal(yes)
+    destination = parse_destination(port, asked.baud)
+    job = PrintJob(destination, Does.RESUME, profile=named, cut_off=journal, log=asked.log, journal=asked.further)
+    cut_off, person = read_resumption(job), AtTerminal(asked.yes)
     for sentence in cut_off.sentences():
         say(sentence)
-    if yes and not cut_off.story.computer_ran_on:
+    if asked.yes and not cut_off.story.computer_ran_on:
         raise JournalError(f"journal {journal}: a person must answer that question: resume at a terminal, without --yes")
     rest = rest_of(cut_off)
-    with serve_watch_page(rest, printing.watch_port, person.commands, printing.browser) as watched:
-        person.follow = watched.follow
+    with _watched(rest, asked.watching, person) as watched:
         end = print_rest(cut_off, rest, job, person)
         watched.end(end.state)
     return exit_code(end)
+
+
+@contextmanager
+def _watched(loaded: LoadedProgram, watching: WatchOptions, person: AtTerminal) -> Iterator[Watched]:
+    """The page that follows and commands the print, where it is asked for."""
+    with serve_watch_page(loaded, watching.port, person.commands, not watching.no_browser) as watched:
+        person.follow = watched.follow
+        yield watched
 
 
 def _job(

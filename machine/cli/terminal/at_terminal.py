@@ -17,8 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from machine.cli.terminal.interrupts import calling, interrupting, stopping
-from machine.cli.terminal.keys import Keyboard, can_type, typing
-from machine.cli.terminal.progress import is_terminal
+from machine.cli.terminal.keys import Keyboard, can_type, is_terminal, typing
 from machine.link.pending_commands import Control
 from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import PlainLines, plain_line, reporting, say, say_lines

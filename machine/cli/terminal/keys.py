@@ -5,12 +5,12 @@ import re
 import select
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from time import monotonic
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any
 
-from machine.cli.terminal.progress import is_terminal
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
 from machine.link.print_state import AWAY, PrintState, PrintStatus
 from machine.notices import say
@@ -134,94 +134,86 @@ _ACTS: dict[str, Callable[[Keyboard], None]] = {
 }
 
 
-class Typing:
-    """`with Typing(press):` keys go to press() from a thread of its own; the terminal is as before afterwards.
+@contextmanager
+def typing(press: Callable[[str], None], named: Mapping[bytes, bytes] = MappingProxyType({})) -> Iterator[None]:
+    """Hand keys to press() from a thread of its own while the block runs; the terminal is as before afterwards.
 
     named: by its sequence the key that an arrow or function key counts as; others are none. Ctrl-C still interrupts; Ctrl-Z is
     switched off, for a stopped sender leaves a hot nozzle standing on the print.
     """
-
-    def __init__(self, press: Callable[[str], None], named: Mapping[bytes, bytes] = MappingProxyType({})) -> None:
-        self._press, self._named = press, named
-        self._thread: threading.Thread | None = None
-
-    def __enter__(self) -> Self:
-        import termios
-        import tty
-
-        self._descriptor = sys.stdin.fileno()
-        self._before = termios.tcgetattr(self._descriptor)
-        tty.setcbreak(self._descriptor, termios.TCSANOW)
-        settings = termios.tcgetattr(self._descriptor)
-        settings[6][termios.VSUSP] = b"\x00"
-        termios.tcsetattr(self._descriptor, termios.TCSANOW, settings)
-        self._end, self._wake = os.pipe()
-        self._thread = threading.Thread(target=self._serve, name="keys", daemon=True)
-        self._thread.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        import termios
-
-        os.write(self._wake, b"x")
-        if self._thread is not None:
-            self._thread.join()
-        os.close(self._end)
-        os.close(self._wake)
-        try:
-            termios.tcsetattr(self._descriptor, termios.TCSAFLUSH, self._before)
-        except (termios.error, OSError):  # the terminal has gone away
-            return
-
-    def _serve(self) -> None:
-        begun = b""
-        while True:
-            ready = select.select([self._descriptor, self._end], [], [])[0]
-            if self._end in ready:
-                return
-            try:
-                typed = os.read(self._descriptor, 64)
-            except OSError:
-                return
-            if not typed:
-                return
-            typed = SEQUENCE.sub(lambda sequence: self._named.get(sequence[0], b""), begun + typed)
-            half = BEGUN.search(typed)
-            begun = half[0] if half else b""
-            for key in typed.removesuffix(begun).decode("ascii", "ignore"):
-                self._press(key)
-
-
-class ConsoleTyping:
-    """`Typing` on Windows, whose console gives keys one by one and is never changed. keys: its module msvcrt."""
-
-    def __init__(self, press: Callable[[str], None], keys: Any) -> None:
-        self._press, self._keys = press, keys
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name="keys", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def _serve(self) -> None:
-        while not self._over.wait(LOOK_S):
-            while self._keys.kbhit():
-                key = self._keys.getwch()
-                if key in ("\x00", "\xe0"):  # an arrow or a function key: the next character says which
-                    self._keys.getwch()
-                else:
-                    self._press(key)
-
-
-def typing(press: Callable[[str], None], named: Mapping[bytes, bytes] = MappingProxyType({})) -> "Typing | ConsoleTyping":
-    """Hand keys to press() as this system does it; named: as Typing takes it."""
     console = _windows_console()
-    return Typing(press, named) if console is None else ConsoleTyping(press, console)
+    with _terminal_keys(press, named) if console is None else _windows_keys(press, console):
+        yield
+
+
+@contextmanager
+def _terminal_keys(press: Callable[[str], None], named: Mapping[bytes, bytes]) -> Iterator[None]:
+    import termios
+    import tty
+
+    terminal = sys.stdin.fileno()
+    before = termios.tcgetattr(terminal)
+    tty.setcbreak(terminal, termios.TCSANOW)
+    settings = termios.tcgetattr(terminal)
+    settings[6][termios.VSUSP] = b"\x00"
+    termios.tcsetattr(terminal, termios.TCSANOW, settings)
+    end, wake = os.pipe()
+    thread = threading.Thread(target=_read_keys, args=(terminal, end, press, named), name="keys", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        os.write(wake, b"x")
+        thread.join()
+        os.close(end)
+        os.close(wake)
+        with suppress(termios.error, OSError):  # the terminal has gone away
+            termios.tcsetattr(terminal, termios.TCSAFLUSH, before)
+
+
+def _read_keys(terminal: int, end: int, press: Callable[[str], None], named: Mapping[bytes, bytes]) -> None:
+    """Read keys until something comes from `end`, or the terminal has gone away."""
+    begun = b""
+    while end not in select.select([terminal, end], [], [])[0]:
+        try:
+            typed = os.read(terminal, 64)
+        except OSError:
+            return
+        if not typed:
+            return
+        typed = SEQUENCE.sub(lambda sequence: named.get(sequence[0], b""), begun + typed)
+        half = BEGUN.search(typed)
+        begun = half[0] if half else b""
+        for key in typed.removesuffix(begun).decode("ascii", "ignore"):
+            press(key)
+
+
+@contextmanager
+def _windows_keys(press: Callable[[str], None], console: Any) -> Iterator[None]:
+    """The same on Windows, whose console gives keys one by one and is never changed. console: its module msvcrt."""
+    over = threading.Event()
+
+    def read_keys() -> None:
+        while not over.wait(LOOK_S):
+            while console.kbhit():
+                key = console.getwch()
+                if key in ("\x00", "\xe0"):  # an arrow or a function key: the next character says which
+                    console.getwch()
+                else:
+                    press(key)
+
+    thread = threading.Thread(target=read_keys, name="keys", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def is_terminal() -> bool:
+    """Whether stderr is a terminal on which lines can be rewritten."""
+    return sys.stderr.isatty() and os.environ.get("TERM", "") not in ("", "dumb")
 
 
 def can_type() -> bool:

@@ -1,20 +1,79 @@
-"""Options: those that several commands share, alone or in groups, and what they ask for together."""
+"""Options: values whose fields are options of the command line, those that several commands share, and what they ask for."""
 
 import re
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass, replace
+from functools import wraps
+from inspect import Parameter, Signature, signature
+from math import isnan
 from os.path import exists
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 import typer
 
-from machine.cli.terminal.option_groups import option
-from machine.pipeline.requests import MOST_COPIES, Cuts, Given, ModelRequest
+from machine.pipeline.requests import MOST_COPIES, Given, ModelRequest
 from profiles.errors import PlanError
 
 if TYPE_CHECKING:
     from profiles.profile import Profile
+
+
+def option(names: str, meaning: str, **further: Any) -> Any:
+    """An option of the command line. names: as `-o --out FILE`, the placeholder of its value last where it has one."""
+    *flags, last = names.split(" ")
+    if not last.startswith("-"):
+        further["metavar"] = last
+    else:
+        flags.append(last)
+    return typer.Option(*flags, help=meaning, **further)
+
+
+def with_option_groups(command: Callable[..., int]) -> Callable[..., int]:
+    """The command as typer reads it: every parameter that is a dataclass becomes an option for each of its fields.
+
+    A field may be such a dataclass itself. A tuple of any length becomes an option that can be repeated, empty by default.
+    """
+    annotations = {name: parameter.annotation for name, parameter in signature(command).parameters.items()}
+    parameters: list[Parameter] = []
+    for name, parameter in signature(command).parameters.items():
+        parameters += _parameters(name, parameter.annotation, parameter.default)
+
+    @wraps(command)
+    def run(**given: Any) -> int:
+        return command(**{name: _value(name, annotation, given) for name, annotation in annotations.items()})
+
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    return run
+
+
+def _is_group(annotation: Any) -> bool:
+    return isinstance(annotation, type) and is_dataclass(annotation)
+
+
+def _is_repeatable(annotation: Any) -> bool:
+    values = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+    return get_origin(values) is tuple and get_args(values)[1:] == (...,)
+
+
+def _parameters(name: str, annotation: Any, default: Any) -> list[Parameter]:
+    if _is_group(annotation):
+        return [each for field in fields(annotation) for each in _parameters(field.name, field.type, field.default)]
+    if _is_repeatable(annotation):
+        values, option = get_args(annotation)
+        annotation, default = Annotated[list[get_args(values)[0]] | None, option], None  # type: ignore[misc]
+    return [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=Parameter.empty if default is MISSING else default, annotation=annotation)
+    ]
+
+
+def _value(name: str, annotation: Any, given: Mapping[str, Any]) -> Any:
+    """What was given for a parameter: of a group an instance, of an option that can be repeated a tuple."""
+    if _is_group(annotation):
+        return annotation(**{field.name: _value(field.name, field.type, given) for field in fields(annotation)})
+    if isinstance(given[name], float) and isnan(given[name]):  # no bound refuses it
+        raise typer.BadParameter(f"{get_args(annotation)[1].param_decls[-1]} is nan: it must be a number")
+    return tuple(given[name] or ()) if _is_repeatable(annotation) else given[name]
 
 
 def _names_of(kind: str) -> Callable[[str], list[str]]:
@@ -171,6 +230,11 @@ class DefaultProfileOptions(ProfileOptions):
     material: Annotated[str, _profile_option("material")] = Given.material
     process: Annotated[str, _profile_option("process")] = Given.process
 
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """The names of machine, material and process."""
+        return self.machine, self.material, self.process
+
 
 def named_models(models: list[str]) -> list[str]:
     """The models of a plate as often as they are to stand there: MODEL:N is a model N times. Raises PlanError."""
@@ -215,6 +279,7 @@ def model_request(
     request = replace(
         ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names),
         settings=given.given(search).settings,
+        parts=search.parts,
         copies=1 if copies is None else copies,
         plate=file.plate,
         **further,
@@ -263,7 +328,7 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
     from machine.pipeline.project import is_project
     from machine.planning.stops import parse_stops
 
-    stops, cuts = parse_stops(program.pause, program.filament_change), Cuts(program.plan, program.parts)
+    stops = parse_stops(program.pause, program.filament_change)
     first, *others = named_models(models)
     if program.settings_of_file and len({first, *others}) > 1:
         several = ", ".join(dict.fromkeys((first, *others)))
@@ -273,7 +338,7 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
             raise PlanError(f"{name}: {first} is a project, which is a plate of its own: --copies N prints more")
         if is_project(Path(named_models([name])[0])):
             raise PlanError(f"{name} is a project, which is a plate of its own: no model goes beside it; --copies N prints more")
-    return model_request(first, program, given, program.copies, cuts=cuts, stops=stops, beside=tuple(others), **further)
+    return model_request(first, program, given, program.copies, plans=program.plan, stops=stops, beside=tuple(others), **further)
 
 
 def machine_profile(machine: str, settings: tuple[str, ...] = ()) -> "Profile":

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from machine.cli.terminal import options
-from machine.cli.terminal.option_groups import option
-from machine.pipeline.requests import UPLOAD_MIB, Cuts, Given, ModelRequest, Outputs, PortRequest, PrintRequest, ProbeRequest
+from machine.cli.terminal.options import option
+from machine.pipeline.requests import BAUD, UPLOAD_MIB, Given, ModelRequest, Outputs
 
 if TYPE_CHECKING:
     from mdp.batch.pool import Workers
@@ -48,8 +48,8 @@ class DecomposeOptions:
             record=self.record,
             plan=None if known else self.plan,
         )
-        cuts = Cuts((known,) if known else (), search.parts, self.planes)
-        return options.model_request(model, search, given, outputs=outputs, cuts=cuts, compare=self.compare)
+        plans = (known,) if known else ()
+        return options.model_request(model, search, given, outputs=outputs, plans=plans, planes=self.planes, compare=self.compare)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class BatchRequest:
 
     def asked(self) -> ModelRequest:
         """What is asked for of each model, without a model's name."""
-        return options.model_request("", self.search, self.given, cuts=Cuts(parts=self.search.parts))
+        return options.model_request("", self.search, self.given)
 
     def workers(self) -> "Workers":
         """Where the work is done."""
@@ -134,17 +134,12 @@ class WatchOptions:
 class PrintOptions:
     """How a print is recorded and watched, and how fast a simulated printer is."""
 
-    baud: options.Baud = PrintRequest.baud
+    baud: options.Baud = BAUD
     speed: options.SimSpeed = 0.0
     watching: WatchOptions = WatchOptions()
     log: options.LogFile = None
     journal: Annotated[Path | None, option("--journal FILE", "for resume; else a new file in the state folder")] = None
     force: options.ForceAll = False
-
-    def at(self, port: str) -> PrintRequest:
-        """The print at a port or a server."""
-        page, browser = self.watching.port, not self.watching.no_browser
-        return PrintRequest(port, self.baud, self.speed, self.log, self.journal, page, browser)
 
 
 @dataclass(frozen=True)
@@ -155,17 +150,12 @@ class ResumeOptions:
         Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
     ] = None
     port: Annotated[str | None, option("--port PORT", "serial port")] = None
-    baud: options.Baud = PrintRequest.baud
+    baud: options.Baud = BAUD
     yes: Annotated[bool, option("--yes", "go on without asking, where nothing is in doubt")] = False
     watching: WatchOptions = WatchOptions()
     further: Annotated[Path | None, option("--journal FILE", "journal of the rest; else a new file in the state folder")] = None
     log: options.LogFile = None
     machine: options.MachineGiven = None
-
-    def at(self, port: str) -> PrintRequest:
-        """The print of the rest at a port."""
-        page, browser = self.watching.port, not self.watching.no_browser
-        return PrintRequest(port, self.baud, 0.0, self.log, self.further, page, browser)
 
 
 @dataclass(frozen=True)
@@ -185,7 +175,7 @@ class ConsoleRequest:
     """A printer to talk to line by line. reports: show temperature reports; log as for a print."""
 
     port: options.PortOrSim
-    baud: options.Baud = PrintRequest.baud
+    baud: options.Baud = BAUD
     sim_speed: options.SimSpeed = 0.0
     reports: Annotated[bool, option("--reports/--no-reports", "show temperatures that the printer reports")] = True
     leave_heaters: Annotated[
@@ -221,7 +211,7 @@ class ProbeOptions:
 
     probe: Annotated[bool, option("--probe", "the machine at --port measures a ball on its plate by itself")] = False
     port: Annotated[str | None, option("--port PORT|sim", "serial port of the machine to measure; sim: simulated")] = None
-    baud: options.Baud = PortRequest.baud
+    baud: options.Baud = BAUD
     ball_mm: Annotated[float, option("--ball-mm MM", "diameter of the ball", min=4, max=60)] = 20.0
     probe_offset: Annotated[
         str, option("--probe-offset X,Y,Z", "from the nozzle's tip to what touches; 0,0,0: the nozzle senses")
@@ -230,21 +220,15 @@ class ProbeOptions:
     log: options.LogFile = None
 
     @property
-    def at(self) -> PortRequest | None:
-        """The printer at --port, None: there is none."""
-        return None if self.port is None else PortRequest(self.port, self.baud, self.log)
-
-    def request(self) -> ProbeRequest:
-        """What is asked for with --probe; raises BadParameter."""
-        if self.at is None:
-            raise typer.BadParameter("--probe needs --port PORT, or sim for the simulated printer")
+    def offset_mm(self) -> tuple[float, float, float]:
+        """From the nozzle's tip to what touches; 0 where the nozzle senses. Raises BadParameter."""
         try:
             x, y, z = (float(word) for word in self.probe_offset.split(","))
         except ValueError:
             raise typer.BadParameter(f"--probe-offset {self.probe_offset}: three numbers X,Y,Z in mm are expected") from None
         if not all(-200.0 <= value <= 200.0 for value in (x, y, z)):
             raise typer.BadParameter(f"--probe-offset {self.probe_offset}: -200 to 200 mm are allowed")
-        return ProbeRequest(self.at, self.ball_mm, (x, y, z), self.png)
+        return x, y, z
 
 
 @dataclass(frozen=True)
@@ -277,16 +261,6 @@ class CalibrationRequest:
     probing: ProbeOptions = ProbeOptions()
     given: MachineOptions = MachineOptions()
 
-    @property
-    def machine(self) -> str:
-        """The name of the machine's profile."""
-        return self.given.machine
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """KEY=VALUE over it."""
-        return self.given.settings
-
 
 @dataclass(frozen=True, kw_only=True)
 class CouponRequest:
@@ -313,21 +287,6 @@ class CouponRequest:
     force: options.Force = False
     given: options.DefaultProfileOptions
 
-    @property
-    def names(self) -> tuple[str, str, str]:
-        """The names of machine, material and process."""
-        return self.given.machine, self.given.material, self.given.process
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """KEY=VALUE over them."""
-        return self.given.settings
-
-    @property
-    def named(self) -> str:
-        """The names as options."""
-        return " ".join(f"--{kind} {name}" for kind, name in zip(("machine", "material", "process"), self.names, strict=True))
-
 
 @dataclass(frozen=True)
 class ImportRequest:
@@ -344,11 +303,6 @@ class ImportRequest:
     replace: Replace = False
     json: Annotated[bool, option("--json", "what became of every setting as JSON")] = False
 
-    @property
-    def presets(self) -> dict[str, str]:
-        """The names of presets by process, material and printer."""
-        return {"process": self.process, "material": self.material, "printer": self.printer}
-
 
 @dataclass(frozen=True)
 class DetectRequest:
@@ -360,7 +314,7 @@ class DetectRequest:
         typer.Argument(metavar="FILE", help="printer.cfg, config.g, a log of M503, a dump of $$, LinuxCNC's .ini"),
     ] = None
     port: Annotated[str | None, option("--port PORT", "of a printer; moonraker:HOST, duet:HOST; or sim")] = None
-    baud: options.Baud = PortRequest.baud
+    baud: options.Baud = BAUD
     base: Annotated[str | None, option("--base NAME", "inherit it, else the nearest shipped one")] = None
     out: Annotated[Path | None, option("-o --out FILE.toml", "profile to write; else one of your own")] = None
     replace: Replace = False

@@ -14,6 +14,7 @@ from machine.workbench.session.session import Session
 from machine.workbench.work.cutting import SearchWay
 from mdp.ranking.ranker import CLASSIC
 from profiles.errors import PlanError
+from profiles.messages import key_name
 
 ProfileKind = Literal["machine", "material", "process"]
 
@@ -165,7 +166,7 @@ def perform(session: Session, command: Command) -> Coroutine[Any, Any, None] | N
             session.comparing.compare()
         case Set():
             return session.take_given(
-                f"set {command.key}",
+                f"set {key_name(command.key)}",
                 lambda given: with_typed(given, command.key, command.value, session.bench.profile),
                 command.key,
             )

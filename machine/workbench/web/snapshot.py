@@ -22,6 +22,7 @@ from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import AnyZone, MeshVolume, Modifier, Zone
 from profiles.material import Material
+from profiles.messages import terminal_words
 from profiles.profile import Profile
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
@@ -175,8 +176,8 @@ def snapshot(session: Session) -> dict[str, Any]:
         "stopped": session.stopped,
         "preparing": bool(session.readiness.progress),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
-        "undo": history.now.word if history.before else "",
-        "redo": history.undone[-1].word if history.undone else "",
+        "undo": terminal_words(history.now.word) if history.before else "",
+        "redo": terminal_words(history.undone[-1].word) if history.undone else "",
         "model": None if bench.model is None else _model(bench.model, session),
         "rotation": bench.rotation,
         "scale": bench.profile.process.scale,

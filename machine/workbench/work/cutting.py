@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from machine.pipeline import compilers
-from machine.pipeline.given_plan import lies_freely, with_file_marks
-from machine.pipeline.orientation import orientation_in_words, standing_in_words
+from machine.pipeline.choice import lies_freely, orientation_in_words, pricing, standing_in_words
+from machine.pipeline.given_plan import with_file_marks
 from machine.pipeline.pictures import contact_sheet, front_picture, parts_picture, parts_together, png_bytes
-from machine.pipeline.pricing import pricing
 from machine.pipeline.project import PICTURE_PX, project_bytes, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts

@@ -9,8 +9,8 @@ import numpy as np
 
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
+from machine.pipeline.choice import as_turned
 from machine.pipeline.comparison import in_one_part, in_parts
-from machine.pipeline.given_plan import as_turned
 from machine.pipeline.pipeline import build
 from machine.pipeline.plate import on_one_plate
 from machine.planning.fit import standing_at

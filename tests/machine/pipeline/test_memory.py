@@ -4,7 +4,7 @@ import ctypes
 
 import pytest
 
-from machine.pipeline.memory import return_large_arrays, return_unused
+from machine.pipeline.compilers import return_large_arrays, return_unused
 
 
 def test_glibc_maps_arrays_of_a_megabyte_one_by_one_and_keeps_two_megabytes_of_heap(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,12 +5,13 @@ from dataclasses import replace
 import manifold3d as m3
 import numpy as np
 
-from machine.pipeline.orientation import orientation_in_words, standing_in_words
+from machine.pipeline.choice import HARDLY_HELD, orientation_in_words, standing_in_words
 from mdp.cut import mesh_of
 from mdp.decomposition import FrontRow
 from mdp.directions.orientation import best_orientation, facet_orientations
 from mdp.plane import Plane
 from mdp.search.orient import Oriented
+from profiles.messages import terminal_words
 from profiles.profile import load
 from tests.machine.cli.terminal.test_report import alone
 from tests.shapes import tee
@@ -37,9 +38,10 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
 def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
     oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, facet_orientations(tee(), 45.0)[0], False, False)
     warning = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
-    assert orientation_in_words(oriented, "--as-is keeps it so") == (warning,)
+    assert terminal_words(HARDLY_HELD) == warning
+    assert orientation_in_words(oriented, "--as-is keeps it so") == (HARDLY_HELD,)
     turned = replace(oriented, orientation=best_orientation(tee(), 45.0))
-    assert orientation_in_words(turned, "--as-is keeps it so")[1:] == (warning,)
+    assert orientation_in_words(turned, "--as-is keeps it so")[1:] == (HARDLY_HELD,)
 
 
 def test_a_model_that_is_turned_because_the_plate_would_not_hold_it_is_told_so() -> None:

@@ -77,26 +77,26 @@ def test_a_picture_that_cannot_be_written_leaves_nothing_and_says_where(tmp_path
 
 
 def test_a_box_seen_from_the_front_covers_its_share_of_the_picture() -> None:
-    image = draw([box(20, 20, 10)], [(120, 120, 120)], view=FRONT, size=(200, 200), span_mm=40.0)
+    image = draw([box(20, 20, 10)], [(120, 120, 120)], axes=FRONT, size=(200, 200), span_mm=40.0)
     assert (image < 250).any(axis=2).mean() == pytest.approx(20 * 10 / 40**2, rel=0.03)
 
 
 def test_a_ball_covers_the_area_of_its_disc() -> None:
-    image = draw([ball(10.0, 96)], [(120, 120, 120)], view=FRONT, size=(200, 200), span_mm=25.0)
+    image = draw([ball(10.0, 96)], [(120, 120, 120)], axes=FRONT, size=(200, 200), span_mm=25.0)
     assert (image < 250).any(axis=2).mean() == pytest.approx(pi * 10**2 / 25**2, rel=0.03)
 
 
 def test_the_nearer_mesh_hides_the_farther_one() -> None:
     near, far = box(10).transform(np.eye(3), (0, -30, 0)), box(10).transform(np.eye(3), (0, 30, 0))
-    image = draw([near, far], [(0, 200, 0), (200, 0, 0)], view=FRONT, size=(80, 80))
+    image = draw([near, far], [(0, 200, 0), (200, 0, 0)], axes=FRONT, size=(80, 80))
     assert image[40, 40, 1] > 2 * image[40, 40, 0]
 
 
 def test_red_faces_are_red_and_the_others_are_not() -> None:
     mesh = box(10, 10, 10)
-    image = draw([mesh], [(200, 200, 200)], reds=[mesh.normals[:, 1] < -0.5], view=FRONT, size=(80, 80), span_mm=20.0)
+    image = draw([mesh], [(200, 200, 200)], reds=[mesh.normals[:, 1] < -0.5], axes=FRONT, size=(80, 80), span_mm=20.0)
     assert share_like(image, RED) == pytest.approx(0.25, rel=0.12)
-    behind = draw([mesh], [(200, 200, 200)], reds=[mesh.normals[:, 1] > 0.5], view=FRONT, size=(80, 80), span_mm=20.0)
+    behind = draw([mesh], [(200, 200, 200)], reds=[mesh.normals[:, 1] > 0.5], axes=FRONT, size=(80, 80), span_mm=20.0)
     assert share_like(behind, RED) == 0.0
 
 
@@ -124,8 +124,8 @@ def test_every_pixel_shows_the_nearest_triangle_over_its_centre(seed: int) -> No
 
 
 def test_a_camera_on_plus_x_sees_plus_y_to_the_right_and_z_up() -> None:
-    assert np.allclose(seen_from(0.0, 0.0).axes, [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
-    assert np.allclose(seen_from(0.0, 30.0).axes[2], [cos(radians(30)), 0, sin(radians(30))])
+    assert np.allclose(seen_from(0.0, 0.0), [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    assert np.allclose(seen_from(0.0, 30.0)[2], [cos(radians(30)), 0, sin(radians(30))])
 
 
 def test_the_parts_picture_shows_the_model_red_and_the_parts_in_their_colours() -> None:

@@ -15,7 +15,7 @@ from machine.dryrun.dryrun import summary
 from machine.pipeline.given_plan import request_of_each
 from machine.pipeline.pipeline import build
 from machine.pipeline.plate import naming_parts, on_one_plate
-from machine.pipeline.requests import Cuts, ModelRequest
+from machine.pipeline.requests import ModelRequest
 from machine.planning.fit import places_on_plate
 from machine.program import Program
 from mdp.decomposition import Decomposition, Part
@@ -183,9 +183,9 @@ def test_each_plan_goes_with_the_model_that_it_names(tmp_path: Path) -> None:
     tee_plan, hook_plan = tmp_path / "tee.toml", tmp_path / "hook.toml"
 
     def of_each(*plans: Path) -> dict[str, ModelRequest]:
-        return request_of_each(ModelRequest("a/hook.stl", plate(), cuts=Cuts(plans), beside=("b/tee.stl", "post.stl")))
+        return request_of_each(ModelRequest("a/hook.stl", plate(), plans=plans, beside=("b/tee.stl", "post.stl")))
 
-    found = {name: request.cuts.plan for name, request in of_each(tee_plan, hook_plan).items()}
+    found = {name: request.plan for name, request in of_each(tee_plan, hook_plan).items()}
     assert found == {"a/hook.stl": hook_plan, "b/tee.stl": tee_plan, "post.stl": None}
     with pytest.raises(PlanError, match=r"tee.toml cuts tee.stl already"):
         of_each(tee_plan, tee_plan)

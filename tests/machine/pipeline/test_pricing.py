@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from machine.pipeline.pricing import pricing
+from machine.pipeline.choice import pricing
 from mdp.mesh import Mesh
 from mdp.search.search import SearchRequest, decompose
 from profiles.profile import load

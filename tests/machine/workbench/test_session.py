@@ -25,6 +25,7 @@ from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
+from profiles.messages import key_name, option
 from profiles.profile import Profile, load
 from tests.machine.workbench.models import model
 
@@ -225,7 +226,7 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
     session = when_done(work)
     assert [stop.at for stop in session.bench.stops] == ["1:3"]
     assert session.problem.startswith(
-        "turn the model: taken away with part 2: --pause 2:8.4mm (Undo brings it back); slicing has ended"
+        f"turn the model: taken away with part 2: {option('pause', '2:8.4mm')} (Undo brings it back); slicing has ended"
     )
 
 
@@ -336,7 +337,7 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
 
     cut: list[tuple[int, int, str]] = []
     session = when_done(work)
-    why = "set process.place_mm: the planes were taken away, for part 3 cannot be cut off: Z would go too far"
+    why = f"set {key_name('process.place_mm')}: the planes were taken away, for part 3 cannot be cut off: Z would go too far"
     assert cut == [(3, 3, ""), (0, 2, why)]
     assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
 

@@ -11,6 +11,7 @@ from mdp.mesh import Floats
 from mdp.read import read_model
 from mdp.zone import Zone
 from profiles.errors import MeshError
+from profiles.messages import phrase
 from tests.mdp import files
 from tests.mdp.slicer_files import (
     AT_ORIGIN,
@@ -79,7 +80,7 @@ def test_a_slicer_file_says_which_plate_is_taken_and_refuses_one_that_is_not_the
     objects = [Object([Made(BLOCK)], at[:2]), Object([Made(BOX)], at[2:])]
     path = bambu(tmp_path / "a.3mf", objects, np.random.default_rng(0))
     assert read_model(path).notes == (
-        "prints plate 2; --plate prints another: 3",
+        f"prints plate 2; {phrase('another plate', '--plate prints another')}: 3",
         "leaves out object b, which is switched off in its slicer",
     )
     with pytest.raises(MeshError, match="--plate 1: that plate is empty; plates with objects: 2, 3"):

@@ -21,6 +21,7 @@ from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
+from profiles.messages import option, terminal_words
 from profiles.profile import Profile, load
 from tests import shapes
 
@@ -89,7 +90,7 @@ def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
         assert len(cut_by_plan(_two_arms(), "shape", _profile(), SearchRequest(plan=plan, parts=count)).parts) == count
     many = cut_by_plan(_two_arms(), "shape", _profile(), SearchRequest(plan=plan, parts=50))
     assert len(many.parts) == len(searched.front)
-    assert many.notes == (f"--parts 50: the plan plan.toml holds no more than {len(searched.front)}",)
+    assert many.notes == (f"{option('parts', 50)}: the plan plan.toml holds no more than {len(searched.front)}",)
 
 
 def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_row_is_cut() -> None:
@@ -110,7 +111,7 @@ def test_a_search_for_so_many_parts_takes_that_row_of_the_front() -> None:
     )
     assert len(free.parts) > len(two.parts) == 2
     assert len(many.parts) == len(many.front)
-    assert many.notes == (f"--parts 50: the search found no more than {len(many.front)}",)
+    assert many.notes == (f"{option('parts', 50)}: the search found no more than {len(many.front)}",)
     assert [row.cost_mm2 for row in two.front] == [row.cost_mm2 for row in free.front]
     assert len(decompose(_two_arms(), "shape", _profile(), SearchRequest(parts=1)).parts) == 1
 
@@ -325,7 +326,8 @@ def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
 def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:
     zones = Zones(no_seam=(Zone((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),))
     found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), SearchRequest(plan=_by_hand(zones=zones)))
-    assert "[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)" in found.notes
+    sentence = "[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)"
+    assert sentence in map(terminal_words, found.notes)
 
 
 def test_the_published_search_starts_from_planes_by_hand_too() -> None:

@@ -23,6 +23,7 @@ from mdp.search.front import ParetoFront, Price
 from mdp.search.parts import folded_mm3
 from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
+from profiles.messages import key_name
 from profiles.profile import load
 from tests import shapes
 from tests.checks import assert_closed
@@ -194,7 +195,7 @@ def test_the_published_search_keeps_to_its_volume_floor() -> None:
 def test_a_time_limit_of_nothing_leaves_one_part_and_says_so() -> None:
     decomposition = _decompose(shapes.tee(), "search.time_limit_s=0")
     assert len(decomposition.parts) == 1
-    assert decomposition.notes == ("search.time_limit_s = 0 ended the search; the best so far is used",)
+    assert decomposition.notes == (f"{key_name('search.time_limit_s')} = 0 ended the search; the best so far is used",)
 
 
 def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.MonkeyPatch) -> None:

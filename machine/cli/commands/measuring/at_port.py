@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 
 from machine.cli.terminal.interrupts import interrupting
 from machine.firmware import dialect_of
@@ -13,10 +14,9 @@ from machine.link.protocol.events import Echo, Event, Unknown
 from machine.link.protocol.framing import LINE_LIMIT
 from machine.link.shutdown import lift_tip
 from machine.notices import say
-from machine.pipeline.requests import PortRequest
 from machine.printing.checks import check_machine
 from machine.printing.command_session import CommandSession
-from machine.printing.destination import parse_printer
+from machine.printing.destination import AtPrinter
 from machine.printing.ports import describe_answer, identify_printer, open_line, rate_of
 from machine.printing.serial_log import TappedWire, new_log
 from machine.setup.calibration.program import cold_start, turn_lines
@@ -149,12 +149,13 @@ class PrinterProber(PrinterMover):
 
 
 @contextmanager
-def cold_session(port: PortRequest, machine: Machine, table: ProbedTable | None = None) -> Iterator[ProbingSession]:
-    """A conversation with the machine at the port, or with the simulated one, whose table may be sensed; its heaters off at the
-    end."""
-    at = parse_printer(port.port, port.baud)
+def cold_session(
+    at: AtPrinter, machine: Machine, log_file: Path | None = None, table: ProbedTable | None = None
+) -> Iterator[ProbingSession]:
+    """A conversation with the machine at a port, or with the simulated one, whose table may be sensed; its heaters off at the
+    end. log_file: for what is sent and received; None: a new one in the state folder."""
     with ExitStack() as stack:
-        log = stack.enter_context(new_log("calibrate", f"calibrate at {port.port}", port.log))
+        log = stack.enter_context(new_log("calibrate", f"calibrate at {at.name}", log_file))
         wire = stack.enter_context(open_line(at, machine, table))
         if log.trouble:
             say(f"the traffic is not logged: {log.file}: {log.trouble}")

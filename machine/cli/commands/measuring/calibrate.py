@@ -29,20 +29,20 @@ def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> i
     height = mark_height_mm(request)
     touches = plan_touches(profile.machine, height, request.mark_radius_mm)
     write_lines(out, calibration_lines(profile, touches))
-    write_bytes(sheet, sheet_text(request.machine, profile.machine, touches).encode())
+    write_bytes(sheet, sheet_text(request.given.machine, profile.machine, touches).encode())
     radius = touches.mark_mm[0]
     show(
         f"fix a pointed mark, {height:g} mm high, {radius:g} mm from the middle of the plate\n"
         f"run {out}: it takes the cold nozzle to the mark at {len(touches.poses)} poses\n"
         f"each time bring the tip onto the mark, note X Y Z in {sheet}, then go on\n"
-        f"then: tiltprint calibrate --machine {request.machine} --measured {sheet}\n"
+        f"then: tiltprint calibrate --machine {request.given.machine} --measured {sheet}\n"
     )
     return 0
 
 
 def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
     """Find signs, zeros and centres from a filled sheet, tell them and save them."""
-    machine, name = tilting_machine(request), request.machine
+    machine, name = tilting_machine(request), request.given.machine
     sheet = read_sheet(measured, request.mark_height_mm)
     if sheet.machine not in (None, name):
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
@@ -60,9 +60,9 @@ def mark_height_mm(request: CalibrationRequest) -> float:
 
 def tilting_machine(request: CalibrationRequest) -> Machine:
     """The machine of a request; raises ProfileError for one without rotary axes."""
-    machine = load_one(request.machine, request.settings).get("machine")
+    machine = load_one(request.given.machine, request.given.settings).get("machine")
     if not isinstance(machine, Machine):
-        raise ProfileError(f"{request.machine} is not a machine profile")
+        raise ProfileError(f"{request.given.machine} is not a machine profile")
     if not machine.tilts:
         raise ProfileError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
     return machine
@@ -85,13 +85,13 @@ def save_calibration(request: CalibrationRequest, machine: Machine, calibration:
 
 def refuse_if_saved(request: CalibrationRequest) -> None:
     """Raise OutputError at once where the result could not be saved at the end."""
-    name = Path(request.machine).stem
-    refuse_to_overwrite(own_profile("machine", request.save or name, request.machine, {})[0], request.replace)
+    name = Path(request.given.machine).stem
+    refuse_to_overwrite(own_profile("machine", request.save or name, request.given.machine, {})[0], request.replace)
 
 
 def save_tables(request: CalibrationRequest, tables: Mapping[str, Any]) -> None:
     """What was found in the user's own profile, and the file before beside it."""
-    file, text = own_profile("machine", request.save or Path(request.machine).stem, request.machine, tables)
+    file, text = own_profile("machine", request.save or Path(request.given.machine).stem, request.given.machine, tables)
     write_own(file, text, request.replace)
     show(f"saved: {file}; use it as --machine {file.stem}\n")
 

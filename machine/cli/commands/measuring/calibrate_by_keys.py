@@ -10,7 +10,6 @@ from machine.cli.commands.measuring.calibrate import judged, mark_height_mm, ref
 from machine.cli.terminal.keys import can_type, typing
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.notices import say
-from machine.pipeline.requests import PortRequest
 from machine.printing.command_session import CommandSession
 from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, Touch
@@ -28,16 +27,16 @@ ENTER = ("\n", "\r")
 PLACE = "fix a pointed mark, {height:g} mm high and {radius:g} mm from the middle towards +X; Enter when it stands there"
 
 
-def touch_by_keys(request: CalibrationRequest, port: PortRequest, profile: Profile) -> int:
+def touch_by_keys(request: CalibrationRequest, port: str, profile: Profile) -> int:
     """Go from touch to touch, tell what follows, save it. Raises UserError, the tip raised and nothing saved."""
     machine = tilting_machine(request)
-    parse_printer(port.port, port.baud)
+    at = parse_printer(port, request.probing.baud)
     refuse_if_saved(request)
     if not can_type():
         raise PrinterError("--port without --probe takes keys from a terminal, and there is none: --probe measures by itself")
     height = mark_height_mm(request)
     plan = plan_touches(machine, height, request.mark_radius_mm)
-    with cold_session(port, machine) as session, keys_of_a_person(session) as keys:
+    with cold_session(at, machine, request.probing.log) as session, keys_of_a_person(session) as keys:
         mover = PrinterMover(session, calibration_pen(profile))
         touching = KeyedTouches(machine, plan, mover, keys, tell)
         with tip_raised_after(mover):

@@ -44,7 +44,7 @@ def write_page(request: CalibrationRequest, printed: Sequence[Path], html: Path)
     if len(printed) != 1:
         raise ProfileError(f"--html is the page of one piece: --printed is given {len(printed)} times")
     piece = _read(printed[0], tilting_machine(request))
-    write_bytes(html, piece_page(piece, request.machine, printed[0].name))
+    write_bytes(html, piece_page(piece, request.given.machine, printed[0].name))
     show(f"open {html} beside the printed piece\n")
     return 0
 

@@ -10,13 +10,13 @@ from machine.firmware import dialect_of, firmware_of
 from machine.firmware.firmware import ProbingRules
 from machine.notices import say, show
 from machine.pipeline.output import check_writable
-from machine.pipeline.requests import ProbeRequest
 from machine.printing.destination import parse_printer
 from machine.setup.calibration.fit import Calibration, calibrate
 from machine.setup.calibration.probing import Ball, Measuring, Probe
 from machine.setup.calibration.program import calibration_pen, usual_radius_mm
 from machine.simulator.contact import ProbedTable, TrueBall
 from profiles.errors import PrinterError, ProfileError
+from profiles.frozen import Vector
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -27,15 +27,18 @@ PLACE = (
 )
 
 
-def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Profile) -> int:
-    """Measure, tell what follows, save it as calibrate saves. Raises UserError, the tip raised and nothing saved."""
-    machine = tilting_machine(request)
-    parse_printer(probing.at.port, probing.at.baud)
+def probe_axes(request: CalibrationRequest, port: str, offset_mm: Vector, profile: Profile) -> int:
+    """Measure, tell what follows, save it as calibrate saves. offset_mm: from the nozzle's tip to what touches.
+
+    Raises UserError, the tip raised and nothing saved.
+    """
+    machine, probing = tilting_machine(request), request.probing
+    at = parse_printer(port, probing.baud)
     refuse_if_saved(request)
     if probing.png is not None:
         check_writable(probing.png)
-    ball, probe = _ball(request, probing, machine), _probe(probing, machine)
-    with cold_session(probing.at, machine, _table(machine, ball, probe)) as session:
+    ball, probe = _ball(request, machine), _probe(offset_mm, machine)
+    with cold_session(at, machine, probing.log, _table(machine, ball, probe)) as session:
         prober = PrinterProber(session, calibration_pen(profile), _rules(machine), probe.offset_mm[2])
         measuring = Measuring(machine, ball, prober, probe, say)
         with tip_raised_after(prober):
@@ -47,8 +50,7 @@ def probe_axes(request: CalibrationRequest, probing: ProbeRequest, profile: Prof
         f"{residual_table(calibration, machine, measuring)}"
     )
     if probing.png is not None:
-        from machine.pipeline.pictures import write_png
-        from machine.pipeline.residual_picture import residual_picture
+        from machine.pipeline.pictures import residual_picture, write_png
 
         write_png(probing.png, residual_picture(calibration, [touch.pose for touch in touches], machine))
     if calibration.rms_mm > MOST_OFF_MM and not request.force:
@@ -68,19 +70,19 @@ def residual_table(calibration: Calibration, machine: Machine, measuring: Measur
     return "\n".join(rows) + "\n"
 
 
-def _ball(request: CalibrationRequest, probing: ProbeRequest, machine: Machine) -> Ball:
+def _ball(request: CalibrationRequest, machine: Machine) -> Ball:
     height = BALL_HEIGHT_MM if request.mark_height_mm is None else request.mark_height_mm
-    radius = usual_radius_mm(machine, request.mark_radius_mm)
-    if height < 0.5 * probing.ball_mm:
-        raise ProfileError(f"--mark-height {height:g}: a ball {probing.ball_mm:g} mm in diameter has its centre higher up")
-    return Ball(0.5 * probing.ball_mm, (radius, 0.0, height))
+    radius, diameter = usual_radius_mm(machine, request.mark_radius_mm), request.probing.ball_mm
+    if height < 0.5 * diameter:
+        raise ProfileError(f"--mark-height {height:g}: a ball {diameter:g} mm in diameter has its centre higher up")
+    return Ball(0.5 * diameter, (radius, 0.0, height))
 
 
-def _probe(probing: ProbeRequest, machine: Machine) -> Probe:
+def _probe(offset_mm: Vector, machine: Machine) -> Probe:
     """The nozzle's own end is as flat as the profile's silhouette says; a probe beside it is taken to be pointed."""
     radius, height = machine.head.silhouette_mm[0]
-    own = Probe(probing.offset_mm)
-    return Probe(probing.offset_mm, radius if own.is_nozzle and height == 0.0 else 0.0)
+    own = Probe(offset_mm)
+    return Probe(offset_mm, radius if own.is_nozzle and height == 0.0 else 0.0)
 
 
 def _rules(machine: Machine) -> ProbingRules:

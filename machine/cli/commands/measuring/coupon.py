@@ -48,30 +48,28 @@ def write_program(request: CouponRequest, out: Path) -> int:
         refuse_to_overwrite(file, request.replace)
     check_outputs(Outputs(html=request.html, png=request.png))
     shape = _shape(request)
-    profile = load(*request.names, settings=(*request.settings, *UNSUPPORTED))
+    profile = load(*request.given.names, settings=(*request.given.settings, *UNSUPPORTED))
     chosen = factors(profile, request.vary)
     decomposition = coupon(shape, profile)
     profile = _with_settings_of_bars(profile, settings_of_bars(chosen))
     program = build(decomposition, profile, pictures=True)
     refuse_errors(program.run.errors, request.force)
     write_lines(out, program.lines)
-    write_bytes(sheet_file, sheet_text(empty_sheet(shape, request.names, chosen)).encode())
+    write_bytes(sheet_file, sheet_text(empty_sheet(shape, request.given.names, chosen)).encode())
     if request.html is not None:
         write_bytes(request.html, print_page(decomposition.name, program, profile))
     if request.png is not None:
         write_png(request.png, contact_sheet(decomposition, profile.machine))
     show(print_table(program, profile))
-    show(
-        f"print {out}, break the bars, note the loads in {sheet_file}\n"
-        f"then: tiltprint coupon {request.named} --measured {sheet_file}\n"
-    )
+    named = " ".join(f"--{kind} {name}" for kind, name in zip(KINDS, request.given.names, strict=True))
+    show(f"print {out}, break the bars, note the loads in {sheet_file}\nthen: tiltprint coupon {named} --measured {sheet_file}\n")
     return 0
 
 
 def evaluate_sheet(request: CouponRequest, measured: Path) -> int:
     """Find strengths and the settings that won from a filled sheet; save them, or only write them as a report."""
     sheet = read_sheet(measured)
-    for kind, told, name in zip(KINDS, (sheet.machine, sheet.material, sheet.process), request.names, strict=True):
+    for kind, told, name in zip(KINDS, (sheet.machine, sheet.material, sheet.process), request.given.names, strict=True):
         if told != name:
             raise ProfileError(f"{measured} is a sheet of {told}: --{kind} {told} is expected, not {name}")
     outcome = evaluate(sheet)
@@ -88,8 +86,8 @@ def evaluate_sheet(request: CouponRequest, measured: Path) -> int:
 
 def ask_for_loads(request: CouponRequest) -> int:
     """Ask a person for the loads one by one, tell what follows from them, save it."""
-    profile = load(*request.names, settings=request.settings)
-    sheet = empty_sheet(_shape(request), request.names, factors(profile, request.vary))
+    profile = load(*request.given.names, settings=request.given.settings)
+    sheet = empty_sheet(_shape(request), request.given.names, factors(profile, request.vary))
     for kind in ("material", "process"):
         refuse_to_overwrite(_own_profile(request, kind, {})[0], request.replace)
 
@@ -135,7 +133,7 @@ def _loads(reply: str, shape: Shape) -> tuple[float, ...]:
 def _save(request: CouponRequest, outcome: Outcome) -> None:
     """Strengths and what won in the user's own profiles, the files before beside them."""
     day = date.today()
-    before = load(*request.names, settings=request.settings).material
+    before = load(*request.given.names, settings=request.given.settings).material
     found = {"material": material_tables(outcome, before, day), "process": process_tables(outcome, day)}
     profiles = {kind: _own_profile(request, kind, tables) for kind, tables in found.items() if tables}
     for file, _ in profiles.values():
@@ -148,7 +146,7 @@ def _save(request: CouponRequest, outcome: Outcome) -> None:
 
 
 def _own_profile(request: CouponRequest, kind: str, tables: Mapping[str, Any]) -> tuple[Path, str]:
-    name = dict(zip(KINDS, request.names, strict=True))[kind]
+    name = dict(zip(KINDS, request.given.names, strict=True))[kind]
     return own_profile(kind, request.save or Path(name).stem, name, tables)
 
 

@@ -22,13 +22,23 @@ AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "worked out", "left"
 
 def import_profiles(request: ImportRequest) -> int:
     """Write the material and the process of a file, and say row by row what became of its settings."""
-    config = read_config(request.file, request.presets)
-    found = [imported(config, kind, request.name, request.file.stem) for kind in KINDS]
-    found = [profile for profile in found if any(row.taken for row in profile.rows)]
-    if not found:
-        raise ProfileError(f"profile {request.file}: none of its {len(config.entries)} settings has one like it here")
+    presets = {"process": request.process, "material": request.material, "printer": request.printer}
     if request.out is not None:
         check_folder(request.out)
+    config = read_config(request.file, presets)
+    for kind, name in (("process", config.process), ("material", config.material)):
+        if presets[kind] not in ("", name):
+            raise ProfileError(f"--{kind}-preset {presets[kind]}: {request.file} is no bundle that has presets to choose from")
+    found = [imported(config, kind, request.name, request.file.stem) for kind in KINDS]
+    rows = [row for profile in found for row in profile.rows]
+    if not rows:
+        raise ProfileError(f"profile {request.file}: none of its {len(config.entries)} settings has one like it here")
+    found = [profile for profile in found if any(row.taken for row in profile.rows)]
+    if not found:
+        raise ProfileError(
+            f"profile {request.file}: {len(rows)} of its {len(config.entries)} settings have one like them here, but no value of "
+            f"theirs can be taken, the first: {_row(rows[0])}"
+        )
     files = {profile.kind: _file(request, profile) for profile in found}
     for file in files.values():
         refuse_to_overwrite(file, request.replace)

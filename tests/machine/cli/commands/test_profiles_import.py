@@ -84,6 +84,27 @@ def test_a_file_that_is_not_there_is_one_sentence(capsys: pytest.CaptureFixture[
     assert "profile nowhere.ini: cannot be read (no such file or directory)" in capsys.readouterr().err
 
 
+def test_settings_whose_values_cannot_be_taken_are_no_strangers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "odd.ini").write_text("perimeters = many\nlayer_height = none\n")
+    assert main(["profiles", "import", str(tmp_path / "odd.ini")]) == 1
+    said = capsys.readouterr().err
+    assert "2 of its 2 settings have one like them here, but no value of theirs can be taken, the first: layer_height" in said
+
+
+@pytest.mark.parametrize(("options", "sentence"), [
+    (("-o", "config.ini"), "output config.ini is a file: a folder is expected"),
+    (("--process-preset", "FINE"), "--process-preset FINE: odd.ini is no bundle that has presets to choose from"),
+])  # fmt: skip
+def test_a_wrong_option_is_told_before_settings_that_cannot_be_taken(
+    options: tuple[str, ...], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("config.ini").write_text(CONFIG)
+    Path("odd.ini").write_text("perimeters = many\n")
+    assert main(["profiles", "import", "odd.ini", *options]) == 1
+    assert sentence in capsys.readouterr().err
+
+
 @pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="PrusaSlicer is not installed")
 def test_a_piece_has_the_widths_heights_speeds_and_temperatures_that_prusaslicer_gives_it(tmp_path: Path) -> None:
     import_profiles(request(tmp_path))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from machine.cli.terminal.advice import advice
+from machine.cli.commands.decompose import advice
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from profiles.profile import load

@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from machine.cli.terminal import keys as keys_module
-from machine.cli.terminal.keys import ALONE_S, CANCELLING, HINT_S, LEAVING, MORE, SURE, Keyboard, Typing, can_type, typing
+from machine.cli.terminal.keys import ALONE_S, CANCELLING, HINT_S, LEAVING, MORE, SURE, Keyboard, can_type, typing
 from machine.link.pending_commands import Command, Control, PendingCommand
 from machine.link.print_state import PrintStatus
 from tests.machine.peers import PATIENCE_S
@@ -136,7 +136,7 @@ def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 def test_keys_come_as_they_are_pressed_and_arrows_are_none(keyboard: int) -> None:
     pressed = Pressed()
-    with Typing(pressed):
+    with typing(pressed):
         os.write(keyboard, b"p")
         assert pressed.wait_for(1) == "p"
         os.write(keyboard, b"\x1b[C\x1bOP\x1b[15~r")
@@ -146,7 +146,7 @@ def test_keys_come_as_they_are_pressed_and_arrows_are_none(keyboard: int) -> Non
 @pytest.mark.parametrize(("begin", "rest"), [(b"p\x1b", b"[Cr"), (b"p\x1b[", b"Cr"), (b"p\x1bO", b"Pr"), (b"p\x1b[15", b"~r")])
 def test_an_arrow_that_comes_in_pieces_is_no_key_either(keyboard: int, begin: bytes, rest: bytes) -> None:
     pressed = Pressed()
-    with Typing(pressed):
+    with typing(pressed):
         os.write(keyboard, begin)
         assert pressed.wait_for(1) == "p"
         os.write(keyboard, rest)
@@ -154,7 +154,7 @@ def test_an_arrow_that_comes_in_pieces_is_no_key_either(keyboard: int, begin: by
 
 
 def test_ctrl_c_still_interrupts_and_ctrl_z_does_nothing(keyboard: int) -> None:
-    with Typing(Pressed()):
+    with typing(Pressed()):
         settings = termios.tcgetattr(sys.stdin.fileno())
     assert not settings[3] & (termios.ICANON | termios.ECHO)
     assert settings[3] & termios.ISIG
@@ -162,7 +162,7 @@ def test_ctrl_c_still_interrupts_and_ctrl_z_does_nothing(keyboard: int) -> None:
 
 
 def _interrupted() -> None:
-    with Typing(Pressed()):
+    with typing(Pressed()):
         raise KeyboardInterrupt
 
 
@@ -175,7 +175,7 @@ def test_the_terminal_is_as_before_on_every_way_out(keyboard: int) -> None:
 
 def test_no_thread_is_left(keyboard: int) -> None:
     before = set(threading.enumerate())
-    with Typing(Pressed()):
+    with typing(Pressed()):
         pass
     assert set(threading.enumerate()) <= before
 
@@ -184,7 +184,7 @@ def test_a_terminal_that_goes_away_ends_the_reading_of_keys_and_is_no_error(monk
     fingers, terminal = pty.openpty()
     with os.fdopen(terminal, "r") as stdin:
         monkeypatch.setattr(sys, "stdin", stdin)
-        with Typing(Pressed()):
+        with typing(Pressed()):
             reader = next(thread for thread in threading.enumerate() if thread.name == "keys")
             os.close(fingers)
             reader.join(PATIENCE_S)

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from machine import notices
-from machine.cli.terminal import progress
+from machine.cli import cli
+from machine.cli.terminal import keys
 from machine.notices import PLAIN_AGAIN_S, PLAIN_EVERY_S, PlainLines
 from mdp.kernels import threads
 from mdp.save import stl
@@ -40,8 +41,8 @@ def test_on_a_terminal_the_work_under_way_is_one_live_line_that_goes_away(tmp_pa
 def test_the_thread_that_draws_a_live_line_does_not_keep_work_from_being_shared_out_to_copies(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(progress, "is_terminal", lambda: True)
+    monkeypatch.setattr(keys, "is_terminal", lambda: True)
     alone = threading.active_count()
-    with progress.progress():
+    with cli.progress():
         assert threading.active_count() == alone + 1
         assert threads.come_to_rest()

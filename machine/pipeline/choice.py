@@ -1,0 +1,91 @@
+"""Choice: by what a search chooses how a model lies and into which parts it is cut, and in words what was chosen."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from machine.pipeline.requests import ModelRequest
+from machine.planning.fit import check_parts
+from machine.quantities import minutes
+from mdp.cost.footing import BuildPlate
+from mdp.decomposition import FrontRow, Part
+from mdp.directions.orientation import in_words, side_in_words
+from mdp.mesh import Floats, Mesh
+from mdp.pose import turned_further
+from mdp.search.front import Price, Pricing
+from mdp.search.orient import Oriented
+from mdp.search.plan_file import PlanFile
+from profiles.errors import UserError
+from profiles.messages import key_name
+from profiles.profile import Profile
+from slicer.estimate.estimate import estimate
+
+HARDLY_HELD = (
+    f"its base may be too small to hold it: think of a wide brim ({key_name('process.brim_mm')}) or another "
+    f"side ({key_name('process.rotate_deg')})"
+)
+
+
+def pricing(profile: Profile) -> Pricing:
+    """What parts take to print by this profile; None for parts that cannot be sliced or that the machine has no room for."""
+
+    def price(parts: Sequence[Part]) -> Price | None:
+        try:
+            check_parts(parts, profile)
+            guess = estimate(parts, profile)
+        except UserError:
+            return None
+        return guess.time_s, guess.filament_mm
+
+    return price
+
+
+def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:
+    """Whether it is searched how the model lies: where the user asks for it, or nothing says how it lies, as a plan does."""
+    if request.orient is not None or given is not None:
+        return bool(request.orient) and given is None
+    return lies_freely(profile)
+
+
+def lies_freely(profile: Profile) -> bool:
+    """Whether a profile leaves it open how a model lies; turns and the paper's terms mean it as it is."""
+    return profile.search.effective.seam_mm > 0.0 and not any(profile.process.rotate_deg)
+
+
+def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
+    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it
+    lies; None: it was not turned."""
+    if orientation is None:
+        return profile
+    rotate_deg = turned_further(profile.process.rotate_deg, orientation)
+    return profile.model_copy(update={"process": profile.process.model_copy(update={"rotate_deg": rotate_deg})})
+
+
+def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
+    """How a model was laid down, what that is better by, and how to change it; nothing where it stays. Then a warning where the
+    plate hardly holds it."""
+    orientation, standing, laid = oriented.orientation, oriented.standing, oriented.decomposition.chosen
+    warning = () if oriented.held else (HARDLY_HELD,)
+    if orientation is None:
+        return warning
+    side, turns = side_in_words(orientation), in_words(orientation, held=True)
+    where, better = f"{side} ({turns})" if side else turns, ""
+    if laid is not None:
+        was = f"{oriented.upright.risky_mm2:.0f} mm² hang over" if standing is None else _with_scars(standing)
+        better = f": {_with_scars(laid)}, as it stands {was if oriented.upright_held else 'the plate would hardly hold it'}"
+    return (f"it is laid down {where}{better}; {otherwise}", *warning)
+
+
+def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
+    """A warning where the plate hardly holds a model as it stands."""
+    return () if BuildPlate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
+
+
+def _with_scars(row: FrontRow) -> str:
+    taking = "" if row.time_s is None else f" in {minutes(row.time_s)}"
+    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm² of scars{taking}"
+
+
+def in_parts(count: int) -> str:
+    """A number of parts in words."""
+    return "in one piece" if count == 1 else f"in {count} parts"
