@@ -162,6 +162,8 @@ def _wrong_value(error: TyperException) -> str:
     if not option or not problems:
         return ""
     problem = problems[0]
+    if str(problem["input"]).strip("+-").lower() == "nan":  # which fails at any bound
+        return f"{option} is nan: it must be a number"
     expected = EXPECTED.get(problem["type"], problem["msg"]).format(**problem.get("ctx", {}))
     return f"{option} is {problem['input']!r}: it must be {expected}"
 

@@ -1,4 +1,4 @@
-"""Output: files appear whole or not at all, and stdout carries results only."""
+"""Output: files appear whole or not at all, none is written over one that is read, and stdout carries results only."""
 
 import json
 import os
@@ -9,13 +9,19 @@ from pathlib import Path
 from typing import Any
 from unicodedata import normalize
 
-from machine.pipeline.requests import STDOUT, Outputs
+from machine.pipeline.requests import STDOUT, ModelRequest, Outputs
 from mdp.decomposition import Decomposition
+from mdp.model_file import DEMO
+from mdp.ranking import SUFFIX
 from mdp.save import FOLDER_FILES, HEADING, PART_FILES, glb, part_file, stl, threemf
 from profiles.errors import OutputError, reason
 from profiles.files import PRIVATE, SHARED, write_whole
 from profiles.messages import option
+from profiles.places import is_file_name
 
+STREAMED = ("gcode", "json")  # outputs that can go to standard output
+PROGRAM = ".gcode"  # ends the name of a program that is kept beside its journal
+Role = tuple[str, Path | None]  # what the file is for, as a message says it, and its path; None: not asked for
 LONGEST_NAME, LONGEST_SUFFIX = 150, 20  # bytes, which a disk counts
 
 
@@ -52,10 +58,8 @@ def check_outputs(outputs: Outputs) -> None:
         check_folder(outputs.folder)
     if STDOUT in (outputs.gcode, outputs.json) and getattr(sys.stdout, "name", "") == os.devnull:  # see machine.cli.start
         raise OutputError("output -: standard output is closed")
-    streams = (None if file == STDOUT else file for file in (outputs.gcode, outputs.json))
-    files = (outputs.png, outputs.sheet, outputs.front, outputs.record, outputs.html, outputs.svg, outputs.plan)
-    for file in (*files, *streams):
-        if file is not None:
+    for name, file in outputs.files.items():
+        if file is not None and (file != STDOUT or name not in STREAMED):
             check_writable(file)
 
 
@@ -183,3 +187,80 @@ def _drop_earlier_parts(folder: Path, parts: int) -> None:
     for file in folder.glob(PART_FILES):
         if file.name not in now and file.is_file() and file.open("rb").read(len(HEADING)) == HEADING:
             delete(file)
+
+
+def check_model_files(request: ModelRequest, written: Iterable[Role], *also_read: Role) -> None:
+    """Raise OutputError for an output that cannot be written, and where a command would write over what it reads or one file
+    twice. written: files beside the outputs of the request."""
+    check_outputs(request.outputs)
+    read = [*_read_by(request), *also_read]
+    check_roles(read, (*_written(request.outputs), *written))
+    if request.outputs.folder is not None:
+        _check_folder(request.outputs.folder, read)
+
+
+def printing_files(log: Path | None, journal: Path | None) -> tuple[Role, ...]:
+    """The files that a print writes."""
+    program = None if journal is None else program_beside(journal)
+    return (option("log"), log), (option("journal"), journal), (f"the program beside {option('journal')}", program)
+
+
+def program_beside(journal: Path) -> Path:
+    """Where the program of a journal is kept when it is no file of its own."""
+    return journal.with_name(journal.name + PROGRAM)
+
+
+def check_roles(read: Iterable[Role], written: Iterable[Role]) -> None:
+    """Raise OutputError for a file that is read and written, or written twice. Two names of one file, by links or another
+    folder's name, are one file."""
+    known: dict[object, str] = {}
+    for role, path in read:
+        if path is not None and (same := _identity(path)) is not None:
+            known.setdefault(same, f"{role}, which is read")
+    for role, path in written:
+        if path is None or path == STDOUT or (same := _identity(path)) is None:
+            continue
+        if same in known:
+            raise OutputError(f"{role} {path} is the same file as {known[same]}: another name is expected")
+        known[same] = f"{role}, which is written too"
+
+
+def _identity(path: Path) -> object:
+    """What is the same for all names of a file; None for a device or a pipe, which keeps nothing."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return os.path.realpath(path)
+    return (status.st_dev, status.st_ino) if isfile(path) else None
+
+
+def _read_by(request: ModelRequest) -> list[Role]:
+    models = [("the model", Path(name)) for name in (request.model, *request.beside) if not name.startswith(DEMO)]
+    profiles = zip(("machine", "material", "process"), request.profile_names, strict=False)
+    ranker = Path(request.ranker) if request.ranker.endswith(SUFFIX) else None
+    own = [(option(kind), Path(name)) for kind, name in profiles if name is not None and is_file_name(name)]
+    plans = [(option("plan"), plan) for plan in request.plans]
+    return [
+        *models,
+        ("the project", request.project),
+        *plans,
+        (option("planes"), request.planes),
+        (option("ranker"), ranker),
+        *own,
+    ]
+
+
+def _written(outputs: Outputs) -> list[Role]:
+    label = {"gcode": "output", "html": "page"}
+    return [(label.get(name, option(name)), file) for name, file in outputs.files.items()]
+
+
+def _check_folder(folder: Path, read: Iterable[Role]) -> None:
+    """A folder's own files have fixed names: none of them may be one that is read."""
+    own = {_identity(folder / name): name for name in FOLDER_FILES}
+    own |= {_identity(file): file.name for file in folder.glob(PART_FILES)} if folder.is_dir() else {}
+    for role, path in read:
+        if role != option("plan") and path is not None and (name := own.get(_identity(path))) is not None:
+            raise OutputError(
+                f"output folder {folder} gets a file {name}, but that is {role}, which is read: another is expected"
+            )

@@ -48,6 +48,11 @@ class Outputs:
     record: Path | None = None
     plan: Path | None = None
 
+    @property
+    def files(self) -> dict[str, Path | None]:
+        """The files by the names of their fields."""
+        return {name: file for name, file in vars(self).items() if name not in ("folder", "layer")}
+
 
 @dataclass(frozen=True)
 class ModelRequest:

@@ -10,8 +10,7 @@ from time import time
 
 from machine.gcode.lines import GcodeFile
 from machine.link.journal import LONGEST_BYTES, Checkpoint, Journal, JournalHeading, is_being_printed, read_journal
-from machine.pipeline.file_roles import PROGRAM, program_beside
-from machine.pipeline.output import write_lines
+from machine.pipeline.output import PROGRAM, program_beside, write_lines
 from profiles.errors import JournalError, OutputError, reason
 from profiles.folders import state_folder
 from profiles.profile import Profile

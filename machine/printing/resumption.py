@@ -36,7 +36,7 @@ from machine.link.resume import (
 )
 from machine.link.status import PrinterStatus
 from machine.notices import say
-from machine.pipeline.file_roles import check_roles, printing_files
+from machine.pipeline.output import check_roles, printing_files
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_dialect
 from machine.printing.destination import SerialPort, Simulated, at_printer

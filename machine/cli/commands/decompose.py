@@ -8,8 +8,7 @@ from machine.notices import show
 from machine.pipeline import compilers
 from machine.pipeline.choice import in_parts
 from machine.pipeline.comparison import alternatives_json, compare_with_one_part
-from machine.pipeline.file_roles import check_model_files
-from machine.pipeline.output import PLAN, check_outputs, save_parts, write_bytes, write_json
+from machine.pipeline.output import PLAN, check_model_files, save_parts, write_bytes, write_json
 from machine.pipeline.pictures import contact_sheet, front_picture, parts_picture, write_png
 from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.project import with_meshes
@@ -26,7 +25,6 @@ from profiles.profile import Profile
 def decompose(request: ModelRequest) -> int:
     """Find the parts of a model and save what is asked for; to compare them they are sliced, and the model in one part."""
     outputs = request.outputs
-    check_outputs(outputs)
     check_model_files(request, ())
     decomposed = decompose_model(request)
     decomposition, profile = decomposed.decomposition, decomposed.profile

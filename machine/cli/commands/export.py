@@ -8,8 +8,7 @@ from machine.cli.terminal.report import compare_table, joints_table, print_price
 from machine.dryrun.dryrun import summary
 from machine.notices import say_lines, show
 from machine.pipeline.comparison import alternatives_json, compare_with_one_part
-from machine.pipeline.file_roles import check_model_files
-from machine.pipeline.output import check_outputs, check_writable, write_bytes, write_json, write_lines
+from machine.pipeline.output import check_model_files, check_writable, write_bytes, write_json, write_lines
 from machine.pipeline.pictures import parts_together, png_bytes
 from machine.pipeline.pipeline import Decomposed, decompose_model
 from machine.pipeline.programs import load_program, refuse_errors
@@ -32,7 +31,6 @@ def export(request: ModelRequest) -> int:
     outputs = request.outputs
     if outputs.gcode == outputs.json == STDOUT:
         raise OutputError("-o - and --json -: only one of them can go to standard output")
-    check_outputs(outputs)
     check_model_files(request, ())
     part, layer = parse_layer(outputs.layer, outputs.svg is not None)
     loaded = load_program(request, pictures=True)

@@ -10,8 +10,7 @@ from machine.cli.terminal.at_terminal import AtTerminal, exit_code
 from machine.cli.terminal.report import print_table
 from machine.cli.terminal.requests import PrintOptions, ResumeOptions, WatchOptions
 from machine.notices import plain_line, say, show
-from machine.pipeline.file_roles import check_model_files, printing_files, program_beside
-from machine.pipeline.output import check_writable
+from machine.pipeline.output import check_model_files, check_writable, printing_files, program_beside
 from machine.pipeline.programs import LoadedProgram, load_program
 from machine.pipeline.requests import ModelRequest
 from machine.printing.destination import Destination, Server, parse_destination, parse_server_address

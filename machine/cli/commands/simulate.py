@@ -10,8 +10,7 @@ from machine.cli.terminal.report import agreement_line, print_price, print_table
 from machine.dryrun.dryrun import summary
 from machine.firmware.firmware import check_baud
 from machine.notices import show
-from machine.pipeline.file_roles import check_model_files
-from machine.pipeline.output import check_outputs, write_bytes, write_json
+from machine.pipeline.output import check_model_files, write_bytes, write_json
 from machine.pipeline.programs import load_program
 from machine.pipeline.project import open_project
 from machine.pipeline.requests import STDOUT, ModelRequest
@@ -25,7 +24,6 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     reference: the model that a G-code file's plastic is held against. baud: of a line whose speed is judged too.
     """
     outputs = request.outputs
-    check_outputs(outputs)
     check_model_files(request, (), ("--model", None if reference is None else Path(reference)))
     if baud is not None:
         check_baud(baud)

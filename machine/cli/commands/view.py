@@ -5,8 +5,7 @@ from pathlib import Path
 
 from machine.notices import plain_line, say, show
 from machine.pipeline.comparison import compare_with_one_part
-from machine.pipeline.file_roles import check_model_files
-from machine.pipeline.output import check_writable, write_bytes
+from machine.pipeline.output import check_model_files, check_writable, write_bytes
 from machine.pipeline.programs import load_program
 from machine.pipeline.requests import ModelRequest
 from machine.program import Program

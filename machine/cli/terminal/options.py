@@ -72,7 +72,8 @@ def _value(name: str, annotation: Any, given: Mapping[str, Any]) -> Any:
     if _is_group(annotation):
         return annotation(**{field.name: _value(field.name, field.type, given) for field in fields(annotation)})
     if isinstance(given[name], float) and isnan(given[name]):  # no bound refuses it
-        raise typer.BadParameter(f"{get_args(annotation)[1].param_decls[-1]} is nan: it must be a number")
+        asked = get_args(annotation)[1]  # to typer the first name is the default
+        raise typer.BadParameter(f"{(asked.default, *asked.param_decls)[-1]} is nan: it must be a number")
     return tuple(given[name] or ()) if _is_repeatable(annotation) else given[name]
 
 

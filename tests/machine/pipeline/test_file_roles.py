@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from machine.cli.cli import main
-from machine.pipeline.file_roles import check_roles
+from machine.pipeline.output import check_roles
 from machine.printing.journal_folder import new_journal
 from mdp.save import stl
 from profiles.errors import OutputError

@@ -105,6 +105,7 @@ def test_options_that_do_not_go_together_are_refused(
         (["--machine", "three_axis", "--port", "sim"], "there is no rotary axis to calibrate"),
         (["--machine", "generic_ac", "--port", "sim", "--mark-height", "5"], "has its centre higher up"),
         (["--port", "sim", "--mark-height", "nan"], "--mark-height is nan: it must be a number"),
+        (["--port", "sim", "--mark-radius", "nan"], "--mark-radius is nan: it must be a number"),
         (["--machine", "generic_ac", "--port", "sim", "--mark-radius", "300"], "a mark 300 mm from the middle cannot be used"),
     ],
 )
