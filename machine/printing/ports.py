@@ -27,7 +27,7 @@ from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 from profiles.files import lock
 from profiles.folders import state_folder
 from profiles.machine import Machine
-from profiles.messages import advice, phrase
+from profiles.messages import advice, phrase, terminal_words
 
 ECHO = ("M114", "M115")
 STARTING_S, STARTING_AGAIN_S = 60.0, 5.0  # Klipper takes 5 to 20 s until its boards are connected
@@ -210,7 +210,7 @@ def port_json(report: PortReport) -> dict[str, Any]:
         "firmware": answer.firmware if answer is not None and answer.kind is Kind.PRINTER else None,
         "axes": list(answer.letters) if answer is not None else [],
         "limits": {letter: list(limits) for letter, limits in answer.limits.items()} if answer is not None else {},
-        "trouble": report.trouble or None,
+        "trouble": terminal_words(report.trouble) or None,
     }
 
 

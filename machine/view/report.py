@@ -25,7 +25,7 @@ from mdp.joint import Joint, weakest_of
 from mdp.mesh import Floats
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
-from profiles.messages import option
+from profiles.messages import terminal_words
 from profiles.places import OF_KIND, shipped
 from profiles.profile import DEFAULTS, SECTIONS, Profile, load_one, rows
 
@@ -167,7 +167,7 @@ def _front(decomposition: Decomposition) -> list[Table]:
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
         rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
     notes = [f"taken: {row.reason}" for row in front if row.chosen]
-    notes.append(f"{option('parts')} takes another row; time and filament are estimates")
+    notes.append("--parts takes another row; time and filament are estimates")
     return [
         _table("In how many parts", ["parts", "support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "m"], rows, notes)
     ]
@@ -207,7 +207,7 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
     whole = decomposition.risky_area_mm2
     rows = [[name, f"{max(area, 0.0):.1f}", _share(whole - area, whole)] for name, area in risky_mm2]
     rows[0][2] = ""
-    notes = [f"best single orientation: {in_words(best)}", f"{option('compare')} tells time and material too"]
+    notes = [f"best single orientation: {in_words(best)}", "--compare tells time and material too"]
     return _table(COMPARED, ["print", "risky mm²", "less"], rows, notes)
 
 
@@ -222,7 +222,7 @@ def _alternatives(alternatives: Sequence[Alternative]) -> Table:
             scars = [f"{way.seam_mm:.0f}", f"{way.stairs_mm2:.0f}", str(way.findings)]
             costs = [duration(way.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
         columns.append([*costs, f"{max(way.risky_mm2, 0.0):.1f}"])
-    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
+    notes = [f"{way.name}: {terminal_words(note)}" for way in alternatives for note in (way.orientation, way.message) if note]
     rows = [[cost, *values] for cost, *values in zip(COSTS, *columns, strict=True)]
     return _table(COMPARED, ["", *(way.name for way in alternatives)], rows, notes)
 

@@ -158,7 +158,7 @@ def run(row: Row, path: Path, settings: Settings) -> tuple[Row, bytes]:
             return replace(row, excluded=NO_SIDE, seconds=round(process_time() - began, 2)), b""
         decomposition = decompose(resting, row.id, profile, SearchRequest(on_record=records.append))
     except UserError as error:
-        return replace(row, excluded=f"{FAILED}{error}", seconds=round(process_time() - began, 2)), b""
+        return replace(row, excluded=f"{FAILED}{error!s}", seconds=round(process_time() - began, 2)), b""
     late = int(settings.time_limit_s is not None and decomposition.search_s >= settings.time_limit_s)
     row = replace(row, candidates=decomposition.candidates_evaluated, late=late, seconds=round(process_time() - began, 2))
     with np.load(io.BytesIO(records[0])) as record:

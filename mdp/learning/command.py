@@ -32,7 +32,7 @@ def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str
     try:
         command(arguments)
     except UserError as error:
-        sys.stderr.write(f"error: {error}\n")
+        sys.stderr.write(f"error: {error!s}\n")
         return 1
     except ModuleNotFoundError as error:
         sys.stderr.write(f"error: {error.name} is not installed; in a clone: pip install -e '.[train]'\n")

@@ -12,16 +12,13 @@ from mdp.mesh import colour_text
 from mdp.plane import Plane
 from mdp.search.plan_file import ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, height_range
 from mdp.zone import AnyZone, Grown, MeshVolume, Modifier, Painted, Zone
-from profiles.messages import option
 
 
 def plan_text(plan: PlanFile, folder: Path | None = None) -> str:
     """The content of a plan's file. folder: where it will lie; None: anywhere, the files that it names have whole paths."""
     document = tomlkit.document()
     count = len(plan.parts) + 1
-    document.add(
-        tomlkit.comment(f"How a model is cut into {count} part{'s' * (count > 1)}, in print order; use it with {option('plan')}.")
-    )
+    document.add(tomlkit.comment(f"How a model is cut into {count} part{'s' * (count > 1)}, in print order; use it with --plan."))
     document["version"] = VERSION
     document["model"] = plan.model
     document["sha256"] = plan.sha256

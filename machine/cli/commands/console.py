@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import threading
@@ -17,7 +16,8 @@ from machine.firmware import dialect_of
 from machine.firmware.firmware import check_baud
 from machine.link.protocol import events
 from machine.notices import say, show
-from machine.pipeline.output import check_writable
+from machine.pipeline.output import check_writable, write_json
+from machine.pipeline.requests import STDOUT
 from machine.printing.command_session import CommandSession, LeftError, StopError
 from machine.printing.destination import parse_printer
 from machine.printing.ports import (
@@ -343,6 +343,8 @@ def ports(baud: int, as_json: bool, ask: bool) -> int:
     elif ask:
         say(f"asking {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {LONGEST_S:.0f} s")
     reports = ask_ports(devices, baud, threading.Event()) if ask else [PortReport(device) for device in devices]
-    text = json.dumps([port_json(report) for report in reports], indent=2) + "\n"
-    show(text if as_json else "".join(describe(report) for report in reports))
+    if as_json:
+        write_json(STDOUT, [port_json(report) for report in reports])
+    else:
+        show("".join(describe(report) for report in reports))
     return 0

@@ -79,7 +79,7 @@ def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
                 try:
                     picture, kind = await asyncio.to_thread(fetch_picture, job.state.webcam)
                 except ServerError as error:
-                    return Response(f"{error}\n", 502)
+                    return Response(f"{error!s}\n", 502)
                 return Response(picture, media_type=kind, headers={"cache-control": "no-store"})
         return Response("there is no camera at this print\n", 404)
 

@@ -113,9 +113,11 @@ UNMARKED = {
     "machine/cli": "messages of commands, which no page shows",
     "machine/notices.py": "what the terminal's front end adds to a forced error",
     "machine/view/parts.py": "a command to copy",
+    "machine/view/report.py": "notes in a file, which name the options of the command that wrote it",
     "machine/workbench/bench/page_words.py": "the names of marks",
     "machine/workbench/bench/settings.py": "a command to copy",
     "mdp/learning": "tools of their own, whose options these are",
+    "mdp/search/plan_writing.py": "the head of a plan file",
     "profiles/messages.py": "the marks themselves",
     "profiles/search.py": "the description of a key, which --help and the page show alike",
 }

@@ -117,7 +117,7 @@ class KeyedTouches:
             try:
                 moved, problem = pressed(jog, key, machine, pose), ""
             except MoveError as error:
-                problem = f"- {error}"
+                problem = f"- {error!s}"
                 continue
             if moved.at_mm[:2] != jog.at_mm[:2]:
                 mover.cross(*moved.at_mm[:2])

@@ -59,7 +59,7 @@ def _ask(questions: Sequence[Question[Answer]], index: int, answers: list[Answer
         try:
             answers[index] = question.parse(reply)
         except ProfileError as error:
-            sys.stdout.write(f"  {error}\n")
+            sys.stdout.write(f"  {error!s}\n")
         else:
             return index + 1
 

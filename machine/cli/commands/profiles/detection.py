@@ -18,6 +18,7 @@ from machine.setup.detect.found import ConfigText, Found
 from machine.setup.detect.proposal import CALIBRATED, Proposal, propose, read, settings_of
 from profiles.errors import ProfileError, reason
 from profiles.machine import Machine
+from profiles.messages import terminal_words
 from profiles.places import own_folder
 from profiles.profile import DEFAULTS, load_one
 from profiles.toml_text import value_text
@@ -116,6 +117,6 @@ def _as_json(found: Found, proposal: Proposal, out: Path) -> str:
         "probe": found.probe,
         "not_told": list(proposal.absent),
         "only_measured": list(proposal.measured),
-        "notes": list(proposal.remarks),
+        "notes": [terminal_words(remark) for remark in proposal.remarks],
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
