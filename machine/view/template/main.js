@@ -1,24 +1,19 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
-import { cameraOf, CORNERS, handle, viewButtons } from "./camera.js";
-import { controlsOf } from "./controls.js";
-import { courseOf } from "./course.js";
-import { findingsOf } from "./findings.js";
-import { frontOf } from "./front.js";
-import { keysOf } from "./keys.js";
-import { layerTimes } from "./layer-times.js";
-import { layerSliders } from "./layers.js";
-import { follow } from "./live.js";
-import { add, carried, multiply, RAD, scaled, sub, turned, undone } from "./math.js";
-import { outsideOf } from "./outside.js";
-import { $, bells, duration, notice, themeSwitch } from "./page.js";
-import { cardOf, pictureOf } from "./picture.js";
-import { printOf } from "./print.js";
-import { readoutsOf } from "./readouts.js";
-import { showReport } from "./report.js";
-import { sceneOf } from "./scene.js";
-import { standing } from "./stage.js";
-import { textOf } from "./text.js";
+import { $, bells, duration, notice, themeSwitch } from "./elements.js";
+import { cardOf, pictureOf } from "./moves/picture.js";
+import { printOf } from "./moves/rows.js";
+import { sceneOf } from "./moves/scene.js";
+import { standing } from "./moves/stage.js";
+import { controlsOf, readoutsOf } from "./panel/controls.js";
+import { courseOf, keysOf } from "./panel/course.js";
+import { findingsOf } from "./panel/findings.js";
+import { layerSliders, layerTimes } from "./panel/layers.js";
+import { follow, outsideOf } from "./panel/outside.js";
+import { frontOf, showReport } from "./panel/report.js";
+import { textOf } from "./panel/text.js";
+import { cameraOf, CORNERS, handle, viewButtons } from "./picture/camera.js";
+import { add, carried, multiply, RAD, scaled, sub, turned, undone } from "./picture/math.js";
 
 async function main() {
   const gl = cardOf($("canvas")), text = $("tiltprint").textContent.trim();

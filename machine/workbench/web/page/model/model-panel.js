@@ -1,0 +1,113 @@
+// Model panel: the file, how it is turned, what overhangs then, the ways it rests, and how large it stands on the platform.
+
+import { $ } from "../../../../view/template/elements.js";
+import { send } from "../line.js";
+import { alike, button, fill, listen, listIn, mm2, sayIn, tellIn } from "../lists.js";
+import { turnedFurther } from "../scene/triangles.js";
+import { onNew, onState, store, subscribe, update } from "../store.js";
+import { unitButtons } from "../told.js";
+import { offer, takeFiles } from "./benches.js";
+
+const TURNS = ["x", "y", "z"];
+
+export function modelPanel() {
+  listen("change", {
+    file: () => { takeFiles([...$("file").files]); $("file").value = ""; },
+    demo: () => { if ($("demo").value) send({ do: "demo", name: $("demo").value }); },
+  });
+  const by = () => TURNS.map((axis) => Number($(`turn-${axis}-typed`).value));
+  const turn = () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); };
+  for (const axis of TURNS) {
+    const slider = $(`turn-${axis}`), typed = $(`turn-${axis}-typed`);
+    const follow = (from, to) => () => { to.value = from.value; update({ turning: turnedFurther(store.state.rotation, by()) }); };
+    slider.addEventListener("input", follow(slider, typed));
+    typed.addEventListener("input", follow(typed, slider));
+    for (const input of [slider, typed]) input.addEventListener("change", turn);
+  }
+  document.querySelectorAll("[data-turn]").forEach(({ dataset }, k, all) => all[k].addEventListener("click", () => send({ do: "turn", axis: dataset.turn, deg: Number(dataset.deg) })));
+  listen("click", { "as-read": () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }) });
+  dropping();
+  offer("left");
+  onNew(({ rotation }) => rotation, () => TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; }));
+  onState((state) => {
+    const { model, overhang_mm2: area } = state;
+    if (!model) return;
+    if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
+    listIn("model-notes", model.notes);
+    tellTiny(state);
+    tellFile(model);
+    if (area !== null) $("overhang").textContent = mm2(area);
+  });
+  subscribe(tellModel);
+}
+
+const TINY_MM = 10, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a model that is smaller is rarely meant so; the largest that is printed
+const GLTF = /\.(glb|gltf)$/i; // its metres have y up
+
+/** Asks for the unit of a model that is very small. */
+function tellTiny({ model }) {
+  const most = Math.max(...model.size_mm), known = GLTF.test(model.name) ? ["metres"] : Object.keys(UNITS);
+  const words = known.filter((unit) => most * UNITS[unit] <= MOST_MM);
+  $("tiny").hidden = most >= TINY_MM || !words.length;
+  $("tiny-told").textContent = `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?`;
+  unitButtons($("tiny-units"), words, (unit) => {
+    if (GLTF.test(model.name)) send({ do: "set", key: "process.rotate_deg", value: "[90, 0, 0]" });
+    send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) });
+  });
+}
+
+/** The plates of a slicer file to choose from, and whether it keeps settings. */
+function tellFile({ plates, has_settings: has, settings_note: note }) {
+  const shown = plates.length > 1 ? plates : [];
+  if ($("plates").dataset.shown !== JSON.stringify(shown)) $("plates").replaceChildren(...shown.map(({ number, name, taken }) =>
+    button(`Plate ${number}${name && ` (${name})`}`, () => send({ do: "plate", plate: number }), { ariaPressed: String(taken), disabled: taken })));
+  $("plates").dataset.shown = JSON.stringify(shown);
+  $("inside").hidden = !has;
+  sayIn("file-settings-note", note);
+}
+
+const scaleBy = (factor) => String(Number((store.state.scale * factor).toPrecision(9)));
+
+/** A file may be dropped anywhere on the page. */
+function dropping() {
+  const over = (whether) => $("scene").classList.toggle("over", whether);
+  addEventListener("dragover", (event) => { event.preventDefault(); over(true); });
+  addEventListener("dragleave", () => over(false));
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    over(false);
+    takeFiles([...event.dataTransfer.files]);
+  });
+}
+
+/** Sides along the platform's axes as the model stands, or a hand turns it; as it is read where neither is known. */
+export const sizeOf = ({ standing, model }) => ((!store.turning && standing) || store.seen || model).size_mm;
+
+function tellModel({ state: { model, standing } }) {
+  if (model) tellIn("model-told", [
+    ["name", model.name], ["faces", model.faces.toLocaleString("en")],
+    ["size", `${sizeOf({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
+  ]);
+}
+
+export function sizePanel() {
+  const sides = TURNS.map((axis) => $(`size-${axis}`));
+  const scale = (value) => send({ do: "set", key: "process.scale", value });
+  listen("change", { scale: () => scale(scaleBy(Number($("scale").value) / 100 / store.state.scale)) });
+  sides.forEach((side, k) => side.addEventListener("change", () => {
+    const { standing } = store.state;
+    if (standing) scale(scaleBy(Number(side.value) / standing.size_mm[k]));
+  }));
+  let shown = null; // the standing that was told last
+  listen("click", { "scale-as-read": () => scale(null) });
+  onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
+    if (!standing) return;
+    const fresh = problem !== before?.problem || !alike(standing, shown);
+    shown = standing;
+    const put = (input, value) => { if (fresh) input.value = value; else fill(input, value); };
+    put($("scale"), Number((100 * factor).toPrecision(6)));
+    sides.forEach((side, k) => put(side, standing.size_mm[k].toFixed(2)));
+    $("fit-told").textContent = standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
+    $("fit-told").classList.toggle("refused", Boolean(standing.problem));
+  });
+}

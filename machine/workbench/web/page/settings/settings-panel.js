@@ -1,0 +1,156 @@
+// Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
+// changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
+
+import { $, made } from "../../../../view/template/elements.js";
+import { ask, send } from "../line.js";
+import { alike, button, disable, hide, listen, pressed, putRows, tell } from "../lists.js";
+import { keptInTab, onState, store } from "../store.js";
+import { settingRow } from "./setting-row.js";
+
+const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
+const KINDS = ["machine", "material", "process"];
+const KIND_OF = { machine: "machine", material: "material", process: "process", search: "process" };
+const kept = keptInTab("settings", { level: "simple", folded: [] });
+
+export function settingsPanel() {
+  const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
+  const explained = new Set();
+  let settings = [], missed = false, changedOnly = false; // missed: they have not come
+  const part = () => Number($("settings-part").value) || 0;
+  const set = (key, value, typed) => {
+    const of = part();
+    ask(of ? { do: "set_part", part: of, key, value } : { do: "set", key, value }, (refusal) => {
+      if (of !== part()) return;
+      if (refusal) {
+        wrongs.set(key, { text: refusal, typed });
+        tellBeside();
+        list();
+      } else if (wrongs.delete(key)) fetchAll();
+    });
+  };
+  /** What is refused stands beside its field, whatever is told next. */
+  const tellBeside = () => {
+    const beside = [...wrongs.values()].some(({ text }) => text === store.state.problem);
+    if (beside && store.tab === "settings") $("problem").hidden = true;
+  };
+  const sought = () => $("search-settings").value.toLowerCase().split(/\s+/).filter(Boolean).map(stem);
+  const shown = (setting) => {
+    const marked = setting.changed || wrongs.has(setting.key), words = sought();
+    if (changedOnly) return marked && hasWords(setting, words);
+    return words.length ? hasWords(setting, words) : marked || LEVELS.indexOf(setting.level) <= LEVELS.indexOf(kept.now.level);
+  };
+  const list = () => {
+    const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0;
+    if (changedOnly && !changed.length) return showChanged(false);
+    tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : "No setting has these words.", "only-changed": `${changed.length} changed` });
+    disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
+    tellTakeBack(changed, part());
+    for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
+    const groups = groupedBy(rows, ({ group }) => group);
+    putRows([...groups].flatMap(([group, own]) => {
+      const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
+      const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key)]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
+      return [title, ...(folded ? [] : own.map(row))];
+    }), $("settings-list"));
+  };
+  const fold = (group, folded) => {
+    kept.keep({ folded: [...kept.now.folded.filter((name) => name !== group), ...(folded ? [group] : [])] });
+    list();
+  };
+  const showChanged = (only) => {
+    changedOnly = only;
+    pressed("only-changed", only);
+    list();
+  };
+  const fetchAll = async () => {
+    const asked = part(), answer = await fetch(`settings.json?part=${asked}`).catch(() => null);
+    missed = !answer; // the line is lost: the next state asks again
+    if (!answer?.ok || asked !== part()) return;
+    const told = await answer.json();
+    settings = told.settings;
+    showProfiles(told.profiles);
+    $("command-line").replaceChildren(...told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
+    $("command-field").hidden = !told.command;
+    list();
+  };
+  const partsToChoose = ({ parts, part_settings: own, model }) => {
+    const names = ["all parts", ...Array.from({ length: model ? Math.max(parts, 1) : 0 }, (_, k) => {
+      const keys = own.find((ofPart) => ofPart.part === k + 1)?.keys.length || 0;
+      return `part ${k + 1}${keys ? ` (${keys} of its own)` : ""}`;
+    })];
+    const chosen = part() < names.length ? part() : 0;
+    $("settings-part").replaceChildren(...names.map((text, k) => made("option", { text, value: k, selected: k === chosen })));
+  };
+  listen("input", { "search-settings": list });
+  listen("change", { "settings-part": () => { wrongs.clear(); fetchAll(); } });
+  listen("click", {
+    "only-changed": () => showChanged(!changedOnly), "copy-command": () => copyText($("command-line"), $("copy-command")),
+    "reset-settings": () => send(part() ? { do: "reset_part", part: part() } : { do: "reset" }),
+  });
+  for (const level of LEVELS) listen("click", { [`level-${level}`]: () => { kept.keep({ level }); list(); } });
+  for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
+  const ofSettings = ({ given, part_settings: own, parts, model, rotation, stops, copies } = {}) => [given, own, parts, model?.name, rotation, stops, copies];
+  onState((state, before) => {
+    const fresh = !before || !alike(ofSettings(state), ofSettings(before));
+    if (fresh) partsToChoose(state);
+    tellBeside();
+    if (fresh || missed) fetchAll();
+  });
+}
+
+function showProfiles(profiles) {
+  const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
+    const select = made("select", {}, ...names.map((text) => made("option", { text, value: text, selected: text === name })));
+    select.addEventListener("change", () => ask({ do: "profile", kind, name: select.value }, (refusal) => { if (refusal) select.value = name; }));
+    return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
+  });
+  putRows(rows, $("profiles-list"));
+}
+
+/** A word finds its plural, too, and the other way round. */
+const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); // a key stays whole
+
+/** The words by which a setting is found, those that say most first. */
+const textsOf = ({ key, label, title, synonyms, meaning, about }) => [`${label} ${key}`, synonyms, `${title} ${meaning} ${about}`].map((text) => text.toLowerCase());
+const hasWords = (setting, words) => words.every((word) => textsOf(setting).join(" ").includes(word));
+
+/** How late the words that are sought come: 0, where the label is these alone, 1, where it or the key has one. */
+function farFrom(setting, words) {
+  if (!words.length || setting.label.toLowerCase().split(/\s+/).map(stem).join(" ") === words.join(" ")) return 0;
+  return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));
+}
+
+function groupedBy(rows, nameOf) {
+  const groups = new Map();
+  for (const row of rows) groups.set(nameOf(row), [...(groups.get(nameOf(row)) || []), row]);
+  return groups;
+}
+
+/** Whose changes there are, with a button for each profile that has some, and one for all. */
+function tellTakeBack(changed, part) {
+  const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
+  for (const kind of KINDS) {
+    const count = counts.get(kind)?.length || 0;
+    tell({ [`reset-${kind}`]: `Those of the ${kind} (${count})` });
+    hide({ [`reset-${kind}`]: part > 0 || !count || counts.size < 2 });
+  }
+  const all = part ? `Take back what part ${part} has of its own` : counts.size === 1 ? `Take the changes of the ${[...counts.keys()][0]} back` : "Take all changes back";
+  tell({ "reset-settings": `${all} (${changed.length})` });
+}
+
+function groupTitle(own, folded, turn) {
+  const [{ group, title, about }] = own, told = JSON.stringify([title, own.length, folded]);
+  const more = { title: `${about}.`, ariaExpanded: String(!folded) }, words = () => [made("span", { text: title }), made("small", { text: own.length })];
+  return { id: `group ${group}`, told, make: () => made("h2", {}, button("", turn, more, ...words())) };
+}
+
+/** A text into the clipboard, or marked for the person to take where the browser allows no more. */
+async function copyText(element, button) {
+  const range = document.createRange();
+  range.selectNodeContents(element);
+  getSelection().removeAllRanges();
+  getSelection().addRange(range);
+  const copied = await navigator.clipboard?.writeText(element.textContent).then(() => true, () => false);
+  button.textContent = copied ? "Copied" : "Marked: copy it by Ctrl+C";
+  setTimeout(() => { button.textContent = "Copy"; }, 3000);
+}

@@ -1,0 +1,105 @@
+// Slices panel: copies and pauses, the parts sliced, what the print takes, what the dry run complains of, and what one piece would cost.
+
+import { $, made, swatch } from "../../../../view/template/elements.js";
+import { send } from "../line.js";
+import { alike, button, cross, disable, hide, listen, listIn, putTable, sayIn, tell, tellIn, toggle } from "../lists.js";
+import { onState, store, update } from "../store.js";
+
+export function slicesPanel(showFinding) {
+  listen("click", {
+    again: () => { update({ looking: false }); $("tab-slices").click(); send({ do: "slice" }); },
+    look: () => update({ looking: !store.looking }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
+  });
+  onState((state, before) => {
+    const { slicing, sliced } = state;
+    disable({ slice: Boolean(slicing) });
+    hide({ "stop-slicing": !slicing, "slicing-bar": !slicing });
+    tell({ "slicing-told": slicing ? slicing.text : "" });
+    showShares(slicing, state.colours);
+    toggle("no-slices", !sliced);
+    toggle("stale", sliced?.stale);
+    if (alike(sliced, before?.sliced)) return;
+    if (!sliced) update({ looking: false });
+    tellIn("sliced-told", sliced?.told || []);
+    if (sliced) showVerdict(sliced.verdict, showFinding);
+    putTable($("joints"), sliced?.joints || [], JOINT_HEAD, () => (sliced?.joints || []).map(([part, ...texts]) => rowOf(part, texts)));
+    showFindings(sliced, showFinding);
+  });
+}
+
+/** Whether it can be printed, in one sentence, with a button for what a button can do. */
+function showVerdict({ kind, text, finding, remedy }, showFinding) {
+  $("verdict").className = `sliced ${kind}`;
+  tell({ "verdict-told": `${text}.` });
+  hide({ "verdict-show": finding < 0, "verdict-print": kind !== "ready", "bar-print": kind !== "ready" });
+  sayIn("verdict-remedy", remedy?.text || "");
+  $("verdict-remedy").onclick = () => send(remedy.command);
+  $("verdict-show").onclick = () => showFinding(finding);
+}
+
+/** Of every part how much is sliced; the whole as one bar where there is one part. */
+function showShares(slicing, colours) {
+  const shares = slicing ? slicing.shares : [], ready = shares.filter((share) => share === 1).length;
+  if (shares.length) $("slicing-bar").value = shares.reduce((sum, share) => sum + share, 0) / shares.length;
+  else $("slicing-bar").removeAttribute("value");
+  $("slicing-ready").textContent = shares.length > 1 ? `${ready} of ${shares.length} parts sliced` : "";
+  $("slicing-parts").replaceChildren(...(shares.length > 1 ? shares : []).map((share, k) => {
+    const bar = made("progress", { max: 1, value: share });
+    bar.setAttribute("aria-label", `part ${k + 1}`);
+    return made("li", { className: share === 1 ? "ready" : "" }, swatch(colours[k]), `part ${k + 1}`, bar);
+  }));
+}
+
+const JOINT_HEAD = [["joint of part"], ["area"], ["contact"], ["plastic"], ["seam"], ["breaks at"]];
+
+const rowOf = (title, texts) => made("tr", {}, made("th", { text: title, scope: "row" }), ...texts.map((text) => made("td", { text })));
+
+function showFindings(sliced, showFinding) {
+  const { findings = [], more_findings: more = 0 } = sliced || {};
+  $("no-findings").hidden = !sliced || findings.length > 0;
+  const rows = findings.map((finding, k) => {
+    const { severity, code, message, part, layer, line } = finding;
+    const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
+    return made("li", {}, button("", () => showFinding(k), { className: severity },
+      made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? `${where}: show it` : "the whole print" })));
+  });
+  $("sliced-findings").replaceChildren(...rows, ...(more ? [made("li", { text: `and ${more} more, in the page of the print` })] : []));
+}
+
+export function stopsPanel() {
+  let adding = false; // what was typed stays until it is taken
+  listen("change", { copies: () => send({ do: "copies", count: Number($("copies").value) }) });
+  listen("submit", { "add-stop": (event) => {
+    event.preventDefault();
+    adding = true;
+    send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
+  } });
+  onState(({ copies, copies_told: told, stops, problem }, before) => {
+    $("copies-told").textContent = told;
+    if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
+    if (alike(stops, before?.stops)) return;
+    if (adding) $("stop-at").value = "";
+    adding = false;
+    const held = $("stops").contains(document.activeElement);
+    $("stops").replaceChildren(made("tbody", {}, ...stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 })))));
+    if (held) $("stop-at").focus(); // the row that had the focus is gone
+  });
+}
+
+function stopRow({ part, layer, height_mm: height, change }, remove) {
+  const kind = change ? "filament change" : "pause", where = layer === null ? `part ${part}, at ${height} mm` : `part ${part}, before layer ${layer}`;
+  return made("tr", {}, made("td", { text: kind }), made("td", { text: where }), made("td", {}, cross(`Remove the ${kind} of ${where}`, remove)));
+}
+
+export function comparePanel() {
+  onState(({ comparing, compared, sliced }, before) => {
+    disable({ compare: Boolean(comparing || compared.length || !sliced || sliced.stale) });
+    hide({ "stop-comparing": !comparing });
+    tell({ "comparing-told": comparing });
+    if (alike(compared, before?.compared)) return;
+    const [, standing, lying] = compared, shown = compared.filter((alternative) => alternative !== lying || lying.note !== standing.note);
+    putTable($("compared"), shown, [[""], ...shown.map(({ name }) => [name])], () => (
+      standing ? standing.figures.map(([title], k) => rowOf(title, shown.map(({ figures }) => figures[k][1]))) : []));
+    listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
+  });
+}
