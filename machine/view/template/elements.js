@@ -64,6 +64,19 @@ export function needsKey({ key, target: { tagName, type } }) {
   return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);
 }
 
+/** Has something done when the browser next draws, once however often it is asked for by then. */
+export function nextFrame(act) {
+  let asked = false;
+  const begin = () => {
+    asked = false;
+    act();
+  };
+  return () => {
+    if (!asked) requestAnimationFrame(begin);
+    asked = true;
+  };
+}
+
 /** Who is told what has changed: row, layers, colours, look. */
 export function bells() {
   const heard = new Map();

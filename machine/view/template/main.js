@@ -1,7 +1,7 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
 import { $, bells, duration, notice, themeSwitch } from "./elements.js";
-import { cardOf, pictureOf } from "./moves/picture.js";
+import { compileAll, pictureOf } from "./moves/picture.js";
 import { printOf } from "./moves/rows.js";
 import { sceneOf } from "./moves/scene.js";
 import { standing } from "./moves/stage.js";
@@ -13,10 +13,12 @@ import { follow, outsideOf } from "./panel/outside.js";
 import { frontOf, showReport } from "./panel/report.js";
 import { textOf } from "./panel/text.js";
 import { cameraOf, CORNERS, handle, viewButtons } from "./picture/camera.js";
-import { add, carried, multiply, RAD, scaled, sub, turned, undone } from "./picture/math.js";
+import { cardOf, sizeOf } from "./picture/gl.js";
+import { add, carried, cornersOf, multiply, RAD, scaled, sub, turned, undone } from "./picture/math.js";
 
 async function main() {
   const gl = cardOf($("canvas")), text = $("tiltprint").textContent.trim();
+  if (gl) compileAll(gl);
   $("tiltprint").textContent = "";
   const print = await printOf(text), { header, rows } = print;
   const ring = bells(), camera = cameraOf(), scene = sceneOf(print, ring);
@@ -61,8 +63,7 @@ function fitting(print, scene, camera, picture, ring) {
   const [least, most] = print.box, middle = scaled(add(least, most), 0.5);
   const work = () => standing(print.chain, scene.place, scene.riding).work;
   const fit = () => {
-    const corners = Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => print.box[(i >> axis) & 1][axis]));
-    camera.fit(corners.map((corner) => carried(work(), corner)), picture.canvas.clientWidth / Math.max(picture.canvas.clientHeight, 1));
+    camera.fit(cornersOf(print.box).map((corner) => carried(work(), corner)), sizeOf(picture.canvas));
     picture.ask();
   };
   let before = work();

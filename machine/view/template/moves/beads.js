@@ -2,9 +2,9 @@
 // Near: a prism of eight sides with a rounded shade, mitred where one bead follows the other, a blunt tip where it ends.
 // Far: a ribbon that faces the eye and is as wide as the bead's outline, in the light of its side and of its back.
 
-import { attribute, bufferOf, LIGHT, programOf } from "../picture/gl.js";
-import { bounds, carried, clamp } from "../picture/math.js";
-import { TEXELS } from "./rows.js";
+import { cornersOn, LIGHT, programOf } from "../picture/gl.js";
+import { bounds, clamp, cornersOf } from "../picture/math.js";
+import { once, TEXELS } from "./rows.js";
 
 const AT_ONCE = 4096; // beads in one draw
 const CLOSE_PIXELS = 3; // a bead this wide on the screen is drawn as a prism
@@ -109,7 +109,7 @@ flat in int slot;
 uniform bool picking;
 out vec4 colour;
 bool gap() { return paint.a == 0.0 && (int(gl_FragCoord.x) + int(gl_FragCoord.y)) % 3 != 0; }
-vec4 number() { return vec4(slot & 255, (slot >> 8) & 255, (slot >> 16) & 255, (slot >> 24) & 255) / 255.0; }
+vec4 number() { int k = slot + 1; return vec4(k & 255, (k >> 8) & 255, (k >> 16) & 255, (k >> 24) & 255) / 255.0; } // 0: none
 `;
 
 export const PAINT_NEAR = `${PAINT_HEAD}
@@ -164,31 +164,23 @@ export function beadsOf(gl, shapes, path) {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, path.texels / TEXELS, gl.RGBA, gl.UNSIGNED_BYTE, colours);
   };
   /** seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share}. */
-  const draw = (seen, ranges, moving, picking = false) => {
-    const shape = seen.pixels > CLOSE_PIXELS ? shapes.near : shapes.far, { to } = shape.program;
-    shape.program.use();
-    gl.bindVertexArray(shape.vao());
-    Object.entries(textures).forEach(([name, held], unit) => {
+  const draw = ({ toClip, toEye, eye, pixels }, ranges, moving, picking = false) => {
+    const { program, corners, indices, drawing } = pixels > CLOSE_PIXELS ? shapes.near : shapes.far;
+    Object.values(textures).forEach((held, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, held);
-      gl.uniform1i(to(name), unit);
     });
-    gl.uniformMatrix4fv(to("toClip"), false, seen.toClip);
-    gl.uniformMatrix4fv(to("toEye"), false, seen.toEye);
-    gl.uniform3fv(to("eye"), seen.eye);
-    gl.uniform1f(to("roundness"), clamp(seen.pixels / CLOSE_PIXELS - 0.25, 0, 1));
-    gl.uniform1i(to("picking"), picking ? 1 : 0);
-    gl.uniform1i(to("last"), moving.slot);
-    gl.uniform1f(to("share"), moving.share);
-    gl.uniform1i(to("corners"), shape.corners);
-    for (const { first, end, tint } of ranges) {
-      gl.uniform4fv(to("tint"), tint);
-      for (const [from, behind] of boxes.seen(seen.toClip, first, end)) {
-        gl.uniform1i(to("first"), from);
-        gl.drawElements(gl.TRIANGLES, (behind - from) * shape.indices, gl.UNSIGNED_INT, 0);
+    const units = Object.fromEntries(Object.keys(textures).map((name, unit) => [name, unit]));
+    const roundness = clamp(pixels / CLOSE_PIXELS - 0.25, 0, 1);
+    drawing().draw({ ...units, toClip, toEye, eye, roundness, picking, last: moving.slot, share: moving.share, corners }, () => {
+      for (const { first, end, tint } of ranges) {
+        program.set({ tint });
+        for (const [from, behind] of boxes.seen(toClip, first, end)) {
+          program.set({ first: from });
+          gl.drawElements(gl.TRIANGLES, (behind - from) * indices, gl.UNSIGNED_INT, 0);
+        }
       }
-    }
-    gl.bindVertexArray(null);
+    });
   };
   return { paint, draw };
 }
@@ -211,14 +203,9 @@ function boxesOfRuns({ slots, points }) {
 }
 
 /** Whether a box may be in the picture: not all of its corners lie beyond the same edge. */
-function inPicture(m, corners) {
-  let beyond = 15;
-  for (let i = 0; i < 8 && beyond; i++) {
-    const v = [corners[i & 1][0], corners[(i >> 1) & 1][1], corners[i >> 2][2]], [x, y] = carried(m, v);
-    const w = m[3] * v[0] + m[7] * v[1] + m[11] * v[2] + m[15];
-    beyond &= (x > w && 1) | (x < -w && 2) | (y > w && 4) | (y < -w && 8);
-  }
-  return !beyond;
+function inPicture(m, box) {
+  const corners = cornersOf(box).map(([x, y, z]) => [0, 1, 3].map((k) => m[k] * x + m[k + 4] * y + m[k + 8] * z + m[k + 12]));
+  return ![0, 1].some((axis) => [1, -1].some((sign) => corners.every((corner) => sign * corner[axis] > corner[2])));
 }
 
 /** Values by slot, TEXELS to a line. */
@@ -235,19 +222,13 @@ function texture(gl, inside, format, type, content, each) {
 /** One shape of a bead: its program, and the corners and triangles of as many beads as are drawn at once, made when first used. */
 function shapeOf(gl, program, { corners, faces }) {
   const each = corners.length / 4;
-  let vao = null;
-  const make = () => {
+  const drawing = once(() => {
     const all = new Float32Array(corners.length * AT_ONCE), indices = new Uint32Array(faces.length * AT_ONCE);
     for (let bead = 0; bead < AT_ONCE; bead++) {
       all.set(corners, bead * corners.length);
       for (let k = 0; k < faces.length; k++) indices[bead * faces.length + k] = bead * each + faces[k];
     }
-    vao = gl.createVertexArray();
-    gl.bindVertexArray(vao);
-    bufferOf(gl, indices, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    attribute(gl, program.at("corner"), bufferOf(gl, all), 4, gl.FLOAT, false);
-    gl.bindVertexArray(null);
-    return vao;
-  };
-  return { program, vao: () => vao || make(), corners: each, indices: faces.length };
+    return cornersOn(gl, program, { corner: [all, 4] }, indices);
+  });
+  return { program, drawing, corners: each, indices: faces.length };
 }

@@ -1,7 +1,7 @@
 // Colours: what the beads are coloured by, and the legend of each.
 
 import { clamp, mix } from "../picture/math.js";
-import { PLAIN, rgb } from "../picture/solids.js";
+import { PLAIN, rgb, wordOf } from "../picture/solids.js";
 import { KIND } from "./rows.js";
 
 const TYPES = [
@@ -17,8 +17,7 @@ function ramp(share) {
   const place = clamp(share, 0, 1) * (RAMP.length - 1), k = Math.min(Math.floor(place), RAMP.length - 2);
   return RAMP[k].map((x, axis) => mix(x, RAMP[k + 1][axis], place - k));
 }
-const STEPS = Array.from({ length: 256 }, (_, k) => packed(ramp(k / 255)));
-function packed([r, g, b]) { return (255 << 24 | Math.round(b) << 16 | Math.round(g) << 8 | Math.round(r)) >>> 0; }
+const STEPS = Array.from({ length: 256 }, (_, k) => wordOf(ramp(k / 255)));
 
 const bySpeed = (rows) => (i) => rows.speed[i] / 1000;
 const SCALES = {
@@ -63,12 +62,12 @@ function scaleOf(mode, rows, extra) {
 }
 
 function typesOf(rows) {
-  const words = rows.types.map((name) => packed(rgb(typeColour(name))));
+  const words = rows.types.map((name) => wordOf(rgb(typeColour(name))));
   return { colour: (i) => words[rows.type[i]], legend: null };
 }
 
 function partsOf(rows, { parts }) {
-  const words = new Map(parts.map((part) => [part.index, packed(rgb(part.colour))])), plain = packed(rgb(PLAIN));
+  const words = new Map(parts.map((part) => [part.index, wordOf(rgb(part.colour))])), plain = wordOf(rgb(PLAIN));
   const known = new Uint32Array(Math.max(0, ...parts.map((part) => part.index)) + 1).fill(plain);
   for (const [index, word] of words) known[index] = word;
   return { colour: (i) => known[rows.part[i]], legend: null };

@@ -2,9 +2,10 @@
 
 import { showLegend } from "../panel/controls.js";
 import { keepPicture } from "../panel/report.js";
-import { COARSE_SHARE, framesOf, outlive, programOf } from "../picture/gl.js";
-import { surfaceColours } from "../picture/model.js";
-import { LINE_FRAGMENT, LINE_VERTEX, rgb, SOLID_FRAGMENT, SOLID_VERTEX } from "../picture/solids.js";
+import { placeOn } from "../picture/camera.js";
+import { density, frameOf, outgrown, outlive, programOf, sizeOf } from "../picture/gl.js";
+import { ownInk, surfaceColours } from "../picture/model.js";
+import { LINE_FRAGMENT, LINE_VERTEX, SOLID_FRAGMENT, SOLID_VERTEX } from "../picture/solids.js";
 import { BEAD_FAR, BEAD_NEAR, PAINT_FAR, PAINT_NEAR } from "./beads.js";
 import { coloured } from "./colours.js";
 import { paceOf } from "./pace.js";
@@ -12,16 +13,10 @@ import { drawnRanges } from "./scene.js";
 import { bodiesOn, firstOf, paintCoarse, paintRest, slotAt, stageOf, viewOf } from "./stage.js";
 import { MARK_FRAGMENT, MARK_VERTEX } from "./ways.js";
 
-const USUAL_SAMPLES = { alpha: true, antialias: false, depth: false, powerPreference: "high-performance" }; // frames have their own
+const COARSE_SHARE = 0.6; // of the canvas' width and height, drawn while all moves slowly
 
-/** The canvas' WebGL2 with its programs on their way, or null. */
-export function cardOf(canvas) {
-  const gl = canvas.getContext("webgl2", USUAL_SAMPLES);
-  if (gl) compileAll(gl);
-  return gl;
-}
-
-function compileAll(gl) {
+/** Has the card compile all programs while the page reads the print. */
+export function compileAll(gl) {
   const pairs = [
     [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
   ];
@@ -41,7 +36,7 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
     painter.stage?.coarse.paint(colours);
     tell();
   };
-  const reds = () => painter.stage?.model?.paint(surfaceColours(print.surfaces, (part) => rgb(part.colour), redOf(scene)));
+  const reds = () => painter.stage?.model?.paint(surfaceColours(print.surfaces, ownInk, redOf(scene)));
   const build = () => {
     painter.build();
     colour();
@@ -54,14 +49,13 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
   bells.on("theme", () => { painter.dress(); pace.ask(); });
   bells.on("row layers look", pace.ask);
   bells.on("moving", pace.moved);
-  new ResizeObserver(() => { if (painter.outgrown()) pace.ask(); }).observe(canvas);
+  new ResizeObserver(() => { if (outgrown(canvas)) pace.ask(); }).observe(canvas);
   outlive(gl, painter.drop, build);
   addEventListener("beforeprint", () => {
     painter.begin();
     painter.step(Infinity);
     keepPicture(canvas);
   });
-  build();
   return { canvas, ask: pace.ask, moved: pace.moved, rowAt: (event) => print.path.row(painter.slotUnder(event)) };
 }
 
@@ -69,12 +63,9 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
 function painterOf(gl, print, scene, camera, showMarkers) {
   const { canvas } = gl, painter = { stage: null, shown: null };
   let frames = null, seen = null, left = [];
-  const density = () => Math.min(devicePixelRatio || 1, 2);
-  const room = (share) => [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density() * share), 1));
-  const look = (share) => ({ size: room(share), seen: viewOf(print, scene, camera, ...room(share), density() * share) });
-  painter.outgrown = () => room(1).some((x, k) => x !== [canvas.width, canvas.height][k]);
+  const look = (share) => ({ size: sizeOf(canvas, share), seen: viewOf(print, scene, camera, sizeOf(canvas, share), density() * share) });
   const show = (frame, now) => {
-    if (painter.outgrown()) [canvas.width, canvas.height] = room(1);
+    if (outgrown(canvas)) [canvas.width, canvas.height] = sizeOf(canvas);
     frame.show();
     painter.shown = now;
     showMarkers(now.work.toClip, canvas);
@@ -82,7 +73,7 @@ function painterOf(gl, print, scene, camera, showMarkers) {
   };
   painter.build = () => {
     painter.stage = stageOf(gl, print, scene.dark);
-    frames = framesOf(gl);
+    frames = { still: frameOf(gl, 4), moving: frameOf(gl, 0) }; // with smooth edges, and quick
   };
   painter.dress = () => { if (painter.stage) painter.stage.bodies = bodiesOn(gl, print.header.machine, scene.dark); };
   painter.drop = () => { painter.stage = null; };
@@ -113,9 +104,8 @@ function painterOf(gl, print, scene, camera, showMarkers) {
   painter.left = () => left.reduce((sum, { first, end }) => sum + end - first, 0);
   painter.slotUnder = (event) => {
     if (!scene.beads()) return -1;
-    const box = canvas.getBoundingClientRect(), scale = canvas.width / box.width;
-    const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((part) => Math.floor(part * scale));
-    return slotAt(gl, painter.stage, painter.shown, [x, canvas.height - 1 - y]);
+    const [x, y] = placeOn(canvas, event), { width, height } = canvas;
+    return slotAt(gl, painter.stage, painter.shown, [Math.floor((x * height + width) / 2), Math.floor(((y + 1) * height) / 2)]);
   };
   return painter;
 }

@@ -4,6 +4,9 @@ import { bounds, countUpTo, IDENTITY, length, mix, moved, multiply, RAD, rotated
 import { surfacesOf } from "../picture/model.js";
 import { openBlock } from "./block.js";
 
+/** Chain: how the table stands for values of its two rotary axes, and where the tip is on it.
+ * tip = tilt_point + R_tilt (turn_point + R_turn w - tilt_point), X Y Z = tip + tool; each R turns right-handed about its
+ * axis by -sign (value - zero). The rule of LinuxCNC's xyzac-trt-kins for any two axes. */
 export function chainOf(machine) {
   const { tilt, turn, tool_mm: tool } = machine;
   const arm = sub(turn.point_mm, tilt.point_mm);
@@ -45,39 +48,15 @@ export const TEXELS = 2048; // in a line of the textures that hold the path
 export const KIND = { travel: 0, extrude: 1, retract: 2, rotate: 3, wipe: 4, prime: 5 };
 const WALLS = /^(external perimeter|outer wall|wall-outer)$/i;
 
-export function rowsOf({ header, array }) {
-  const [x, y, z, tilt, turn] = array("end");
-  const one = (name) => array(name)[0];
-  const rows = {
-    count: one("line").length,
-    axes: [x, y, z, tilt, turn],
-    jumpRow: one("jump_row"),
-    jumpStart: array("jump_start"),
-    time: one("time"),
-    filament: one("filament"),
-    line: one("line"),
-    part: one("part"),
-    layer: one("layer"),
-    speed: one("speed"),
-    kind: one("kind"),
-    type: one("type"),
-    width: one("width"),
-    height: one("height"),
-    fan: one("fan"),
-    nozzle: one("nozzle"),
-    bed: one("bed"),
-  };
-  rows.types = header.types;
-  rows.layers = layersOf(one);
-  return rows;
-}
+const COLUMNS = ["time", "filament", "line", "part", "layer", "speed", "kind", "type", "width", "height", "fan", "nozzle", "bed"];
 
-function layersOf(one) {
-  const [part, number, first, count, z, time] =
-    ["layer_part", "layer_number", "layer_first", "layer_rows", "layer_z", "layer_time"].map(one);
-  return Array.from(first, (_, k) => ({
-    part: part[k], number: number[k], first: first[k], last: first[k] + count[k] - 1, z: z[k], time: time[k],
-  }));
+/** Moves as columns, with the layers {part, number, first, last: rows, z, time}; first: the first row of each layer. */
+export function rowsOf({ header, array }) {
+  const one = (name) => array(name)[0], columns = Object.fromEntries(COLUMNS.map((name) => [name, one(name)]));
+  const [part, number, first, count, z, time] = ["part", "number", "first", "rows", "z", "time"].map((name) => one(`layer_${name}`));
+  const layers = Array.from(first, (row, k) => ({ part: part[k], number: number[k], first: row, last: row + count[k] - 1, z: z[k], time: time[k] }));
+  const jumps = { jumpRow: one("jump_row"), jumpStart: array("jump_start") };
+  return { ...columns, ...jumps, count: columns.line.length, axes: array("end"), types: header.types, layers, first };
 }
 
 /** X Y Z tilt turn where a row begins (share 0) to where it ends (share 1). */
@@ -143,14 +122,7 @@ export function flowOf(rows, path, area) {
 }
 
 /** The layer that a row belongs to, as a place in the list of layers; -1 before the first. */
-export function layerOf(rows, row) {
-  let low = 0, high = rows.layers.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (rows.layers[middle].first <= row) low = middle + 1; else high = middle;
-  }
-  return low - 1;
-}
+export const layerOf = (rows, row) => countUpTo(rows.first, row) - 1;
 
 /** A value that is worked out when it is first asked for. */
 export function once(make) {

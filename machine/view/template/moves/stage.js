@@ -1,10 +1,11 @@
 // Stage: all that is drawn, in the right order, for the scene as it is chosen.
 
-import { bodiesOf } from "../picture/bodies.js";
+import { bodiesOf, FROM_BELOW, ON_PLATE } from "../picture/bodies.js";
 import { HALF_HEIGHT } from "../picture/camera.js";
+import { frameOf } from "../picture/gl.js";
 import { carried, clamp, countUpTo, IDENTITY, moved, multiply, scaled, sub, undone } from "../picture/math.js";
-import { arrowsOf, based, cutsOf, planesOf, surfaceColours } from "../picture/model.js";
-import { linesOf, rgb, solidOf } from "../picture/solids.js";
+import { arrowsOf, based, cutsOf, ownInk, planesOf, surfaceColours } from "../picture/model.js";
+import { bodyOf, linesOf, rgb, solidOf } from "../picture/solids.js";
 import { beadsOf, shapesOf } from "./beads.js";
 import { coarseColours, coarseOf, dividedRanges } from "./coarse.js";
 import { once } from "./rows.js";
@@ -16,18 +17,14 @@ const BEAD_MM = 0.4; // a usual bead, by which is told how near the eye is
 /** Everything on the graphics card; made anew when the context was lost. */
 export function stageOf(gl, print, dark) {
   const { rows, path, chain, header, marks, surfaces, span } = print, { parts } = header;
-  gl.enable(gl.DEPTH_TEST);
-  gl.depthFunc(gl.LEQUAL);
-  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   const partColour = (part) => rgb(part.colour), planes = planesOf(parts, partColour), shapes = shapesOf(gl);
   const marksOn = ([name, look]) => [name, once(() => marksAt(gl, marks()[name], path, look))];
-  const surface = () => ({ places: surfaces.places, colours: surfaceColours(surfaces, partColour, "printed") });
   return {
     beads: rows.count ? beadsOf(gl, shapes, path) : null,
     coarse: coarseOn(gl, shapes, print),
     ways: once(() => waysOn(gl, waysOf(rows, path, chain))),
     marks: Object.fromEntries(Object.entries(MARKS).map(marksOn)),
-    model: surfaces && solidOf(gl, surface()),
+    model: surfaces && solidOf(gl, { places: surfaces.places, colours: surfaceColours(surfaces, ownInk, "printed") }),
     planes: solidOf(gl, planes.discs),
     rims: linesOf(gl, planes.rims),
     arrows: solidOf(gl, arrowsOf(parts, partColour, span)),
@@ -57,15 +54,8 @@ function coarseOn(gl, shapes, print) {
   return { at, paint };
 }
 
-export function bodiesOn(gl, machine, dark) {
-  const { table, cradle, head } = bodiesOf(machine, dark);
-  return {
-    table: solidOf(gl, table.solid), tableLines: linesOf(gl, table.lines),
-    cradle: solidOf(gl, cradle.solid), cradleLines: linesOf(gl, cradle.lines),
-    nozzle: solidOf(gl, head.nozzle), head: solidOf(gl, head.solid),
-    boxes: solidOf(gl, head.boxes), boxLines: linesOf(gl, head.lines),
-  };
-}
+/** {table, cradle, nozzle, hotEnd, boxes}: the machine's own, drawn as bodyOf does. */
+export const bodiesOn = (gl, machine, dark) => Object.fromEntries(Object.entries(bodiesOf(machine, dark)).map(([name, shapes]) => [name, bodyOf(gl, shapes)]));
 
 /** Where table, cradle, work and head stand in the frame that is shown, for places of the five axes. */
 export function standing(chain, place, riding) {
@@ -76,11 +66,10 @@ export function standing(chain, place, riding) {
 }
 
 /** How the eye sees the scene now: {work, cradle, head, beads, below, seenAt, ranges, moving, lift, size}. */
-export function viewOf(print, scene, camera, width, height, density) {
-  const view = camera.toEye(), lens = camera.lens(width / height), stand = standing(print.chain, scene.place, scene.riding);
-  const seenAs = (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
+export function viewOf(print, scene, camera, size, density) {
+  const seenAs = camera.seen(size), stand = standing(print.chain, scene.place, scene.riding);
   const [work, cradle, head] = [stand.work, stand.cradle, stand.head].map(seenAs);
-  const pixels = (BEAD_MM * height) / (2 * HALF_HEIGHT * camera.distance), eye = carried(undone(work.toEye), [0, 0, 0]);
+  const pixels = (BEAD_MM * size[1]) / (2 * HALF_HEIGHT * camera.distance), eye = carried(undone(work.toEye), [0, 0, 0]);
   return {
     work, cradle, head, beads: { ...work, eye, pixels }, below: eye[2] < 0,
     seenAt: (shift) => seenAs(multiply(stand.work, moved(shift))),
@@ -111,36 +100,34 @@ export function paintCoarse({ beads, coarse }, print, seen, k) {
 
 /** All but the beads. */
 export function paintRest(stage, print, scene, seen) {
-  const { on } = scene, { work, cradle, head, below, lift } = seen;
-  if (on.machine && !below) paintTable(stage.bodies, work, cradle, {});
-  if (on.machine) stage.bodies.nozzle.draw(head);
+  const { on } = scene, { work, cradle, head, below, lift } = seen, { bodies } = stage;
+  const paintTable = (look) => {
+    bodies.table.draw(work, { ...look, lift: ON_PLATE });
+    bodies.cradle.draw(cradle, { ...look, lift: ON_PLATE });
+  };
+  if (on.machine && !below) paintTable({});
+  if (on.machine) bodies.nozzle.draw(head);
   if (scene.tried) paintTried(stage.model, scene.tried, print.surfaces, work);
   else {
-    paintPath(stage, seen.ranges, on, work.toClip, lift, seen.size);
+    paintPath(stage, seen.ranges, on, work, lift, seen.size);
     paintModel(stage, print, scene, seen.seenAt, lift);
   }
-  if (on.machine && below) paintTable(stage.bodies, work, cradle, { strength: 0.18 }); // or it would hide everything
-  if (on.machine) paintHead(stage.bodies, head);
+  if (!on.machine) return;
+  if (below) paintTable(FROM_BELOW);
+  bodies.hotEnd.draw(head, { ghost: 0.3 });
+  bodies.boxes.draw(head, { ghost: 0.14, strength: 0.5 });
 }
 
-function paintTable(bodies, work, cradle, look) {
-  bodies.table.draw(work, look);
-  bodies.cradle.draw(cradle, look);
-  bodies.tableLines.draw(work.toClip, { lift: 1e-5 });
-  bodies.cradleLines.draw(cradle.toClip, { lift: 1e-5 });
-}
-
-function paintPath({ ways, marks }, ranges, on, toClip, lift, size) {
+function paintPath({ ways, marks }, ranges, on, seen, lift, size) {
   for (const { firstRow, endRow, tint } of ranges) {
     if (tint !== PLAIN_TINT) continue;
     if (on.travels) {
-      const { row, lines } = ways(), [first, end] = [firstRow, endRow].map((edge) => 2 * countUpTo(row, edge - 1));
-      lines.draw(toClip, { first, end });
+      const { row, lines } = ways();
+      lines.draw(seen, { range: [firstRow, endRow].map((edge) => 2 * countUpTo(row, edge - 1)) });
     }
-    if (on.seams) marks.seams().draw(toClip, firstRow, endRow, size, lift);
-    if (!on.retractions) continue;
-    marks.retracts().draw(toClip, firstRow, endRow, size + 2, lift);
-    marks.primes().draw(toClip, firstRow, endRow, size + 2, lift);
+    const draw = (name, larger) => marks[name]().draw(seen.toClip, firstRow, endRow, size + larger, lift);
+    if (on.seams) draw("seams", 0);
+    if (on.retractions) ["retracts", "primes"].forEach((name) => draw(name, 2));
   }
 }
 
@@ -157,10 +144,7 @@ function paintModel(stage, print, scene, seenAt, lift) {
   if (scene.on.directions) cut.forEach((part, k) => stage.arrows.draw(seen(part), { range: piece(stage.arrows, k) }));
   if (!scene.on.planes) return;
   const [, ...above] = cut.map((part, k) => [seen(part), k]); // the first part stands on the platform
-  for (const [at, k] of above) {
-    const [first, end] = piece(stage.rims, k);
-    stage.rims.draw(at.toClip, { first, end });
-  }
+  for (const [at, k] of above) stage.rims.draw(at, { range: piece(stage.rims, k) });
   for (const [at, k] of above) stage.planes.draw(at, { strength: 0.3, range: piece(stage.planes, k) });
 }
 
@@ -170,35 +154,17 @@ function paintTried(model, row, { parts }, seen) {
   for (const { range } of parts) model.draw(seen, { cuts, range });
 }
 
-function paintHead(bodies, seen) {
-  bodies.head.draw(seen, { ghost: 0.3 });
-  bodies.boxes.draw(seen, { ghost: 0.14, strength: 0.5 });
-  bodies.boxLines.draw(seen.toClip);
-}
-
 /** The slot of the bead at a place of the picture, or -1: one pixel drawn with numbers for colours. */
 export function slotAt(gl, stage, { beads, ranges }, [x, y]) {
   if (!stage.beads || !ranges.length) return -1;
-  const { width, height } = gl.canvas, frame = gl.createFramebuffer(), byte = new Uint8Array(4);
-  const target = (format, place) => {
-    const store = gl.createRenderbuffer();
-    gl.bindRenderbuffer(gl.RENDERBUFFER, store);
-    gl.renderbufferStorage(gl.RENDERBUFFER, format, width, height);
-    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, store);
-    return store;
-  };
-  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
-  const stores = [target(gl.RGBA8, gl.COLOR_ATTACHMENT0), target(gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT)];
+  const frame = frameOf(gl, 0), byte = new Uint8Array(4);
   gl.enable(gl.SCISSOR_TEST);
   gl.scissor(x, y, 1, 1);
-  gl.clearColor(1, 1, 1, 1);
-  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  frame.begin(gl.canvas.width, gl.canvas.height);
   stage.beads.draw(beads, ranges, { slot: -1, share: 1 }, true);
   gl.readPixels(x, y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, byte);
   gl.disable(gl.SCISSOR_TEST);
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-  gl.deleteFramebuffer(frame);
-  stores.forEach((store) => gl.deleteRenderbuffer(store));
-  const slot = byte[0] | (byte[1] << 8) | (byte[2] << 16) | (byte[3] << 24);
-  return slot;
+  frame.free();
+  return new Int32Array(byte.buffer)[0] - 1;
 }

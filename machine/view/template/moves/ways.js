@@ -1,6 +1,6 @@
 // Ways: where the tip goes while nothing is laid, and marks on the path for seams, retractions and primes.
 
-import { attribute, bufferOf, programOf } from "../picture/gl.js";
+import { cornersOn, programOf } from "../picture/gl.js";
 import { clamp, countUpTo, length, mix, sub } from "../picture/math.js";
 import { KIND, placeAt, workpieceOf } from "./rows.js";
 
@@ -72,24 +72,12 @@ export const MARKS = {
 
 /** Marks of one kind at the beginnings of rows. */
 export function marksAt(gl, marked, path, { fill, shape }) {
-  const program = programOf(gl, MARK_VERTEX, MARK_FRAGMENT), vao = gl.createVertexArray();
   const places = new Float32Array(3 * marked.length);
   marked.forEach((row, k) => places.set(path.points.subarray(3 * path.slot(row), 3 * path.slot(row) + 3), 3 * k));
-  gl.bindVertexArray(vao);
-  attribute(gl, program.at("place"), bufferOf(gl, places), 3, gl.FLOAT, false);
-  gl.bindVertexArray(null);
+  const points = cornersOn(gl, programOf(gl, MARK_VERTEX, MARK_FRAGMENT), { place: [places, 3] });
   const draw = (toClip, firstRow, endRow, size, lift) => {
     const first = countUpTo(marked, firstRow - 1), end = countUpTo(marked, endRow - 1);
-    if (end <= first) return;
-    program.use();
-    gl.bindVertexArray(vao);
-    gl.uniformMatrix4fv(program.to("toClip"), false, toClip);
-    gl.uniform1f(program.to("size"), size);
-    gl.uniform1f(program.to("lift"), lift);
-    gl.uniform3fv(program.to("fill"), fill);
-    gl.uniform1i(program.to("shape"), shape);
-    gl.drawArrays(gl.POINTS, first, end - first);
-    gl.bindVertexArray(null);
+    if (end > first) points.draw({ toClip, size, lift, fill, shape }, () => gl.drawArrays(gl.POINTS, first, end - first));
   };
   return { draw };
 }

@@ -1,6 +1,6 @@
 // Lines: the text of the G-code out of the page's own rows: patterns whose holes the numbers of a line's move fill (docs/view.md).
 
-import { $, made } from "../elements.js";
+import { $, made, nextFrame } from "../elements.js";
 import { clamp, countUpTo } from "../picture/math.js";
 
 const HOLE = /([A-Z])([\u0001-\u0006])/g;
@@ -39,7 +39,7 @@ async function linesOfFile(file) {
 /** {take(file), go(line), needed()}: the text that is in the page, else that of a file. */
 export function textOf(print, scene, bells, stop) {
   const { rows, header } = print, pane = $("code-lines"), room = $("code-room");
-  let text = linesOfRows(print), asked = { row: -1, line: 0 }, queued = false;
+  let text = linesOfRows(print), asked = { row: -1, line: 0 };
   const now = () => (asked.row === scene.row ? asked.line : rows.line[scene.row] || 0);
   const fit = () => Math.max(Math.floor(pane.clientHeight / LINE_PX), 1);
   const high = () => Math.min(text.count * LINE_PX, MOST_PX);
@@ -49,7 +49,6 @@ export function textOf(print, scene, bells, stop) {
     return Math.round((pane.scrollTop / Math.max(high() - pane.clientHeight, 1)) * Math.max(text.count - fit(), 0));
   };
   const draw = () => {
-    queued = false;
     if (!text || !pane.clientHeight) return;
     const begin = first(), end = Math.min(begin + fit() + 2, text.count), marked = now();
     room.style.height = `${high()}px`;
@@ -60,7 +59,7 @@ export function textOf(print, scene, bells, stop) {
     else pane.removeAttribute("aria-activedescendant");
     $("code-line").value = marked;
   };
-  const ask = () => { if (!queued) { queued = true; requestAnimationFrame(draw); } };
+  const ask = nextFrame(draw);
   /** Brings the marked line into view, where it is not. */
   const follow = () => {
     if (!text || !pane.clientHeight) return;

@@ -6,15 +6,17 @@ import { boxCorners, boxEdges, chained, circle, revolved, trianglesOf } from "./
 const HEAD_ABOVE_MM = 12; // how far the hot end is drawn above the last height that the profile tells
 const NOZZLE_MM = 6; // what lies within is drawn as the nozzle
 const ROUND = 96;
+export const ON_PLATE = 1e-5; // in depth, by which the plate's lines are seen before it
+export const FROM_BELOW = { strength: 0.18 }; // how the plate is drawn then, or it would hide everything
 
+/** Shapes of all that the machine is, {solid, lines} each, by name; hotEnd: of the head, above the nozzle. */
 export function bodiesOf(machine, dark) {
   const plate = dark ? [66, 72, 81, 255] : [232, 235, 239, 255], frame = dark ? [112, 121, 134, 255] : [190, 196, 205, 255];
   const line = dark ? [120, 128, 140, 110] : [120, 126, 136, 120], edge = dark ? [170, 178, 190, 190] : [70, 76, 86, 170];
-  const table = [{ corners: plateCorners(machine.table), colour: plate }];
   return {
-    table: { solid: trianglesOf(table), lines: trianglesOf(plateLines(machine.table, line, edge)) },
+    table: { solid: trianglesOf([{ corners: plateCorners(machine.table), colour: plate }]), lines: trianglesOf(plateLines(machine.table, line, edge)) },
     cradle: boxesOf(machine.cradle, frame, edge),
-    head: headOf(machine.head, frame, edge),
+    ...headOf(machine.head, frame, edge),
   };
 }
 
@@ -53,10 +55,9 @@ export function headOf({ silhouette_mm: silhouette, boxes }, colour, edge) {
   const top = height + HEAD_ABOVE_MM;
   const outline = [[0, least[1]], ...silhouette, [radius, top], [0, top]];
   const brass = [205, 154, 66, 255], low = silhouette.filter(([r, h]) => r <= NOZZLE_MM && h <= NOZZLE_MM).length;
-  const around = boxesOf(boxes, colour, edge);
   return {
-    nozzle: trianglesOf([{ corners: revolved(outline.slice(0, low + 1), ROUND), colour: brass }]),
-    solid: trianglesOf([{ corners: revolved(outline.slice(low), ROUND), colour }]),
-    boxes: around.solid, lines: around.lines,
+    nozzle: { solid: trianglesOf([{ corners: revolved(outline.slice(0, low + 1), ROUND), colour: brass }]) },
+    hotEnd: { solid: trianglesOf([{ corners: revolved(outline.slice(low), ROUND), colour }]) },
+    boxes: boxesOf(boxes, colour, edge),
   };
 }

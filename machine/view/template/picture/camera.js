@@ -23,6 +23,19 @@ export function cameraOf() {
     const far = camera.distance + Math.max(8 * camera.radius, FARTHEST_MM);
     return perspective(HALF_HEIGHT, aspect, camera.distance / 40, far);
   };
+  /** How the eye sees what a matrix puts somewhere, {toEye, toClip}, in a picture of a size. */
+  camera.seen = ([width, height]) => {
+    const view = camera.toEye(), lens = camera.lens(width / height);
+    return (matrix) => {
+      const toEye = multiply(view, matrix);
+      return { toEye, toClip: multiply(lens, toEye) };
+    };
+  };
+  /** From where and along what a place of the picture is seen, as placeOn gives it. */
+  camera.sight = ([x, y]) => {
+    const across = add(scaled(camera.right(), x), scaled(camera.up(), y));
+    return [camera.eye(), add(scaled(outward(), -1), scaled(across, HALF_HEIGHT))];
+  };
   camera.orbit = (dx, dy) => {
     camera.yaw -= dx;
     camera.pitch = clamp(camera.pitch + dy, -89.5 * RAD, 89.5 * RAD);
@@ -38,15 +51,15 @@ export function cameraOf() {
     camera.target = add(camera.target, add(scaled(camera.right(), x * span), scaled(camera.up(), y * span)));
     camera.distance = next;
   };
-  /** Brings places into view about their middle. */
-  camera.fit = (places, aspect) => {
+  /** Brings places into view about their middle, in a picture of a size. */
+  camera.fit = (places, [width, height]) => {
     const [least, most] = bounds(places.flat());
     camera.target = scaled(add(least, most), 0.5);
     camera.radius = Math.max(length(sub(most, least)) / 2, 1);
     const axes = [camera.right(), camera.up(), outward()];
     const needed = places.map((place) => {
       const [x, y, near] = axes.map((axis) => dot(axis, sub(place, camera.target)));
-      return near + Math.max(Math.abs(x) / aspect, Math.abs(y)) / HALF_HEIGHT;
+      return near + Math.max((Math.abs(x) * height) / width, Math.abs(y)) / HALF_HEIGHT;
     });
     camera.distance = MARGIN * Math.max(...needed, 1);
   };
@@ -66,6 +79,12 @@ export function viewButtons(camera, corner, changed) {
   look("corner");
 }
 
+/** Where on the canvas an event is: -1..1 upwards, and as far across as the canvas is wider than high. */
+export function placeOn(canvas, { clientX, clientY }) {
+  const { left, top, width, height } = canvas.getBoundingClientRect();
+  return [((clientX - left) / width * 2 - 1) * (width / height), 1 - ((clientY - top) / height) * 2];
+}
+
 /** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. */
 export function handle(canvas, camera, { changed, pressed }) {
   const fingers = new Map();
@@ -75,10 +94,6 @@ export function handle(canvas, camera, { changed, pressed }) {
   const spread = () => {
     const [a, b] = [...fingers.values()];
     return b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : 0;
-  };
-  const within = (x, y) => {
-    const box = canvas.getBoundingClientRect();
-    return [((x - box.left) / box.width * 2 - 1) * (box.width / box.height), 1 - ((y - box.top) / box.height) * 2];
   };
   canvas.addEventListener("pointerdown", (event) => {
     if (fingers.size === 0) path = 0;
@@ -95,7 +110,7 @@ export function handle(canvas, camera, { changed, pressed }) {
     path += Math.abs(dx) + Math.abs(dy);
     if (shifts) camera.pan(dx / canvas.clientHeight, dy / canvas.clientHeight);
     else camera.orbit(dx * 0.008, dy * 0.008);
-    if (fingers.size === 2 && wide > 0 && spread() > 0) camera.zoom(wide / spread(), ...within(...to));
+    if (fingers.size === 2 && wide > 0 && spread() > 0) camera.zoom(wide / spread(), ...placeOn(canvas, { clientX: to[0], clientY: to[1] }));
     changed();
   });
   const lift = (event) => {
@@ -108,7 +123,7 @@ export function handle(canvas, camera, { changed, pressed }) {
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     const step = event.deltaMode === 1 ? event.deltaY * 16 : event.deltaY;
-    camera.zoom(Math.exp(clamp(step, -240, 240) * 0.0016), ...within(event.clientX, event.clientY));
+    camera.zoom(Math.exp(clamp(step, -240, 240) * 0.0016), ...placeOn(canvas, event));
     changed();
   }, { passive: false });
 }

@@ -75,6 +75,9 @@ export function bounds(points) {
   return points.length ? [least, most] : [];
 }
 
+/** The eight corners of a box [least, most]; the bits of a corner's place tell at which end of each axis it lies. */
+export const cornersOf = (box) => Array.from({ length: 8 }, (_, k) => [0, 1, 2].map((axis) => box[(k >> axis) & 1][axis]));
+
 /** How many of the rising numbers are at most x. */
 export function countUpTo(rising, x) {
   let low = 0, high = rising.length;

@@ -1,9 +1,8 @@
 // Model: the parts' surfaces, the planes of the cuts and the directions of printing.
 
 import { add, cross, scaled, unit } from "./math.js";
-import { chained, circle, revolved, rgb, trianglesOf } from "./solids.js";
+import { chained, circle, RED, revolved, rgb, trianglesOf, wordOf } from "./solids.js";
 
-export const RED = [213, 32, 40];
 export const LEFT = { none: 0, printed: 1, straight: 2 };
 
 /** Corners of all faces and, a part each, which of them are its own. */
@@ -20,17 +19,21 @@ export function surfacesOf({ header, array }) {
   return { ...surfaces, apart: apartOf(surfaces) };
 }
 
-/** Colours of all corners: the part's, and red where a face is risky in the way asked for (none, printed, straight). */
-export function surfaceColours({ marks, parts }, colourOf, risky) {
-  const colours = new Uint8Array(12 * marks.length);
-  for (const { part, range } of parts)
-    for (let corner = range[0]; corner < range[1]; corner++) {
-      const red = marks[Math.floor(corner / 3)] & LEFT[risky];
-      const [r, g, b] = red ? RED : colourOf(part);
-      colours.set([r, g, b, red ? 255 : 254], 4 * corner);
-    }
-  return colours;
+/** Colours of all corners: red where a face is risky in the way asked for (none, printed, straight), else as inkOf(part) gives them for a face. */
+export function surfaceColours({ marks, parts }, inkOf, risky) {
+  const words = new Uint32Array(3 * marks.length), red = wordOf(RED);
+  for (const described of parts) {
+    const [first, end] = described.range, ink = inkOf(described);
+    for (let face = first / 3; face < end / 3; face++) words.fill(marks[face] & LEFT[risky] ? red : ink(face), 3 * face, 3 * face + 3);
+  }
+  return new Uint8Array(words.buffer);
 }
+
+/** For surfaceColours: every part in its own colour. */
+export const ownInk = ({ part }) => {
+  const word = wordOf(rgb(part.colour), 254);
+  return () => word;
+};
 
 /** A row of the front for the drawing of solids: the colours of its parts, and the planes between them. */
 export function cutsOf({ planes, colours }) {

@@ -1,10 +1,15 @@
 // Solids: triangles with flat faces, drawn whole or as a ghost whose edges show and whose faces let the light through; lines; and the shapes of both.
 
-import { attribute, bufferOf, freed, LIGHT, programOf } from "./gl.js";
+import { cornersOn, LIGHT, programOf } from "./gl.js";
+import { cornersOf } from "./math.js";
 
 export const rgb = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
 export const hex = (colour) => "#" + colour.map((x) => Math.round(x).toString(16).padStart(2, "0")).join("");
 export const PLAIN = "#9aa0a8";
+export const RED = [213, 32, 40];
+
+/** A colour as one number, as it stands in an array of bytes. */
+export const wordOf = ([r, g, b], a = 255) => (a << 24 | Math.round(b) << 16 | Math.round(g) << 8 | Math.round(r)) >>> 0;
 
 export const MOST_CUTS = 64; // as many fit into every graphics card's uniforms
 
@@ -53,43 +58,23 @@ void main() {
 
 /** Drawing for triangles {places, colours}, three corners each; a range of corners may be drawn alone. */
 export function solidOf(gl, { places, colours }) {
-  const program = programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), vao = gl.createVertexArray();
-  gl.bindVertexArray(vao);
-  const placed = bufferOf(gl, places), painted = bufferOf(gl, colours, gl.DYNAMIC_DRAW);
-  attribute(gl, program.at("place"), placed, 3, gl.FLOAT, false);
-  attribute(gl, program.at("colour"), painted, 4, gl.UNSIGNED_BYTE, true);
-  gl.bindVertexArray(null);
-  const paint = (colours) => {
-    gl.bindBuffer(gl.ARRAY_BUFFER, painted);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, colours);
+  const shape = cornersOn(gl, programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), { place: [places, 3], colour: [colours, 4] }), corners = places.length / 3;
+  const draw = ({ toClip, toEye }, { ghost = 0, strength = 1, behind = 0, cuts = null, range: [first, end] = [0, corners] } = {}) => {
+    if (end <= first) return;
+    const parts = cuts ? { cuts: cuts.count, hues: cuts.hues, ...(cuts.count ? { planes: cuts.planes } : {}) } : { cuts: -1 };
+    const pass = () => gl.drawArrays(gl.TRIANGLES, first, end - first);
+    shape.draw({ toClip, toEye, ghost, strength, behind, ...parts }, () => {
+      if (ghost > 0 || strength < 1) {
+        gl.colorMask(false, false, false, false);
+        pass();
+        gl.colorMask(true, true, true, true);
+        gl.enable(gl.BLEND);
+      }
+      pass();
+      gl.disable(gl.BLEND);
+    });
   };
-  const pass = (first, count) => gl.drawArrays(gl.TRIANGLES, first, count);
-  const draw = (seen, { ghost = 0, strength = 1, behind = 0, cuts = null, range = [0, places.length / 3] } = {}) => {
-    if (range[1] <= range[0]) return;
-    program.use();
-    gl.bindVertexArray(vao);
-    gl.uniformMatrix4fv(program.to("toClip"), false, seen.toClip);
-    gl.uniformMatrix4fv(program.to("toEye"), false, seen.toEye);
-    gl.uniform1f(program.to("ghost"), ghost);
-    gl.uniform1f(program.to("strength"), strength);
-    gl.uniform1f(program.to("behind"), behind);
-    gl.uniform1i(program.to("cuts"), cuts ? cuts.count : -1);
-    if (cuts) {
-      if (cuts.count) gl.uniform4fv(program.to("planes"), cuts.planes);
-      gl.uniform3fv(program.to("hues"), cuts.hues);
-    }
-    const through = ghost > 0 || strength < 1, count = range[1] - range[0];
-    if (through) {
-      gl.colorMask(false, false, false, false);
-      pass(range[0], count);
-      gl.colorMask(true, true, true, true);
-      gl.enable(gl.BLEND);
-    }
-    pass(range[0], count);
-    gl.disable(gl.BLEND);
-    gl.bindVertexArray(null);
-  };
-  return { draw, paint, corners: places.length / 3, free: () => freed(gl, vao, placed, painted) };
+  return { draw, corners, paint: (painted) => shape.put("colour", painted), free: shape.free };
 }
 
 /** Corners of triangles put together, all of one colour a piece. */
@@ -105,15 +90,16 @@ export function trianglesOf(pieces) {
 
 const quad = (a, b, c, d) => [a, b, c, a, c, d];
 
-export function boxCorners([x0, y0, z0], [x1, y1, z1]) {
-  const at = (i) => [i & 1 ? x1 : x0, i & 2 ? y1 : y0, i & 4 ? z1 : z0];
-  const sides = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
-  return sides.flatMap((side) => quad(...side.map(at)));
+const SIDES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]; // of a box, by its corners
+
+export function boxCorners(least, most) {
+  const corners = cornersOf([least, most]);
+  return SIDES.flatMap((side) => quad(...side.map((k) => corners[k])));
 }
 
-export function boxEdges([x0, y0, z0], [x1, y1, z1]) {
-  const at = (i) => [i & 1 ? x1 : x0, i & 2 ? y1 : y0, i & 4 ? z1 : z0];
-  return [0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [1, 2, 4].filter((bit) => !(i & bit)).flatMap((bit) => [at(i), at(i | bit)]));
+export function boxEdges(least, most) {
+  const corners = cornersOf([least, most]);
+  return corners.flatMap((corner, k) => [1, 2, 4].filter((bit) => !(k & bit)).flatMap((bit) => [corner, corners[k | bit]]));
 }
 
 export const circle = (radius, z, steps) => Array.from({ length: steps }, (_, k) => {
@@ -148,22 +134,23 @@ in vec4 paint;
 out vec4 colour;
 void main() { colour = vec4(paint.rgb * paint.a, paint.a); }`;
 
+/** Drawing for pairs of places {places, colours}; lift: in depth, towards the eye. */
 export function linesOf(gl, { places, colours }) {
-  const program = programOf(gl, LINE_VERTEX, LINE_FRAGMENT), vao = gl.createVertexArray();
-  gl.bindVertexArray(vao);
-  const placed = bufferOf(gl, places), painted = bufferOf(gl, colours);
-  attribute(gl, program.at("place"), placed, 3, gl.FLOAT, false);
-  attribute(gl, program.at("colour"), painted, 4, gl.UNSIGNED_BYTE, true);
-  gl.bindVertexArray(null);
-  const count = places.length / 3;
-  const draw = (toClip, { first = 0, end = count, lift = 0 } = {}) => {
-    if (end <= first) return;
-    program.use();
-    gl.bindVertexArray(vao);
-    gl.uniformMatrix4fv(program.to("toClip"), false, toClip);
-    gl.uniform1f(program.to("lift"), lift);
-    gl.drawArrays(gl.LINES, first, end - first);
-    gl.bindVertexArray(null);
+  const shape = cornersOn(gl, programOf(gl, LINE_VERTEX, LINE_FRAGMENT), { place: [places, 3], colour: [colours, 4] }), corners = places.length / 3;
+  const draw = ({ toClip }, { range: [first, end] = [0, corners], lift = 0 } = {}) => {
+    if (end > first) shape.draw({ toClip, lift }, () => gl.drawArrays(gl.LINES, first, end - first));
   };
-  return { draw, corners: count, free: () => freed(gl, vao, placed, painted) };
+  return { draw, corners, free: shape.free };
+}
+
+/** Drawing for a body {solid, lines}, of which either may be absent: its lines after its solid. over: before all else; more: see solidOf. */
+export function bodyOf(gl, shapes) {
+  const solid = shapes.solid && solidOf(gl, shapes.solid), lines = shapes.lines && linesOf(gl, shapes.lines);
+  const draw = (seen, { lift = 0, over = false, ...more } = {}) => {
+    if (over) gl.depthFunc(gl.ALWAYS);
+    solid?.draw(seen, more);
+    lines?.draw(seen, { lift });
+    gl.depthFunc(gl.LEQUAL);
+  };
+  return { draw, free: () => [solid, lines].forEach((drawing) => drawing?.free()) };
 }

@@ -2,12 +2,11 @@
 
 import { $, made, swatch } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
-import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/solids.js";
+import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest, send } from "../line.js";
 import { alike, button, choiceRow, cross, fill, listen, putAt, putTable } from "../lists.js";
 import { sizeOf } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
-import { wordOf } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 
 const MARK_KINDS = {
@@ -30,7 +29,7 @@ const fromBox = (zone, place) => axesOf(zone).reduce((sum, axis, k) => add(sum, 
 /** The colours of all corners, marked faces in those of their first kind. */
 export function markedOver(bits, colours) {
   if (!bits) return colours;
-  const words = new Uint32Array(colours.buffer), inks = KIND_NAMES.map((kind) => wordOf(scaled(MARK_KINDS[kind].colour, PAINT), 255));
+  const words = new Uint32Array(colours.buffer), inks = KIND_NAMES.map((kind) => wordOf(scaled(MARK_KINDS[kind].colour, PAINT)));
   bits.forEach((byte, face) => {
     if (byte) words.fill(inks[31 - Math.clz32(byte & -byte)], 3 * face, 3 * face + 3);
   });

@@ -2,8 +2,7 @@
 
 import { boxesOf, headOf } from "../../../../view/template/picture/bodies.js";
 import { length, sub } from "../../../../view/template/picture/math.js";
-import { RED } from "../../../../view/template/picture/model.js";
-import { chained, circle, trianglesOf } from "../../../../view/template/picture/solids.js";
+import { chained, circle, RED, trianglesOf } from "../../../../view/template/picture/solids.js";
 import { subscribe } from "../store.js";
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked
@@ -26,12 +25,9 @@ export function obstacleOf(picture) {
 function headDrawn({ body, tip_mm: tip, rotation }, head) {
   const frame = [150, 158, 170, 255], edge = [60, 66, 76, 200], red = [...RED, 255], matrix = [...rotation.flatMap((row) => [...row, 0]), ...tip, 1];
   const touching = head.boxes.filter(({ name }) => name === body), others = head.boxes.filter(({ name }) => name !== body);
-  const { nozzle, solid, boxes, lines } = headOf({ ...head, boxes: others }, frame, edge), box = boxesOf(touching, red, edge);
-  const hot = touching.length ? solid : headOf({ ...head, boxes: [] }, red, edge).solid;
-  return [
-    { solid: nozzle, matrix }, { solid: hot, matrix, strength: touching.length ? 0.5 : 0.75 }, { solid: boxes, lines, matrix, strength: 0.35 },
-    { solid: box.solid, lines: box.lines, matrix, strength: 0.75 },
-  ];
+  const { nozzle, hotEnd, boxes } = headOf({ ...head, boxes: others }, frame, edge), box = boxesOf(touching, red, edge);
+  const hot = touching.length ? hotEnd : headOf({ ...head, boxes: [] }, red, edge).hotEnd;
+  return [nozzle, { ...hot, strength: touching.length ? 0.5 : 0.75 }, { ...boxes, strength: 0.35 }, { ...box, strength: 0.75 }].map((thing) => ({ ...thing, matrix }));
 }
 
 /** Rings on the table where the head would touch it. */

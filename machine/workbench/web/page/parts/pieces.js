@@ -3,11 +3,11 @@
 import { $ } from "../../../../view/template/elements.js";
 import { blockOf } from "../../../../view/template/moves/block.js";
 import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
-import { arrowsOf, LEFT, RED, surfacesOf } from "../../../../view/template/picture/model.js";
-import { hex, rgb, solidOf } from "../../../../view/template/picture/solids.js";
+import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/model.js";
+import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest } from "../line.js";
 import { listen, mm2, newtons } from "../lists.js";
-import { cornersAt, faceMet, wordOf } from "../scene/triangles.js";
+import { cornersAt, faceMet } from "../scene/triangles.js";
 import { store, subscribe, update } from "../store.js";
 
 const CUT_MM = 2e-3; // within which a corner lies in the plane of a cut: places come in thousandths of a mm
@@ -51,18 +51,10 @@ const fadedRgb = (colour, part, chosen) => rgb(colour).map((x, k) => (chosen && 
 export const fadedColours = (colours, chosen) => colours.map((colour, k) => hex(fadedRgb(colour, k + 1, chosen)));
 
 /** Colours of all corners: the parts', paler those not chosen, light the cuts, red what needs support. */
-function pieceColours({ parts, marks, places }, chosen) {
-  const words = new Uint32Array(places.length / 3);
-  for (const { part, range, cut } of parts) {
-    const plain = fadedRgb(part.colour, part.index, chosen);
-    const [red, light, colour] = [wordOf(RED, 255), wordOf(plain.map((x) => mix(x, 255, CUT_WHITE)), 254), wordOf(plain, 254)];
-    for (let corner = range[0]; corner < range[1]; corner++) {
-      const face = Math.floor(corner / 3);
-      words[corner] = marks[face] & LEFT.printed ? red : cut[face - range[0] / 3] ? light : colour;
-    }
-  }
-  return new Uint8Array(words.buffer);
-}
+const pieceColours = (pieces, chosen) => surfaceColours(pieces, ({ part, range, cut }) => {
+  const plain = fadedRgb(part.colour, part.index, chosen), light = wordOf(plain.map((x) => mix(x, 255, CUT_WHITE)), 254), colour = wordOf(plain, 254);
+  return (face) => (cut[face - range[0] / 3] ? light : colour);
+}, "printed");
 
 /** Their drawing: {draw(seenAt, shifts), paint(chosen)}; seenAt(shift): how the eye sees what is shifted so. */
 export function piecesOn(gl, pieces, chosen) {

@@ -1,185 +1,165 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
-import { bodiesOf } from "../../../../view/template/picture/bodies.js";
-import { cameraOf, HALF_HEIGHT } from "../../../../view/template/picture/camera.js";
-import { frameOf, outlive } from "../../../../view/template/picture/gl.js";
-import { add, bounds, carried, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone, unit } from "../../../../view/template/picture/math.js";
+import { nextFrame } from "../../../../view/template/elements.js";
+import { bodiesOf, FROM_BELOW, ON_PLATE } from "../../../../view/template/picture/bodies.js";
+import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
+import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
+import { add, bounds, carried, cornersOf, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
 import { beside, cutsOf, planesOf } from "../../../../view/template/picture/model.js";
-import { boxEdges, linesOf, MOST_CUTS, solidOf, trianglesOf } from "../../../../view/template/picture/solids.js";
+import { bodyOf, boxEdges, MOST_CUTS, solidOf, trianglesOf } from "../../../../view/template/picture/solids.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
 
-const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156];
-
+const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156], PLANE_COLOUR = [30, 120, 190];
 const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
-
 const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
-
-const PLANE_COLOUR = [30, 120, 190];
-
-const cornersOf = (box) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => box[(i >> axis) & 1][axis]));
+const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on
 
 /** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
 export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shifts, walls, plane, pedestal, extras }) {
-  const bands = (pieces ? null : walls) || [], whole = pieces ? pieces.parts.map((part, k) => part.box.map((place) => add(place, shifts[k]))) : bands.map(({ places }) => bounds(places).map((corner) => sub(corner, place)));
-  if (!pieces) whole.push(pedestal ? bounds(pedestal.vertices) : [], ...[[0, 0, 0], ...copies].map((shift) => box.map((corner) => add(corner, shift))));
+  const shifted = (box, shift) => box.map((corner) => add(corner, shift));
+  const stood = () => [
+    ...[...(walls || []).values()].map(({ places }) => shifted(bounds(places), scaled(place, -1))), pedestal ? bounds(pedestal.vertices) : [],
+    ...[[0, 0, 0], ...copies].map((shift) => shifted(box, shift)),
+  ];
+  const whole = pieces ? pieces.parts.map((part, k) => shifted(part.box, shifts[k])) : stood();
   const rim = plane ? beside(plane.normal).flatMap((way) => [1, -1].map((sign) => add(plane.centre_mm, scaled(way, sign * plane.radius_mm)))) : [];
-  const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((shape) => shape && shape.places.length)
+  const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((shape) => shape?.places.length)
     .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
   return [...whole.filter((box) => box.length).flatMap(cornersOf), ...rim, ...around];
 }
 
-/** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws; what is in
- * `drawn` is called after that. */
-export function pictureOf(canvas, camera) {
-  const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
-  if (!gl) return null;
-  const scene = { model: null, matrix: IDENTITY, place: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, pedestal: null, machine: null, dark: false, marks: null, extras: {} };
-  let card = null, asked = false, count = 0, placed = "";
-  const drawn = [], drawnOf = {}, stale = new Set(); // of what the card holds: made anew before it is drawn, once however often it has changed by then
-  const build = () => {
-    gl.enable(gl.DEPTH_TEST);
-    gl.depthFunc(gl.LEQUAL);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    card = { frame: frameOf(gl, 4), table: null, solid: null, extras: {} };
-    [table, solid, plane, pedestal, pieces, walls, ...Object.keys(scene.extras)].forEach((part) => stale.add(part));
+/** Drawings of the walls of parts, by the walls; those that were there before are kept. */
+function wallsOn(gl, walls, before = new Map()) {
+  const kept = new Map([...(walls || []).values()].map((wall) => [wall, before.get(wall) || solidOf(gl, wall)]));
+  before.forEach((drawing, wall) => { if (!kept.has(wall)) drawing.free(); });
+  return kept;
+}
+
+/** Drawing for things [{solid, lines, matrix, strength, over: before all else}]. */
+function thingsOn(gl, things) {
+  const bodies = things.map(({ solid, lines, matrix = IDENTITY, ...look }) => ({ body: bodyOf(gl, { solid, lines }), matrix, look: { ...look, lift: ON_FACES } }));
+  return {
+    draw: (seenAs) => bodies.forEach(({ body, matrix, look }) => body.draw(seenAs(matrix), look)),
+    free: () => bodies.forEach(({ body }) => body.free()),
   };
-  const anew = (...things) => {
-    things.forEach((part) => stale.add(part));
-    ask();
+}
+
+/** What lies on the bench, drawn when the browser next draws: what the scene has is put there by the calls at the end, and what is in
+ * `drawn` is called after every picture. null: there is no WebGL2. */
+export function pictureOf(canvas, camera) {
+  const gl = cardOf(canvas);
+  if (!gl) return null;
+  const scene = {
+    model: null, matrix: IDENTITY, place: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
+    walls: null, plane: null, pedestal: null, machine: null, dark: false, extras: {},
+  };
+  const drawn = [], toldOf = {}, stale = new Map(); // by the name of what is to be made anew before it is drawn: whether its colours alone are others
+  let card = {}, frame = null, colours = null, count = 0, placed = "";
+  const inks = {
+    model: () => markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours)),
+    pieces: () => scene.chosen,
+  };
+  /** What makes what the card holds, of what the scene has, by its name; more: extras. */
+  const makers = {
+    table: () => bodyOf(gl, scene.machine ? bodiesOf(scene.machine, scene.dark).table : {}),
+    model: () => scene.model && solidOf(gl, { places: scene.model.corners, colours: inks.model() }),
+    pedestal: () => scene.pedestal && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR) }),
+    pieces: () => scene.pieces && piecesOn(gl, scene.pieces, scene.chosen),
+    walls: (before) => wallsOn(gl, scene.walls, before),
+    plane: () => {
+      const { discs, rims } = scene.plane ? planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR) : {};
+      return bodyOf(gl, { solid: discs, lines: rims });
+    },
   };
   const renew = () => {
-    if (stale.has(solid)) stale.delete(painted); // it has the new colours
-    stale.forEach((part) => (typeof part === "string" ? extra(part) : part()));
+    for (const [name, coloursAlone] of stale) {
+      const before = card[name];
+      if (coloursAlone && before) before.paint(inks[name]());
+      else {
+        card[name] = makers[name](before);
+        before?.free?.();
+      }
+    }
     stale.clear();
   };
   const bodies = () => Math.floor(MOST_FACES / Math.max(scene.model?.count || 0, 1));
-  /** What the card holds under a name, in place of what it held: solids and lines of shapes, nothing of none. */
-  const hold = (name, { solid, lines } = {}) => {
-    [card[name]?.solid, card[name]?.lines].forEach((drawing) => drawing?.free());
-    card[name] = solid || lines ? { solid: solid && solidOf(gl, solid), lines: lines && linesOf(gl, lines) } : null;
-  };
-  const table = () => { if (scene.machine) hold("table", bodiesOf(scene.machine, scene.dark).table); };
-  const solid = () => {
-    card.solid?.free();
-    card.solid = null;
-    if (!scene.model) return;
-    const colours = new Uint8Array(12 * scene.model.count);
-    card.colours = markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours));
-    card.solid = solidOf(gl, { places: scene.model.corners, colours });
-  };
   const draw = () => {
-    asked = false;
     if (gl.isContextLost()) return;
     renew();
-    const density = Math.min(devicePixelRatio || 1, 2);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-    const view = camera.toEye(), lens = camera.lens(width / height);
-    const seenFrom = (view) => (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
-    const plate = seenFrom(view)(IDENTITY), seenAs = seenFrom(multiply(view, moved(scene.place))), flat = seenAs(IDENTITY), below = camera.eye()[2] < 0;
-    card.frame.begin(width, height);
-    if (card.table && !below) paintPlate(plate);
+    const size = sizeOf(canvas), plate = camera.seen(size), seenAs = (matrix) => plate(multiply(moved(scene.place), matrix)), below = camera.eye()[2] < 0;
+    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0;
+    if (outgrown(canvas)) [canvas.width, canvas.height] = size;
+    frame.begin(...size);
+    if (!below) card.table.draw(ground, { lift: ON_PLATE });
     if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
-    else if (card.solid) {
-      (card.walls || []).forEach((wall) => wall.draw(plate));
-      const ghost = card.walls ? FAINT : 0;
+    else if (card.model) {
+      card.walls.forEach((wall) => wall.draw(ground));
       for (const shift of [[0, 0, 0], ...scene.copies.slice(0, bodies())]) {
-        card.solid.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost });
-        if (card.pedestal) card.pedestal.solid.draw(seenAs(moved(shift)), { ghost });
+        card.model.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost });
+        card.pedestal?.draw(seenAs(moved(shift)), { ghost });
       }
     }
-    if (card.table && below) paintPlate(plate, { strength: 0.18 });
-    if (card.plane) {
-      card.plane.lines.draw(flat.toClip, { lift: 1e-4 });
-      card.plane.solid.draw(flat, { strength: 0.3 });
-    }
-    for (const things of Object.values(card.extras)) for (const thing of things) paintExtra(thing, seenAs(thing.matrix));
-    card.frame.show();
+    if (below) card.table.draw(ground, { ...FROM_BELOW, lift: ON_PLATE });
+    card.plane.draw(flat, { strength: 0.3, lift: ON_FACES });
+    Object.keys(scene.extras).forEach((name) => card[name].draw(seenAs));
+    frame.show();
     scene.toClip = flat.toClip;
     drawn.forEach((act) => act());
     document.documentElement.dataset.drawn = ++count;
   };
+  const ask = nextFrame(draw);
+  const anew = (name, coloursAlone = false) => {
+    stale.set(name, coloursAlone && (stale.get(name) ?? true));
+    ask();
+  };
+  /** Another value of the scene, and what the card has of it anew. */
+  const take = (key, name = key, coloursAlone = false) => (value) => {
+    if (value === scene[key]) return;
+    scene[key] = value;
+    anew(name, coloursAlone);
+  };
+  /** More to draw under a name: things(), see thingsOn, made where what it tells is new. */
+  const extra = (name, told, things) => {
+    if ((toldOf[name] ?? "") === told) return;
+    toldOf[name] = told;
+    scene.extras[name] = things();
+    makers[name] = () => thingsOn(gl, scene.extras[name]);
+    anew(name);
+  };
   /** The model alone, drawn into a corner of the canvas and taken from there before that is seen. */
   const thumbnail = (rows, into) => {
     const { matrix, box } = standingBy(rows, scene.model.vertices, 0), eye = cameraOf(), { width, height } = into;
-    eye.fit(cornersOf(box), width / height);
-    card.frame.begin(Math.max(canvas.width, width), Math.max(canvas.height, height));
+    eye.fit(cornersOf(box), [width, height]);
+    frame.begin(Math.max(canvas.width, width), Math.max(canvas.height, height));
     gl.viewport(0, 0, width, height);
-    const toEye = multiply(eye.toEye(), matrix);
-    card.solid.draw({ toEye, toClip: multiply(eye.lens(width / height), toEye) }, { cuts: null, ghost: 0 });
-    card.frame.show();
+    card.model.draw(eye.seen([width, height])(matrix));
+    frame.show();
     const flat = into.getContext("2d");
     flat.clearRect(0, 0, width, height);
     flat.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
   };
-  const plane = () => {
-    const { discs, rims } = scene.plane ? planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR) : {};
-    hold("plane", { solid: discs, lines: rims });
-  };
-  const pedestal = () => {
-    const { count = 0, corners } = scene.pedestal || {}, colours = paintedRed(count, null, PEDESTAL_COLOUR, new Uint8Array(12 * count));
-    hold("pedestal", { solid: corners && { places: corners, colours } });
-  };
-  const pieces = () => {
-    card.pieces?.free();
-    card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen);
-  };
-  const chosenPiece = () => { if (card.pieces) card.pieces.paint(scene.chosen); };
-  const extra = (name) => {
-    (card.extras[name] || []).forEach(({ solid, lines }) => [solid, lines].forEach((drawing) => drawing?.free()));
-    card.extras[name] = scene.extras[name].map(({ solid, lines, matrix = IDENTITY, strength = 1, over = false }) => ({
-      solid: solid && solidOf(gl, solid), lines: lines && linesOf(gl, lines), matrix, strength, over,
-    }));
-  };
-  const paintExtra = ({ solid, lines, strength, over }, seen) => {
-    if (over) gl.depthFunc(gl.ALWAYS);
-    if (solid) solid.draw(seen, { strength });
-    if (lines) lines.draw(seen.toClip, { lift: 1e-4 });
-    gl.depthFunc(gl.LEQUAL);
-  };
-  const painted = () => {
-    if (card.solid) card.solid.paint(markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, card.colours)));
-  };
-  const walls = () => {
-    const kept = new Map((card.walls || []).map((wall) => [wall.of, wall]));
-    card.walls = scene.walls && scene.walls.map((of) => kept.get(of) || { of, ...solidOf(gl, of) });
-    kept.forEach((wall, of) => { if (!(scene.walls || []).includes(of)) wall.free(); });
-  };
-  const paintPlate = (seen, look = {}) => {
-    card.table.solid.draw(seen, look);
-    card.table.lines.draw(seen.toClip, { lift: 1e-5 });
-  };
-  const ask = () => {
-    if (!asked) requestAnimationFrame(draw);
-    asked = true;
-  };
-  /** Another value of the scene, and what the card has of it anew. */
-  const take = (name, remade) => (value) => {
-    if (value === scene[name]) return;
-    scene[name] = value;
-    anew(remade);
-  };
-  outlive(gl, () => {}, () => { build(); draw(); });
+  outlive(gl, () => {}, () => {
+    [card, frame] = [{}, frameOf(gl, 4)];
+    Object.keys(makers).forEach((name) => stale.set(name, false));
+    ask();
+  });
   new ResizeObserver(ask).observe(canvas);
-  build();
   return {
     ask,
     drawn,
-    machine: (machine, dark) => { Object.assign(scene, { machine, dark }); anew(table); },
-    show: (model) => { scene.model = model; scene.red = scene.marks = null; anew(solid); },
-    stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
-    red: take("red", painted),
-    /** A byte of each face: the kinds of zones it is marked for. */
-    marks: take("marks", painted),
-    /** More to draw under a name: things(): [{solid, lines, matrix, strength, over: before all else}], made where what it tells is new. */
-    extra: (name, told, things) => {
-      if ((drawnOf[name] ?? "") === told) return;
-      drawnOf[name] = told;
-      scene.extras[name] = things();
-      anew(name);
+    extra,
+    machine: (machine, dark) => { Object.assign(scene, { machine, dark }); anew("table"); },
+    show: (model) => {
+      Object.assign(scene, { model, red: null, marks: null });
+      colours = new Uint8Array(12 * (model?.count || 0));
+      anew("model");
     },
+    stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
+    red: take("red", "model", true),
+    /** A byte of each face: the kinds of zones it is marked for. */
+    marks: take("marks", "model", true),
     cut: (planes, colours) => {
       const drawable = planes && planes.length <= MOST_CUTS;
       scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
@@ -187,22 +167,17 @@ export function pictureOf(canvas, camera) {
     },
     /** The parts as bodies of their own, each shifted, in place of the model; chosen: the number of the part that stands out, 0: all. */
     pieces: (found, shifts, chosen) => {
-      const same = scene.pieces === found, repainted = scene.chosen !== chosen;
+      if (scene.pieces !== found) anew("pieces");
+      else if (found && scene.chosen !== chosen) anew("pieces", true);
       Object.assign(scene, { pieces: found, shifts, chosen });
-      if (same && !(found && repainted)) ask();
-      else anew(same && card.pieces ? chosenPiece : pieces);
+      ask();
     },
     /** The walls of what is sliced, triangles of each part, with the model and its copies as ghosts about them; null: none. */
-    walls: (found) => {
-      const same = (scene.walls || []).length === (found || []).length && (found || []).every((wall, k) => wall === scene.walls[k]);
-      if (same && Boolean(found) === Boolean(scene.walls)) return;
-      scene.walls = found;
-      anew(walls);
-    },
+    walls: take("walls"),
     /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
-    plane: take("plane", plane),
+    plane: take("plane"),
     /** The triangles of what the model stands on, in the platform's frame, or none. */
-    pedestal: take("pedestal", pedestal),
+    pedestal: take("pedestal"),
     /** Where the middle of all that is drawn but the walls stands on the plate, and its copies, from there. */
     place(place, copies) {
       const told = JSON.stringify([place, copies, scene.box]);
@@ -210,7 +185,7 @@ export function pictureOf(canvas, camera) {
       placed = told;
       Object.assign(scene, { place, copies });
       const boxes = copies.slice(bodies()).flatMap((shift) => boxEdges(...scene.box.map((corner) => add(corner, shift))));
-      this.extra("copies", boxes.length ? told : "", () => (boxes.length ? [{ lines: trianglesOf([{ corners: boxes, colour: [...MODEL_COLOUR, 255] }]) }] : []));
+      extra("copies", boxes.length ? told : "", () => (boxes.length ? [{ lines: trianglesOf([{ corners: boxes, colour: [...MODEL_COLOUR, 255] }]) }] : []));
       ask();
     },
     /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
@@ -226,21 +201,19 @@ export function pictureOf(canvas, camera) {
     thumbnails: (wanted) => {
       if (gl.isContextLost() || !scene.model) return;
       renew();
-      card.solid.paint(paintedRed(scene.model.count, null, MODEL_COLOUR, card.colours));
+      card.model.paint(paintedRed(scene.model.count, null, MODEL_COLOUR, colours));
       wanted.forEach(([rows, into]) => thumbnail(rows, into));
-      anew(painted);
+      anew("model", true);
     },
     /** All that is drawn brought into view, and other places. */
     fit: (others = []) => {
-      camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), canvas.clientWidth / Math.max(canvas.clientHeight, 1));
+      camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), sizeOf(canvas));
       ask();
     },
     /** From where and along what an event on the canvas looks, in the frame of the platform, the model in its middle. */
-    sight(event) {
-      const box = canvas.getBoundingClientRect(), eye = camera.eye();
-      const x = ((event.clientX - box.left) / box.width * 2 - 1) * (box.width / box.height) * HALF_HEIGHT;
-      const y = (1 - ((event.clientY - box.top) / box.height) * 2) * HALF_HEIGHT;
-      return [this.eye(), add(unit(sub(camera.target, eye)), add(scaled(camera.right(), x), scaled(camera.up(), y)))];
+    sight: (event) => {
+      const [eye, along] = camera.sight(placeOn(canvas, event));
+      return [sub(eye, scene.place), along];
     },
     /** The same in the frame of the model as it is read. */
     ray(event) {

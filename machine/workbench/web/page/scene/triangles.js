@@ -1,7 +1,7 @@
 // Triangles: the model as it is read, what of it overhangs for a rotation, and the face under a finger.
 
 import { add, bounds, carried, cross, dot, length, mix, multiply, RAD, rotated, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
-import { RED } from "../../../../view/template/picture/model.js";
+import { RED, wordOf } from "../../../../view/template/picture/solids.js";
 
 /** {vertices, faces, corners: places of the triangles' corners, normals, areas, reach_mm: of the farthest vertex from the middle} of the server's bytes. */
 export function trianglesFrom(buffer) {
@@ -41,13 +41,11 @@ export function overhanging({ vertices, faces, normals, areas, count }, up, limi
 }
 
 /** Colours of all corners, the faces that are marked red. */
-export function paintedRed(count, red, colour, into) {
-  const words = new Uint32Array(into.buffer), plain = wordOf(colour, 254), marked = wordOf(RED, 255);
+export function paintedRed(count, red, colour, into = new Uint8Array(12 * count)) {
+  const words = new Uint32Array(into.buffer), plain = wordOf(colour, 254), marked = wordOf(RED);
   for (let face = 0, k = 0; face < count; face++, k += 3) words[k] = words[k + 1] = words[k + 2] = red && red[face] ? marked : plain;
   return into;
 }
-
-export const wordOf = ([r, g, b], a) => new Uint32Array(new Uint8Array([r, g, b, a]).buffer)[0];
 
 const EDGE_SLACK = 1e-9; // of a triangle's side: a ray along an edge, as one through the middle of a square, would slip between two faces by rounding
 

@@ -1,8 +1,7 @@
 // Walls: what is seen of the parts that are sliced, drawn as they become ready, over the faint model and its copies.
 
 import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
-import { PLAIN, rgb } from "../../../../view/template/picture/solids.js";
-import { wordOf } from "../scene/triangles.js";
+import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
 import { store, subscribe, update } from "../store.js";
 
 const PIECE = 7; // numbers of a straight piece: two ends and its height
@@ -42,7 +41,7 @@ export function wallsOf(picture) {
     }
     slices?.ready.filter((part) => !asked.has(part)).forEach((part) => fetchPart(part, number));
     const shown = slices && triangles && store.walls.size > 0;
-    picture.walls(shown ? [...store.walls.values()] : null);
+    picture.walls(shown ? store.walls : null);
     document.documentElement.dataset.walls = shown ? [...store.walls.keys()].sort((a, b) => a - b).join(" ") : "";
   });
 }
