@@ -1,4 +1,4 @@
-// Page: the elements, and words that several places say in the same way.
+// Elements: how both pages find, make, fill and hear their elements, and words that several places say in the same way.
 
 export const $ = (id) => document.getElementById(id);
 
@@ -11,6 +11,41 @@ export function made(tag, { text, className, ...properties } = {}, ...children) 
   element.append(...children);
   return element;
 }
+
+/** A button with what it does; more: its other properties. */
+export const button = (text, onclick, more = {}, ...children) => made("button", { type: "button", text, onclick, ...more }, ...children);
+
+/** A row of a table; cells: texts and elements. */
+export const rowOf = (cells, tag = "td") => made("tr", {}, ...cells.map((cell) => made(tag, {}, cell)));
+
+/** Entries of a list of choices: [value, text]. */
+export const optionsOf = (entries, chosen) => entries.map(([value, text]) => made("option", { value, text, selected: value === chosen }));
+
+/** What is done at an event of elements, a table by their ids. */
+export const listen = (event, acts) => Object.entries(acts).forEach(([id, act]) => $(id).addEventListener(event, act));
+
+/** What is done at a click on the elements that have a data-NAME, each with its data. */
+export const onData = (name, act, within = document) => within.querySelectorAll(`[data-${name}]`)
+  .forEach((element) => element.addEventListener("click", () => act(element.dataset)));
+
+/** Which elements are hidden, which cannot be pressed, and what texts they have, tables by their ids; what is the same is not read aloud again. */
+const putAll = (property) => (values) => Object.entries(values).forEach(([id, value]) => { if ($(id)[property] !== value) $(id)[property] = value; });
+export const hide = putAll("hidden");
+export const disable = putAll("disabled");
+export const tell = putAll("textContent");
+
+/** A text that is seen where there is one. */
+export function sayIn(id, text) {
+  tell({ [id]: text });
+  hide({ [id]: !text });
+}
+
+export const pressed = (id, whether) => $(id).setAttribute("aria-pressed", whether);
+export const toggle = (name, whether) => document.body.classList.toggle(name, Boolean(whether));
+export const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+
+/** Terms with their texts, and with classes of those that have one. */
+export const termsOf = (pairs) => pairs.flatMap(([name, text, className]) => [made("dt", { text: name }), made("dd", { text, className })]);
 
 /** A patch of a colour. */
 export function swatch(colour) {
@@ -49,9 +84,7 @@ const NOTICES = new Map(); // what is said now, by what it is about
 export function notice(text, about) {
   if (NOTICES.get(about) !== text) NOTICES.delete(about); // what is said anew goes to the end
   if (text) NOTICES.set(about, text);
-  const said = [...NOTICES.values()].at(-1) || "";
-  if ($("notice").textContent !== said) $("notice").textContent = said; // read aloud once
-  $("notice").hidden = !said;
+  sayIn("notice", [...NOTICES.values()].at(-1) || "");
 }
 
 const UNTYPED = ["range", "radio", "checkbox", "button", "file"]; // inputs into which no letter goes
@@ -85,6 +118,15 @@ export function bells() {
     ring: (...names) => new Set(names.flatMap((name) => heard.get(name) || [])).forEach((listener) => listener()),
   };
 }
+
+/** An element put where a place of the picture is seen, in pixels; null: it is not. */
+export function putAt(element, place) {
+  element.hidden = !place;
+  if (place) element.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
+}
+
+/** Colours with words, so many that they have room. */
+export const swatches = (entries) => entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text));
 
 /** chosen(panel's id) is called with every choice. */
 export function tabsOf(chosen) {

@@ -1,6 +1,6 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
-import { $, bells, duration, notice, themeSwitch } from "./elements.js";
+import { $, bells, duration, listen, notice, tell, themeSwitch, toggle } from "./elements.js";
 import { compileAll, pictureOf } from "./moves/picture.js";
 import { printOf } from "./moves/rows.js";
 import { sceneOf } from "./moves/scene.js";
@@ -22,8 +22,7 @@ async function main() {
   $("tiltprint").textContent = "";
   const print = await printOf(text), { header, rows } = print;
   const ring = bells(), camera = cameraOf(), scene = sceneOf(print, ring);
-  $("title").textContent = header.title;
-  $("summary").textContent = summaryOf(header, rows);
+  tell({ title: header.title, summary: summaryOf(header, rows) });
   showReport(header);
   controlsOf(print, scene, ring);
   frontOf(print, scene);
@@ -31,23 +30,17 @@ async function main() {
   layerSliders(print, scene, ring);
   layerTimes(scene, ring);
   const chooseTheme = themeSwitch((dark) => { scene.dark = dark; ring.ring("theme"); }), player = courseOf(print, scene, ring);
-  const findings = findingsOf(print, scene, ring, camera, player.stop), code = textOf(print, scene, ring, player.stop);
+  const findings = findingsOf(print, scene, ring, camera, player), code = textOf(print, scene, ring, player);
   scene.go(rows.count - 1);
   outsideOf({ scene, findings, code, chooseTheme, camera, bells: ring });
   if (!gl) return withoutPicture();
   const picture = pictureOf(gl, print, scene, camera, ring, findings.showMarkers);
   const fit = fitting(print, scene, camera, picture, ring);
   keysOf({ scene, camera, player, look: picture.moved, fit, chooseTheme });
-  handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
+  handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => { const row = picture.rowAt(event); if (row >= 0) player.go(row); } });
   if (header.live && location.protocol.startsWith("http")) follow(scene, player);
   document.documentElement.dataset.openedMs = performance.now().toFixed(0);
   document.documentElement.dataset.state = "ready";
-}
-
-function goTo(row, scene, player) {
-  if (row < 0) return;
-  player.stop();
-  scene.go(row);
 }
 
 function summaryOf({ time_s: seconds, filament_mm: filament, parts, thinned }, { count, layers }) {
@@ -77,7 +70,7 @@ function fitting(print, scene, camera, picture, ring) {
     camera.target = add(camera.target, sub(carried(now, middle), carried(before, middle)));
     before = now;
   });
-  $("fit").addEventListener("click", fit);
+  listen("click", { fit });
   viewButtons(camera, bestCorner(print), picture.ask);
   fit();
   return fit;
@@ -93,7 +86,7 @@ function bestCorner({ header, chain }) {
 }
 
 function withoutPicture() {
-  document.body.classList.add("no-picture");
+  toggle("no-picture", true);
   notice("This browser shows no WebGL2, so there is no picture of the print; the report and the findings are complete.", "page");
   $("tab-report").click();
   document.documentElement.dataset.state = "failed";

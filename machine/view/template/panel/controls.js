@@ -1,34 +1,34 @@
 // Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
 
-import { $, duration, made, partsInWords, swatch, tabsOf } from "../elements.js";
+import { $, duration, listen, made, optionsOf, partsInWords, swatch, swatches, tabsOf, toggle } from "../elements.js";
 import { RAMP, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
 import { hex } from "../picture/solids.js";
 
 export function controlsOf(print, scene, bells) {
+  const { parts } = print.header, posed = parts.filter((part) => part.base);
   for (const name of Object.keys(scene.on)) {
     const box = $(`show-${name}`);
     box.checked = scene.on[name];
     box.addEventListener("change", () => { scene.on[name] = box.checked; bells.ring("look"); });
   }
-  const select = (id, take, bell) => $(id).addEventListener("change", () => { take($(id).value); bells.ring(bell); });
-  $("model").value = scene.model;
-  $("colour-by").value = scene.mode;
-  select("colour-by", (value) => { scene.mode = value; }, "colours");
-  select("others", (value) => { scene.others = value; }, "look");
-  select("model", (value) => { scene.model = value; }, "look");
-  select("risky", (value) => { scene.risky = value; }, "model");
-  select("frame", (value) => { scene.riding = value === "workpiece"; }, "frame");
-  if (!print.rows.count) document.body.classList.add("no-paths"); else document.body.classList.add("has-paths");
-  if (!print.surfaces && !print.header.parts.some((part) => part.base)) document.body.classList.add("no-solids");
-  const posed = print.header.parts.filter((part) => part.base);
-  $("stand").append(...posed.map((part) => made("option", { value: part.index, text: `part ${part.index}` })));
-  $("stand").addEventListener("change", () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)));
-  $("apart").addEventListener("input", () => { scene.apart = Number($("apart").value); bells.ring("look"); });
-  if (print.header.parts.length < 2) document.body.classList.add("one-part");
+  const choices = { "colour-by": ["mode", "colours"], others: ["others", "look"], model: ["model", "look"], risky: ["risky", "model"] };
+  for (const [id, [key, bell]] of Object.entries(choices)) {
+    if (["mode", "model"].includes(key)) $(id).value = scene[key];
+    listen("change", { [id]: () => { scene[key] = $(id).value; bells.ring(bell); } });
+  }
+  $("stand").append(...optionsOf(posed.map(({ index }) => [index, `part ${index}`])));
+  listen("change", {
+    frame: () => { scene.riding = $("frame").value === "workpiece"; bells.ring("frame"); },
+    stand: () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)),
+  });
+  listen("input", { apart: () => { scene.apart = Number($("apart").value); bells.ring("look"); } });
+  toggle(print.rows.count ? "has-paths" : "no-paths", true);
+  toggle("no-solids", !print.surfaces && !posed.length);
+  toggle("one-part", parts.length < 2);
   typeBoxes(print, scene, bells);
-  tabsOf((panel) => document.body.classList.toggle("reporting", panel === "report"));
+  tabsOf((panel) => toggle("reporting", panel === "report"));
 }
 
 /** A box for every kind of line in the print, with its share of the time. */
@@ -42,37 +42,29 @@ function typeBoxes({ rows }, scene, bells) {
   }
   rows.types.forEach((name, place) => {
     if (!seconds[place]) return;
-    const box = made("input", { type: "checkbox", checked: true });
-    box.addEventListener("change", () => { scene.hidden[box.checked ? "delete" : "add"](place); bells.ring("colours"); });
-    const share = ((100 * seconds[place]) / whole).toFixed(1);
-    const told = made("span", { className: "share", text: `${share} %` });
-    $("types").append(made("label", {}, box, swatch(typeColour(name)), name || "not told", told));
+    const onchange = ({ target }) => { scene.hidden[target.checked ? "delete" : "add"](place); bells.ring("colours"); };
+    const share = made("span", { className: "share", text: `${((100 * seconds[place]) / whole).toFixed(1)} %` });
+    $("types").append(made("label", {}, made("input", { type: "checkbox", checked: true, onchange }), swatch(typeColour(name)), name || "not told", share));
   });
 }
 
 const TITLES = { kind: "kind of line", layer: "layer time" }; // where the title is not the word itself
 
 export function showLegend({ rows, header }, { mode, tried }, legend) {
-  const box = $("legend");
-  if (tried) {
-    const entries = tried.colours.slice(0, 24).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`));
-    return box.replaceChildren(made("b", { text: `as ${partsInWords(tried.parts)}` }), ...entries);
-  }
-  box.replaceChildren(made("b", { text: (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "") }));
-  if (legend) {
-    const scale = made("div", { className: "scale" });
-    scale.style.backgroundImage = `linear-gradient(to right, ${RAMP.map(hex).join(", ")})`;
-    box.append(scale, made("div", { className: "marks" }, ...legend.marks.map((text) => made("span", { text }))));
-    return;
-  }
-  const parts = header.parts.map((part) => [part.colour, part.index ? `${part.index}` : "the file"]);
-  const entries = mode === "kind" ? kindEntries(rows) : parts;
-  box.append(...entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text)));
+  const title = tried ? `as ${partsInWords(tried.parts)}` : (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "");
+  const parts = tried ? tried.colours.map((colour, k) => [colour, `${k + 1}`]) : header.parts.map(({ colour, index }) => [colour, index ? `${index}` : "the file"]);
+  const entries = swatches(mode === "kind" && !tried ? kindEntries(rows) : parts);
+  $("legend").replaceChildren(made("b", { text: title }), ...(legend && !tried ? scaleOf(legend) : entries));
+}
+
+function scaleOf({ marks }) {
+  const scale = made("div", { className: "scale" });
+  scale.style.backgroundImage = `linear-gradient(to right, ${RAMP.map(hex).join(", ")})`;
+  return [scale, made("div", { className: "marks" }, ...marks.map((text) => made("span", { text })))];
 }
 
 function kindEntries(rows) {
-  const used = new Set();
-  for (let i = 0; i < rows.count; i++) if (rows.kind[i] === KIND.extrude) used.add(rows.type[i]);
+  const used = new Set(rows.type.filter((_, i) => rows.kind[i] === KIND.extrude));
   return [...used].sort((a, b) => a - b).map((place) => [typeColour(rows.types[place]), rows.types[place] || "not told"]);
 }
 
@@ -95,11 +87,10 @@ export function readoutsOf(print, scene, bells) {
     ["nozzle", "nozzle", (i) => (rows.nozzle[i] ? `${(rows.nozzle[i] / 10).toFixed(0)} °C` : "–")],
     ["bed", "bed", (i) => (rows.bed[i] ? `${(rows.bed[i] / 10).toFixed(0)} °C` : "–")],
   ];
-  const less = new Set(["fan", "flow", "nozzle", "bed", "size"]);
+  const less = ["fan", "flow", "nozzle", "bed", "size"];
   for (const [id, label] of told) {
-    const className = [id === "type" ? "wide" : "", less.has(id) ? "less" : ""].join(" ");
-    const term = made("dt", { text: label, className: less.has(id) ? "less" : "" });
-    $("readouts").append(term, made("dd", { className }, made("output", { id: `readout-${id}`, ariaLive: "off" })));
+    const className = less.includes(id) ? "less" : id === "type" ? "wide" : "";
+    $("readouts").append(made("dt", { text: label, className: less.includes(id) ? "less" : "" }), made("dd", { className }, made("output", { id: `readout-${id}`, ariaLive: "off" })));
   }
   bells.on("row", () => { for (const [id, , of] of told) $(`readout-${id}`).textContent = rows.count ? of(scene.row) : "–"; });
 }

@@ -1,29 +1,26 @@
 // Course: the slider over the whole print, playing it, and the strip that shows where each part lies.
 
-import { $, duration, made, onKeys } from "../elements.js";
+import { $, duration, listen, onKeys, optionsOf, tell } from "../elements.js";
 import { viewKeys } from "../picture/camera.js";
 
 const PLAYING = [1, 5, 20, 100, 300, 1000];
 const USUAL = 100;
 
+/** {start, stop, toggle, playing, go(row), step(rows)}: the latter two stop the playing. */
 export function courseOf(print, scene, bells) {
-  const { rows, header } = print, position = $("position");
+  const { rows, header } = print, position = $("position"), total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
   position.max = Math.max(rows.count - 1, 0);
-  for (const speed of PLAYING) $("speed").append(made("option", { value: speed, text: `${speed}×`, selected: speed === USUAL }));
-  const total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
+  $("speed").append(...optionsOf(PLAYING.map((speed) => [speed, `${speed}×`]), USUAL));
   const player = playerOf(scene, bells, total);
-  position.addEventListener("input", (event) => {
-    player.stop();
-    scene.go(Number(position.value));
+  listen("input", { position: (event) => {
+    player.go(Number(position.value));
     if (event.isTrusted) bells.ring("moving");
-  });
-  $("play").addEventListener("click", player.toggle);
-  $("back").addEventListener("click", () => { player.stop(); scene.go(scene.row - 1); });
-  $("forth").addEventListener("click", () => { player.stop(); scene.go(scene.row + 1); });
+  } });
+  listen("click", { play: player.toggle, back: () => player.step(-1), forth: () => player.step(1) });
   bells.on("row", () => {
     if (Number(position.value) !== scene.row) position.value = scene.row;
     position.setAttribute("aria-valuetext", `${duration(scene.time())} of ${duration(total)}`);
-    $("clock").textContent = `${duration(scene.time())} / ${duration(total)}`;
+    tell({ clock: `${duration(scene.time())} / ${duration(total)}` });
   });
   paintStrip($("strip"), header.parts, rows.count);
   return player;
@@ -40,7 +37,7 @@ function playerOf(scene, bells, total) {
     bells.ring("moving");
     if (next >= total) player.stop(); else requestAnimationFrame(step);
   };
-  const tell = () => {
+  const show = () => {
     $("play").textContent = player.playing ? "❚❚" : "▶";
     $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
     bells.ring("look");
@@ -51,10 +48,15 @@ function playerOf(scene, bells, total) {
     player.playing = true;
     before = performance.now();
     requestAnimationFrame(step);
-    tell();
+    show();
   };
-  player.stop = () => { if (player.playing) { player.playing = false; tell(); } };
+  player.stop = () => { if (player.playing) { player.playing = false; show(); } };
   player.toggle = () => (player.playing ? player.stop() : player.start());
+  player.go = (row) => {
+    player.stop();
+    scene.go(row);
+  };
+  player.step = (rows) => player.go(scene.row + rows);
   return player;
 }
 
@@ -68,14 +70,13 @@ function paintStrip(strip, parts, count) {
 }
 
 export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
-  const step = (rows) => () => { player.stop(); scene.go(scene.row + rows); };
   const press = (id) => () => $(id).click();
   const layer = (by) => (event) => {
     if (event.shiftKey) scene.chooseLayers(Math.min(scene.low + by, scene.high), scene.high);
     else scene.chooseLayers(Math.min(scene.low, scene.high + by), scene.high + by);
   };
   const keys = {
-    ...viewKeys(camera, look), " ": () => player.toggle(), ",": step(-1), ".": step(1),
+    ...viewKeys(camera, look), " ": () => player.toggle(), ",": () => player.step(-1), ".": () => player.step(1),
     "[": layer(-1), "]": layer(1), "{": layer(-1), "}": layer(1),
     PageUp: () => scene.goLayer(1), PageDown: () => scene.goLayer(-1), Home: () => scene.go(0), End: () => scene.go(Infinity),
     t: press("show-travels"), s: press("show-seams"), m: press("show-machine"), b: press("show-beads"),
@@ -83,5 +84,5 @@ export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
     f: fit, d: () => chooseTheme(!scene.dark), "?": () => $("help").showModal(),
   };
   onKeys(keys, () => $("help").open);
-  $("help-button").addEventListener("click", () => $("help").showModal());
+  listen("click", { "help-button": keys["?"] });
 }

@@ -1,6 +1,6 @@
 // Findings: what the dry run complains about: a list, and markers over the picture, one for all that lie together; a click goes there.
 
-import { $, made } from "../elements.js";
+import { $, button, hide, made, putAt } from "../elements.js";
 import { standing } from "../moves/stage.js";
 import { carried, projected } from "../picture/math.js";
 
@@ -8,19 +8,18 @@ const APART_PX = 30; // findings nearer to each other share a marker
 const CELL_PX = APART_PX / Math.SQRT2; // no two markers lie in one cell
 const AROUND = [-2, -1, 0, 1, 2];
 
-export function findingsOf(print, scene, bells, camera, stop) {
+export function findingsOf(print, scene, bells, camera, player) {
   const { findings } = print.header, placed = findings.flatMap((finding, k) => (finding.row >= 0 && finding.workpiece_mm ? [k] : []));
   let chosen = -1;
   $("tab-findings").textContent = `Findings (${findings.length})`;
   $("findings").append(made("h2", { text: findings.length ? "Findings" : "The dry run finds nothing to complain about" }));
-  const items = findings.map((finding, k) => listed(finding, () => choose(k)));
+  const items = findings.map((finding, k) => findingButton(finding, () => choose(k), { disabled: finding.row < 0 }));
   $("findings").append(...items);
   const choose = (k) => {
     items[chosen]?.classList.remove("chosen");
     items[k].classList.add("chosen");
     chosen = k;
-    stop();
-    scene.go(findings[k].row);
+    player.go(findings[k].row);
     camera.target = carried(standing(print.chain, scene.place, scene.riding).work, findings[k].workpiece_mm);
     bells.ring("look");
   };
@@ -36,10 +35,16 @@ export function findingsOf(print, scene, bells, camera, stop) {
   const markers = markersOf(press);
   const showMarkers = (toClip, canvas) => {
     const shown = scene.on.findings && !scene.tried;
-    $("markers").hidden = !shown;
+    hide({ markers: !shown });
     if (shown) markers(groupsOf(findings, placed, toClip, canvas), findings, chosen);
   };
   return { showMarkers, open: (k) => { if (items[k]) open(k); } };
+}
+
+/** A finding as a button that goes there, where it has a place. */
+export function findingButton({ severity, code, message, part, layer, line }, onclick, { whole = "the whole file", ending = "", ...more } = {}) {
+  const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
+  return button("", onclick, { className: severity, ...more }, made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? where + ending : whole }));
 }
 
 /** [{x, y, members: places in the list}] of the findings in the picture; x, y: pixels of the first of each group. */
@@ -62,38 +67,18 @@ function groupsOf(findings, placed, toClip, { clientWidth: width, clientHeight: 
 
 /** A function that shows groups as buttons, as many as there are. */
 function markersOf(press) {
-  const buttons = [];
-  const added = () => {
-    const place = buttons.length, button = made("button", { type: "button" });
-    button.addEventListener("click", () => press(button.group));
-    buttons.push(button);
-    $("markers").append(button);
-    return buttons[place];
-  };
+  const markers = [];
   return (groups, findings, chosen) => {
+    while (markers.length < groups.length) $("markers").append(markers[markers.push(button("")) - 1]);
+    markers.forEach((marker, k) => putAt(marker, groups[k] ? [groups[k].x, groups[k].y] : null));
     groups.forEach((group, k) => {
-      const button = buttons[k] || added(), { members, x, y } = group, error = members.some((m) => findings[m].severity === "error");
+      const { members } = group, several = members.length > 1, error = members.some((m) => findings[m].severity === "error");
       const { severity, line, message } = findings[members[0]], first = `${severity}, line ${line}: ${message}`;
-      const told = members.length > 1 ? `${members.length} findings here, the first: ${first}` : first;
-      button.group = group;
-      button.hidden = false;
-      button.className = [error ? "error" : "warning", members.includes(chosen) ? "chosen" : ""].join(" ").trim();
-      button.textContent = members.length > 1 ? (members.length > 99 ? "99+" : members.length) : "!";
-      if (button.title !== told) {
-        button.title = told;
-        button.setAttribute("aria-label", told);
-      }
-      button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      const told = several ? `${members.length} findings here, the first: ${first}` : first;
+      Object.assign(markers[k], {
+        onclick: () => press(group), className: [error ? "error" : "warning", members.includes(chosen) ? "chosen" : ""].join(" ").trim(),
+        textContent: several ? (members.length > 99 ? "99+" : members.length) : "!", ...(markers[k].title === told ? {} : { title: told, ariaLabel: told }),
+      });
     });
-    buttons.slice(groups.length).forEach((button) => { button.hidden = true; });
   };
-}
-
-function listed(finding, choose) {
-  const where = [finding.part && `part ${finding.part}`, finding.layer && `layer ${finding.layer}`, finding.line && `line ${finding.line}`];
-  const button = made("button", { type: "button", className: finding.severity, disabled: finding.row < 0 },
-    made("b", { text: `${finding.severity}: ${finding.code}` }), finding.message,
-    made("small", { text: where.filter(Boolean).join(", ") || "the whole file" }));
-  button.addEventListener("click", choose);
-  return button;
 }

@@ -1,48 +1,44 @@
 // Layers: the two handles that limit what is drawn of the chosen part, typed numbers and heights, and a bar for the time of every layer.
 
-import { $, duration, made } from "../elements.js";
+import { $, duration, hide, listen, optionsOf, tell } from "../elements.js";
 import { clamp } from "../picture/math.js";
 
-export function layerSliders(print, scene, bells) {
-  const ends = ["low", "high"].map((end) => ({
-    end, slider: $(`layer-${end}`), part: $(`layer-${end}-part`), number: $(`layer-${end}-number`), height: $(`layer-${end}-mm`),
-  }));
-  for (const part of print.header.parts)
-    if (part.rows) $("part").append(made("option", { value: part.index, text: part.index ? `part ${part.index}` : "the file" }));
-  const limit = (end, value) => {
-    if (end === "low") scene.chooseLayers(value, Math.max(value, scene.high));
-    else scene.chooseLayers(Math.min(value, scene.low), value);
+export function layerSliders({ header: { parts } }, scene, bells) {
+  const limits = {
+    low: (value) => scene.chooseLayers(value, Math.max(value, scene.high)),
+    high: (value) => scene.chooseLayers(Math.min(value, scene.low), value),
   };
-  const typed = ({ end, slider }, input, of) => {
-    if (input.value === "" || !Number.isFinite(Number(input.value))) return show();
-    limit(end, nearestLayer(scene.layers(), Number(slider.value), Number(input.value), of));
+  const typed = (end, field, of) => () => {
+    const { value } = $(`layer-${end}-${field}`);
+    if (value === "" || !Number.isFinite(Number(value))) return show();
+    limits[end](nearestLayer(scene.layers(), Number($(`layer-${end}`).value), Number(value), of));
     return scene.goTo(scene.layers()[scene[end]]);
   };
-  for (const each of ends) {
-    each.slider.addEventListener("input", () => limit(each.end, Number(each.slider.value)));
-    each.number.addEventListener("change", () => typed(each, each.number, (layer) => layer.number));
-    each.height.addEventListener("change", () => typed(each, each.height, (layer) => layer.z));
+  for (const end of Object.keys(limits)) {
+    listen("input", { [`layer-${end}`]: ({ target }) => limits[end](Number(target.value)) });
+    listen("change", { [`layer-${end}-number`]: typed(end, "number", ({ number }) => number), [`layer-${end}-mm`]: typed(end, "mm", ({ z }) => z) });
   }
-  $("part").addEventListener("change", () => scene.choosePart($("part").value === "" ? null : Number($("part").value)));
+  $("part").append(...optionsOf(parts.filter(({ rows }) => rows).map(({ index }) => [index, index ? `part ${index}` : "the file"])));
+  listen("change", { part: () => scene.choosePart($("part").value === "" ? null : Number($("part").value)) });
   const show = () => {
-    const layers = scene.layers(), most = Math.max(layers.length - 1, 0), several = print.header.parts.length > 1 && scene.part === null;
-    $("layers").hidden = layers.length < 2;
-    for (const { end, slider, part, number, height } of ends) {
-      const layer = layers[scene[end]];
-      slider.max = most;
+    const layers = scene.layers();
+    hide({ layers: layers.length < 2 });
+    for (const end of Object.keys(limits)) {
+      const layer = layers[scene[end]], slider = $(`layer-${end}`);
+      slider.max = Math.max(layers.length - 1, 0);
       slider.value = scene[end];
       if (!layer) continue;
       slider.setAttribute("aria-valuetext", layerInWords(layer));
-      part.textContent = several ? `part ${layer.part}` : "";
-      number.value = layer.number;
-      height.value = layer.z.toFixed(2);
+      tell({ [`layer-${end}-part`]: parts.length > 1 && scene.part === null ? `part ${layer.part}` : "" });
+      $(`layer-${end}-number`).value = layer.number;
+      $(`layer-${end}-mm`).value = layer.z.toFixed(2);
     }
   };
   bells.on("layers", show);
   show();
 }
 
-export const layerInWords = (layer) => `${layer.part ? `part ${layer.part}, ` : ""}layer ${layer.number}, ${layer.z.toFixed(2)} mm, takes ${duration(layer.time)}`;
+const layerInWords = (layer) => `${layer.part ? `part ${layer.part}, ` : ""}layer ${layer.number}, ${layer.z.toFixed(2)} mm, takes ${duration(layer.time)}`;
 
 /** The place of the layer that comes nearest to a value, among those of the same part as the layer at a place. */
 function nearestLayer(layers, place, value, of) {

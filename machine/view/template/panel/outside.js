@@ -1,15 +1,13 @@
 // Outside: with whom the page talks: the workbench's page in which it may lie, and the server of a running print.
 
-import { $, duration } from "../elements.js";
-
-const inside = () => parent !== window && location.origin !== "null";
+import { $, duration, hide, listen, onData, tell, toggle } from "../elements.js";
 
 /** The workbench says {tiltprint: "finding", finding}, {..: "line", line}, {..: "text", text: the file}, {..: "theme", dark}, {..: "view", yaw, pitch in
  * radians}; it is told the latter, too, when a hand has turned the view. */
 export function outsideOf({ scene, findings, code, chooseTheme, camera, bells }) {
-  if (!inside()) return;
-  document.body.classList.add("inside");
-  const tell = (word, more = {}) => parent.postMessage({ tiltprint: word, ...more }, location.origin);
+  if (parent === window || location.origin === "null") return;
+  toggle("inside", true);
+  const say = (word, more = {}) => parent.postMessage({ tiltprint: word, ...more }, location.origin);
   const heard = {
     finding: ({ finding }) => findings.open(finding),
     line: ({ line }) => scene.goToLine(line),
@@ -23,53 +21,48 @@ export function outsideOf({ scene, findings, code, chooseTheme, camera, bells })
   addEventListener("message", ({ data, origin, source }) => {
     if (source === parent && origin === location.origin) heard[data?.tiltprint]?.(data);
   });
-  for (const turned of ["pointerup", "keyup", "click"]) addEventListener(turned, () => tell("view", { yaw: camera.yaw, pitch: camera.pitch }));
+  for (const turned of ["pointerup", "keyup", "click"]) addEventListener(turned, () => say("view", { yaw: camera.yaw, pitch: camera.pitch }));
   let asked = false;
-  $("tab-code").addEventListener("click", () => { if (!asked && code.needed()) tell("text"); asked = true; });
-  addEventListener("keydown", (event) => { if (event.key === "Escape" && !$("help").open) tell("leave"); });
-  tell("ready");
+  listen("click", { "tab-code": () => { if (!asked && code.needed()) say("text"); asked = true; } });
+  addEventListener("keydown", (event) => { if (event.key === "Escape" && !$("help").open) say("leave"); });
+  say("ready");
 }
 
 const ASK_EVERY_MS = 1000;
 const OVER = ["done", "cancelled", "left", "declined", "failed"], AWAY = ["pausing", "paused"]; // the tip, from the print
 const NOT_ARRIVED = "that has not arrived: use the terminal, or the printer's own switch";
 
+/** Follows a running print, asking the computer that served the page for what the printer has acknowledged. */
 export function follow(scene, player) {
-  const badge = $("live");
-  badge.hidden = false;
-  orders(badge);
+  hide({ live: false });
+  orders();
+  const [pause, resume] = ["pause", "resume"].map((name) => document.querySelector(`[data-order=${name}]`));
   let shown = -1;
   const ask = async () => {
-    let state;
-    try {
-      state = await (await fetch("state", { cache: "no-store" })).json();
-    } catch {
-      badge.textContent = "the print's computer does not answer";
-      return setTimeout(ask, 5 * ASK_EVERY_MS);
-    }
-    badge.textContent = liveTold(state);
-    $("orders").hidden = OVER.includes(state.state);
-    document.querySelector("[data-order=pause]").hidden = AWAY.includes(state.state);
-    document.querySelector("[data-order=resume]").hidden = !AWAY.includes(state.state);
+    const state = await fetch("state", { cache: "no-store" }).then((answer) => answer.json()).catch(() => null);
+    tell({ live: state ? liveTold(state) : "the print's computer does not answer" });
+    if (!state) return setTimeout(ask, 5 * ASK_EVERY_MS);
+    const over = OVER.includes(state.state), away = AWAY.includes(state.state);
+    hide({ orders: over });
+    [pause.hidden, resume.hidden] = [away, !away];
     if (state.file_line && state.file_line !== shown && !player.playing) {
       shown = state.file_line;
       scene.goToLine(state.file_line);
     }
-    return OVER.includes(state.state) ? null : setTimeout(ask, ASK_EVERY_MS);
+    return over ? null : setTimeout(ask, ASK_EVERY_MS);
   };
   ask();
 }
 
 /** The buttons, which do what keys in the terminal do; a stop is asked about once more, an emergency stop is not. */
-function orders(badge) {
-  const sure = (asked) => { $("stop-surely").hidden = !asked; $("stop").hidden = asked; };
-  $("stop").addEventListener("click", () => sure(true));
-  $("go-on").addEventListener("click", () => sure(false));
-  document.querySelectorAll("[data-order]").forEach((button) => button.addEventListener("click", async () => {
+function orders() {
+  const sure = (asked) => hide({ "stop-surely": !asked, stop: asked });
+  listen("click", { stop: () => sure(true), "go-on": () => sure(false) });
+  onData("order", async ({ order }) => {
     sure(false);
-    const answer = await fetch(`order/${button.dataset.order}`, { method: "POST" }).catch(() => null);
-    if (!answer?.ok) badge.textContent = NOT_ARRIVED;
-  }));
+    const answer = await fetch(`order/${order}`, { method: "POST" }).catch(() => null);
+    if (!answer?.ok) tell({ live: NOT_ARRIVED });
+  });
 }
 
 function liveTold(told) {

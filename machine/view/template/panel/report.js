@@ -1,6 +1,6 @@
 // Report: the front of decompositions, figures and tables beside the picture, and the picture that is printed with them.
 
-import { $, made, roughly } from "../elements.js";
+import { $, hide, listen, made, roughly, rowOf, termsOf } from "../elements.js";
 import { MOST_CUTS } from "../picture/solids.js";
 
 const orDash = (value, told) => (value === null ? "–" : told(value));
@@ -15,11 +15,11 @@ const FRONT = [
 export function frontOf(print, scene) {
   const { front } = print.header;
   if (front.length < 2) return;
-  $("front-field").hidden = false;
-  const drawable = (row) => print.surfaces && row.planes.length <= MOST_CUTS;
+  hide({ "front-field": false });
   const choose = (row) => {
-    scene.tryRow(row.chosen || !drawable(row) ? null : row);
-    showChoice(row, drawable(row));
+    const drawable = print.surfaces && row.planes.length <= MOST_CUTS;
+    scene.tryRow(row.chosen || !drawable ? null : row);
+    showChoice(row, drawable);
   };
   const head = made("tr", {}, ...["parts", ...FRONT.map(([name]) => name)].map((text) => made("th", { text, scope: "col" })));
   $("front").append(made("thead", {}, head), made("tbody", {}, ...front.map((row, k) => lineOf(row, !row.chosen && !pays(row, front.slice(0, k)), choose))));
@@ -30,12 +30,12 @@ export function frontOf(print, scene) {
 const pays = (row, fewer) => fewer.every(({ cost_mm2: cost }) => row.cost_mm2 < cost);
 
 function lineOf(row, idle, choose) {
-  const mark = made("input", { type: "radio", name: "front", value: row.parts, checked: row.chosen });
-  mark.addEventListener("change", () => choose(row));
-  const first = made("td", {}, made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `taken: ${row.why}` })] : [])));
-  const line = made("tr", { className: idle ? "idle" : "" }, first, ...FRONT.map(([, of]) => made("td", { text: of(row) })));
+  const mark = made("input", { type: "radio", name: "front", value: row.parts, checked: row.chosen, onchange: () => choose(row) });
+  const label = made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `taken: ${row.why}` })] : []));
+  const line = rowOf([label, ...FRONT.map(([, of]) => of(row))]);
+  line.className = idle ? "idle" : "";
   line.addEventListener("click", (event) => {
-    if (first.contains(event.target) || mark.checked) return;
+    if (line.cells[0].contains(event.target) || mark.checked) return;
     mark.click();
     mark.focus();
   });
@@ -52,24 +52,22 @@ function showChoice(row, drawn) {
 const WORDY = 24; // letters: a column with longer cells is text, not figures
 
 export function showReport({ report, thinned, made_by: maker }) {
-  const box = $("report-text");
-  const facts = report.facts.flatMap(([name, value]) => [made("dt", { text: name }), made("dd", { text: value })]);
-  box.append(made("dl", {}, ...facts), ...report.tables.map(sectionOf));
-  if (thinned) box.append(made("p", { className: "note", text: thinnedTold(thinned) }));
-  box.append(made("p", { className: "note", text: `made by ${maker}` }));
-  $("print").addEventListener("click", () => window.print());
+  const notes = [...(thinned ? [thinnedTold(thinned)] : []), `made by ${maker}`];
+  $("report-text").append(made("dl", {}, ...termsOf(report.facts)), ...report.tables.map(sectionOf), ...notes.map(noteOf));
+  listen("click", { print: () => window.print() });
 }
 
 const thinnedTold = ({ rows, kept }) =>
   `of ${rows.toLocaleString("en")} moves ${kept.toLocaleString("en")} are shown: points inside straight strokes were left out`;
 
+const noteOf = (text) => made("p", { className: "note", text });
+
 function sectionOf({ title, head, rows, notes, folded }) {
   const wordy = head.map((_, k) => rows.some((cells) => cells[k].length > WORDY));
   const row = (tag, cells) => made("tr", {}, ...cells.map((text, k) => made(tag, { text, className: wordy[k] ? "words" : "" })));
   const table = made("table", {}, made("thead", {}, row("th", head)), made("tbody", {}, ...rows.map((cells) => row("td", cells))));
-  const content = [...(rows.length ? [made("div", { className: "table" }, table)] : []), ...notes.map((text) => made("p", { className: "note", text }))];
-  if (folded) return made("details", {}, made("summary", { text: title }), ...content);
-  return made("section", {}, made("h2", { text: title }), ...content);
+  const content = [...(rows.length ? [made("div", { className: "table" }, table)] : []), ...notes.map(noteOf)];
+  return folded ? made("details", {}, made("summary", { text: title }), ...content) : made("section", {}, made("h2", { text: title }), ...content);
 }
 
 /** What the canvas shows, kept on paper: WebGL's own is empty by the time that pages are laid out. */

@@ -1,6 +1,6 @@
 // Lines: the text of the G-code out of the page's own rows: patterns whose holes the numbers of a line's move fill (docs/view.md).
 
-import { $, made, nextFrame } from "../elements.js";
+import { $, listen, made, nextFrame, tell, toggle } from "../elements.js";
 import { clamp, countUpTo } from "../picture/math.js";
 
 const HOLE = /([A-Z])([\u0001-\u0006])/g;
@@ -37,7 +37,7 @@ async function linesOfFile(file) {
 }
 
 /** {take(file), go(line), needed()}: the text that is in the page, else that of a file. */
-export function textOf(print, scene, bells, stop) {
+export function textOf(print, scene, bells, player) {
   const { rows, header } = print, pane = $("code-lines"), room = $("code-room");
   let text = linesOfRows(print), asked = { row: -1, line: 0 };
   const now = () => (asked.row === scene.row ? asked.line : rows.line[scene.row] || 0);
@@ -73,19 +73,17 @@ export function textOf(print, scene, bells, stop) {
   };
   const go = (line) => {
     if (!text || !Number.isFinite(line)) return;
-    stop();
     const chosen = clamp(Math.round(line), 1, text.count), row = Math.max(countUpTo(rows.line, chosen) - 1, 0);
     asked = { row, line: chosen };
-    scene.go(row);
+    player.go(row);
   };
-  const has = () => document.body.classList.add("has-text");
   /** Shows a file's text. */
   const take = async (file) => {
     const taken = await linesOfFile(file), other = taken.count !== header.lines;
-    $("code-told").textContent = !other ? "" : `${file.name} has ${taken.count.toLocaleString("en")} lines; the file of this print has ${header.lines.toLocaleString("en")}: it is another one.`;
+    tell({ "code-told": !other ? "" : `${file.name} has ${taken.count.toLocaleString("en")} lines; the file of this print has ${header.lines.toLocaleString("en")}: it is another one.` });
     if (other) return;
     text = taken;
-    has();
+    toggle("has-text", true);
     follow();
   };
   const steps = { ArrowUp: () => -1, ArrowDown: () => 1, PageUp: () => -fit(), PageDown: fit, Home: () => -Infinity, End: () => Infinity };
@@ -98,18 +96,19 @@ export function textOf(print, scene, bells, stop) {
   });
   pane.addEventListener("click", (event) => { const line = event.target.closest("[role=option]"); if (line) go(Number(line.dataset.line)); });
   pane.addEventListener("scroll", ask);
-  $("code-line").addEventListener("change", () => go(Number($("code-line").value || NaN)));
-  $("code-file").addEventListener("change", () => { if ($("code-file").files[0]) take($("code-file").files[0]); });
-  $("tab-code").addEventListener("click", follow);
+  listen("change", {
+    "code-line": () => go(Number($("code-line").value || NaN)), "code-file": () => { if ($("code-file").files[0]) take($("code-file").files[0]); },
+  });
+  listen("click", { "tab-code": follow });
   bells.on("row", follow);
   new ResizeObserver(follow).observe(pane);
-  if (text) has();
+  toggle("has-text", text);
   return { take, go, needed: () => !text };
 }
 
 function textLine(number, { line }, marked) {
   const words = line(number), cut = words.indexOf(";"), code = cut < 0 ? words : words.slice(0, cut);
-  const row = made("div", { id: `code-${number}`, role: "option", className: number === marked ? "now" : "" },
+  const row = made("div", { id: `code-${number}`, className: number === marked ? "now" : "" },
     made("span", { className: "number", text: number }), code, ...(cut < 0 ? [] : [made("span", { className: "comment", text: words.slice(cut) })]));
   row.setAttribute("role", "option");
   row.setAttribute("aria-selected", number === marked);

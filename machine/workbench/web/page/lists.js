@@ -1,35 +1,13 @@
 // Elements: texts, lists and rows that several panels show in the same way.
 
-import { $, made } from "../../../view/template/elements.js";
+import { $, button, made, termsOf } from "../../../view/template/elements.js";
 
-export const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 export const newtons = (force) => `${Number(force.toPrecision(2))} N`;
 export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...form });
 
-/** What is done at an event of elements, a table by their ids. */
-export const listen = (event, acts) => Object.entries(acts).forEach(([id, act]) => $(id).addEventListener(event, act));
-
 /** A value into a field, but for one that somebody types in. */
 export const fill = (field, value) => { if (document.activeElement !== field) field.value = value; };
-
-/** Which elements are hidden, which cannot be pressed, and what texts they have, tables by their ids; what is the same is not read aloud again. */
-const putAll = (property) => (values) => Object.entries(values).forEach(([id, value]) => { if ($(id)[property] !== value) $(id)[property] = value; });
-export const hide = putAll("hidden");
-export const disable = putAll("disabled");
-export const tell = putAll("textContent");
-
-/** A text that is seen where there is one. */
-export function sayIn(id, text) {
-  tell({ [id]: text });
-  hide({ [id]: !text });
-}
-
-export const pressed = (id, whether) => $(id).setAttribute("aria-pressed", whether);
-export const toggle = (name, whether) => document.body.classList.toggle(name, Boolean(whether));
-
-/** A button with what it does; more: its other properties. */
-export const button = (text, onclick, more = {}, ...children) => made("button", { type: "button", text, onclick, ...more }, ...children);
 
 /** A button of a row that takes away what it stands for. */
 export const cross = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
@@ -39,7 +17,7 @@ export function tellIn(id, pairs) {
   const told = JSON.stringify(pairs);
   if ($(id).told === told) return;
   $(id).told = told;
-  $(id).replaceChildren(...pairs.flatMap(([name, text, className]) => [made("dt", { text: name }), made("dd", { text, className })]));
+  $(id).replaceChildren(...termsOf(pairs));
 }
 
 export const listIn = (id, sentences) => $(id).replaceChildren(...sentences.map((text) => made("li", { text })));
@@ -80,10 +58,4 @@ export function choiceRow(name, value, checked, label, cells, choose) {
   const mark = made("input", { type: "radio", name, value, checked, onchange: choose });
   const onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
   return made("tr", { onclick }, made("td", {}, made("label", {}, mark, ...label)), ...cells.map(([content, className]) => made("td", { className }, content)));
-}
-
-/** A knob put where a place is seen; null: it is not. */
-export function putAt(knob, place) {
-  knob.hidden = !place;
-  if (place) knob.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
 }

@@ -1,9 +1,8 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, notice, onKeys, tabsOf, themeSwitch } from "../../../view/template/elements.js";
+import { $, hide, listen, notice, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
-import { hide, listen, tell, toggle } from "./lists.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
 import { modelPanel, sizePanel } from "./model/model-panel.js";
 import { fetchModel, modelOf, pedestalOf } from "./model/model.js";

@@ -1,8 +1,8 @@
 // Told: what the page says of its work: a title, what is under way and for how long, and what could not be done.
 
-import { $, duration } from "../../../view/template/elements.js";
+import { $, button, duration } from "../../../view/template/elements.js";
 import { send } from "./line.js";
-import { button, withWholeOptions } from "./lists.js";
+import { withWholeOptions } from "./lists.js";
 import { onState } from "./store.js";
 
 /** Buttons, one a unit, that say what a model's coordinates are in. */

@@ -1,8 +1,8 @@
 // Benches: several models at once, each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
 
-import { $, made, notice, partsInWords } from "../../../../view/template/elements.js";
+import { $, button, hide, listen, made, notice, partsInWords, tell } from "../../../../view/template/elements.js";
 import { lineAt, sendFile } from "../line.js";
-import { button, clock, cross, hide, listen, putRows, tell } from "../lists.js";
+import { clock, cross, putRows } from "../lists.js";
 import { onNew } from "../store.js";
 
 const TOLD_MS = 8000;

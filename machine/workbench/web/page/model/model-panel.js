@@ -1,8 +1,8 @@
 // Model panel: the file, how it is turned, what overhangs then, the ways it rests, and how large it stands on the platform.
 
-import { $ } from "../../../../view/template/elements.js";
+import { $, alike, button, listen, sayIn } from "../../../../view/template/elements.js";
 import { send } from "../line.js";
-import { alike, button, fill, listen, listIn, mm2, sayIn, tellIn } from "../lists.js";
+import { fill, listIn, mm2, tellIn } from "../lists.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { unitButtons } from "../told.js";

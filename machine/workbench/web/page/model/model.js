@@ -1,9 +1,9 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal.
 
-import { $, made, notice, swatch } from "../../../../view/template/elements.js";
+import { $, alike, made, notice, swatch } from "../../../../view/template/elements.js";
 import { sub } from "../../../../view/template/picture/math.js";
 import { AGAIN_MS, newest } from "../line.js";
-import { alike, mm2 } from "../lists.js";
+import { mm2 } from "../lists.js";
 import { fadedColours } from "../parts/pieces.js";
 import { planesNow } from "../parts/planes.js";
 import { overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";

@@ -1,9 +1,8 @@
 // Place: where on the plate the model and its copies stand: dragged there in the picture, by arrow keys, or typed.
 
-import { $ } from "../../../../view/template/elements.js";
+import { $, alike, putAt } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask } from "../line.js";
-import { alike, putAt } from "../lists.js";
 import { gripOf } from "../scene/grip.js";
 import { onState, store, subscribe, update } from "../store.js";
 

@@ -1,10 +1,10 @@
 // Resting: the ways in which the model can lie: faces of its hull, lit to be clicked, and small pictures beside the words.
 
-import { $, made } from "../../../../view/template/elements.js";
+import { $, button, made } from "../../../../view/template/elements.js";
 import { add, dot, scaled } from "../../../../view/template/picture/math.js";
 import { trianglesOf } from "../../../../view/template/picture/solids.js";
 import { newest, send } from "../line.js";
-import { button, mm2 } from "../lists.js";
+import { mm2 } from "../lists.js";
 import { cornersAt, faceMet } from "../scene/triangles.js";
 import { store, subscribe, update } from "../store.js";
 

@@ -1,9 +1,8 @@
 // Rings: three about the model, by which it is turned about the platform's x, y and z; red follows as it does for the sliders.
 
-import { $ } from "../../../../view/template/elements.js";
+import { $, listen, pressed } from "../../../../view/template/elements.js";
 import { add, dot, length, RAD, scaled, sub, unit } from "../../../../view/template/picture/math.js";
 import { send } from "../line.js";
-import { listen, pressed } from "../lists.js";
 import { alongSeen, gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { store, update } from "../store.js";

@@ -1,9 +1,8 @@
 // Handles: three knobs at the chosen plane: one moves it along its normal, two tilt it; by hand, finger or arrow keys.
 
-import { $ } from "../../../../view/template/elements.js";
+import { $, putAt } from "../../../../view/template/elements.js";
 import { add, cross, dot, RAD, rotated, scaled, turned, unit } from "../../../../view/template/picture/math.js";
 import { beside } from "../../../../view/template/picture/model.js";
-import { putAt } from "../lists.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { sectionOf } from "../scene/triangles.js";
 import { store, subscribe } from "../store.js";

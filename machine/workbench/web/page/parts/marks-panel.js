@@ -1,10 +1,10 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, made, swatch } from "../../../../view/template/elements.js";
+import { $, alike, button, listen, made, putAt, swatch } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
 import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest, send } from "../line.js";
-import { alike, button, choiceRow, cross, fill, listen, putAt, putTable } from "../lists.js";
+import { choiceRow, cross, fill, putTable } from "../lists.js";
 import { sizeOf } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { onState, store, subscribe, update } from "../store.js";

@@ -1,7 +1,7 @@
 // Parts list: every part with the plane it stands on in a row, chosen there as in the picture; keys and a menu for what is done to it.
 
-import { $, made, needsKey, swatch } from "../../../../view/template/elements.js";
-import { button, choiceRow, newtons, putTable } from "../lists.js";
+import { $, button, made, needsKey, swatch } from "../../../../view/template/elements.js";
+import { choiceRow, newtons, putTable } from "../lists.js";
 import { store, subscribe } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 

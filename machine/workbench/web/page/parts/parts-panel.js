@@ -1,8 +1,8 @@
 // Parts panel: the search, and its front as a slider.
 
-import { $, made, partsInWords, roughly } from "../../../../view/template/elements.js";
+import { $, disable, hide, listen, made, partsInWords, roughly, tell, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
-import { disable, hide, listen, listIn, mm2, tell, tellIn, toggle } from "../lists.js";
+import { listIn, mm2, tellIn } from "../lists.js";
 import { onState, store, update } from "../store.js";
 
 export function partsPanel() {

@@ -1,12 +1,12 @@
 // Pieces: the parts as bodies of their own, drawn apart along their printing directions, so that the faces of the cuts are seen.
 
-import { $ } from "../../../../view/template/elements.js";
+import { $, listen } from "../../../../view/template/elements.js";
 import { blockOf } from "../../../../view/template/moves/block.js";
 import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
 import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/model.js";
 import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest } from "../line.js";
-import { listen, mm2, newtons } from "../lists.js";
+import { mm2, newtons } from "../lists.js";
 import { cornersAt, faceMet } from "../scene/triangles.js";
 import { store, subscribe, update } from "../store.js";
 

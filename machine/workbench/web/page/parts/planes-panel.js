@@ -1,9 +1,9 @@
 // Planes panel: the chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand.
 
-import { $ } from "../../../../view/template/elements.js";
+import { $, alike, disable, hide, listen, tell } from "../../../../view/template/elements.js";
 import { add, dot, RAD, scaled } from "../../../../view/template/picture/math.js";
 import { send } from "../line.js";
-import { alike, disable, fill, hide, listen, mm2, tell } from "../lists.js";
+import { fill, mm2 } from "../lists.js";
 import { sizeOf } from "../model/model-panel.js";
 import { onState, store, subscribe, update } from "../store.js";
 import { sectionNow } from "./handles.js";

@@ -1,7 +1,6 @@
 // At the printer: moved and heated by hand, its camera's picture, and a graph of its temperatures.
 
-import { $ } from "../../../../view/template/elements.js";
-import { listen } from "../lists.js";
+import { $, listen } from "../../../../view/template/elements.js";
 import { keptInTab } from "../store.js";
 import { IN_HAND } from "./print-shown.js";
 

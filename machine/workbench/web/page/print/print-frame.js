@@ -1,8 +1,7 @@
 // Print frame: the page of the print in the place of picture and panel, beside the tab that prints in the picture's alone; the two
 // pages tell each other what to show.
 
-import { $ } from "../../../../view/template/elements.js";
-import { listen, pressed, toggle } from "../lists.js";
+import { $, listen, pressed, toggle } from "../../../../view/template/elements.js";
 import { store, subscribe, update } from "../store.js";
 
 const frame = $("print-page"), heard = {}; // heard: what is done at what the page of the print says

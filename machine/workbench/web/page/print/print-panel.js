@@ -1,8 +1,8 @@
 // Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
 // whatever becomes of this page.
 
-import { $, needsKey, notice } from "../../../../view/template/elements.js";
-import { listen, sayIn, withWholeOptions } from "../lists.js";
+import { $, listen, needsKey, notice, sayIn } from "../../../../view/template/elements.js";
+import { withWholeOptions } from "../lists.js";
 import { onNew, onState, update } from "../store.js";
 import { handPanel, keepHeats, showHand, showHeats, webcamPanel } from "./at-printer.js";
 import { followIn } from "./print-frame.js";

@@ -1,7 +1,7 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab while anything prints, and what is told of prints outside the page.
 
-import { $, duration, made } from "../../../../view/template/elements.js";
-import { clock, hide, listIn, tell, tellIn } from "../lists.js";
+import { $, duration, hide, made, tell } from "../../../../view/template/elements.js";
+import { clock, listIn, tellIn } from "../lists.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
 const FEW = 8;

@@ -1,8 +1,7 @@
 // Prints line: a page's line to the prints, which comes back by itself, the name by which the page is known then, and what becomes of emergency stops.
 
-import { $, notice } from "../../../../view/template/elements.js";
+import { $, listen, notice, sayIn } from "../../../../view/template/elements.js";
 import { lineAt } from "../line.js";
-import { listen, sayIn } from "../lists.js";
 
 export const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
 const ANSWER_MS = 3000; // within which the workbench answers, and a printer has confirmed an emergency stop

@@ -1,7 +1,6 @@
 // Where to print: the lists of ports and of prints that can be gone on with.
 
-import { $, made } from "../../../../view/template/elements.js";
-import { alike, hide } from "../lists.js";
+import { $, alike, hide, made } from "../../../../view/template/elements.js";
 
 /** What is chosen of a list whose last entry is another one, typed. */
 export function chosenOr(name, typed) {

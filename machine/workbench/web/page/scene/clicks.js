@@ -1,7 +1,6 @@
 // Clicks: what the next click on the model is for, and what it does.
 
-import { $, notice } from "../../../../view/template/elements.js";
-import { listen, pressed } from "../lists.js";
+import { $, listen, notice, pressed } from "../../../../view/template/elements.js";
 import { layFacet } from "../model/resting.js";
 import { markAt, markWord } from "../parts/marks-panel.js";
 import { openMenu } from "../parts/parts-list.js";

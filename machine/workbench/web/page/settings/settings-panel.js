@@ -1,9 +1,9 @@
 // Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
 // changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
-import { $, made } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, made, pressed, tell } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
-import { alike, button, disable, hide, listen, pressed, putRows, tell } from "../lists.js";
+import { putRows } from "../lists.js";
 import { keptInTab, onState, store } from "../store.js";
 import { settingRow } from "./setting-row.js";
 

@@ -1,8 +1,8 @@
 // Save menu: all that is saved of a bench, in one place; what is not there yet says why.
 
-import { $ } from "../../../../view/template/elements.js";
+import { $, listen } from "../../../../view/template/elements.js";
 import { save } from "../line.js";
-import { listen, listIn } from "../lists.js";
+import { listIn } from "../lists.js";
 import { onNew, store } from "../store.js";
 
 const SECTIONS_OF = { machine: ["machine"], material: ["material"], process: ["process", "search"] }; // of the profiles' files

@@ -1,8 +1,8 @@
 // Slices panel: copies and pauses, the parts sliced, what the print takes, what the dry run complains of, and what one piece would cost.
 
-import { $, made, swatch } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, made, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
 import { send } from "../line.js";
-import { alike, button, cross, disable, hide, listen, listIn, putTable, sayIn, tell, tellIn, toggle } from "../lists.js";
+import { cross, listIn, putTable, tellIn } from "../lists.js";
 import { onState, store, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
