@@ -1,6 +1,6 @@
 // Findings: what the dry run complains about: a list, and markers over the picture, one for all that lie together; a click goes there.
 
-import { $, button, hide, made, putAt } from "../elements.js";
+import { $, button, findingButton, hide, made, putAt } from "../elements.js";
 import { standing } from "../moves/stage.js";
 import { carried, projected } from "../picture/math.js";
 
@@ -39,12 +39,6 @@ export function findingsOf(print, scene, bells, camera, player) {
     if (shown) markers(groupsOf(findings, placed, toClip, canvas), findings, chosen);
   };
   return { showMarkers, open: (k) => { if (items[k]) open(k); } };
-}
-
-/** A finding as a button that goes there, where it has a place. */
-export function findingButton({ severity, code, message, part, layer, line }, onclick, { whole = "the whole file", ending = "", ...more } = {}) {
-  const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
-  return button("", onclick, { className: severity, ...more }, made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? where + ending : whole }));
 }
 
 /** [{x, y, members: places in the list}] of the findings in the picture; x, y: pixels of the first of each group. */

@@ -1,6 +1,6 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, hide, listen, notice, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, disable, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
@@ -58,11 +58,11 @@ function main() {
     viewButtons(camera, CORNERS[0], picture.ask);
     axesOf(camera, picture);
   } else {
-    document.body.classList.add("no-picture");
+    toggle("no-picture", true);
     $("show-rings").disabled = true;
   }
   keysOf(camera, picture);
-  for (const button of document.querySelectorAll("[data-do]")) button.addEventListener("click", () => send({ do: button.dataset.do }));
+  onData("do", ({ do: name }) => send({ do: name }));
   root.dataset.state = picture ? "ready" : "failed";
 }
 
@@ -76,10 +76,9 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
   toggle("has-model", model);
-  for (const [id, word] of [["undo", undo], ["redo", redo]]) {
-    $(id).disabled = !word;
-    $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);
-  }
+  disable({ undo: !undo, redo: !redo });
+  $("undo").ariaLabel = undo ? `undo: ${undo}` : "undo";
+  $("redo").ariaLabel = redo ? `redo: ${redo}` : "redo";
 }
 
 /** What keys do; undo and redo, but where what is typed has an undo of its own. */

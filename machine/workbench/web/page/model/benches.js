@@ -38,18 +38,16 @@ export async function takeFiles(files) {
   await sendFiles(files.filter((file) => !further.includes(file)));
 }
 
-const closeBench = (number) => fetch(`../benches/${number}`, { method: "DELETE" });
-
 /** The list of the open benches, where there are several. */
 function showBenches(benches) {
-  $("benches").hidden = benches.length < 2;
+  hide({ benches: benches.length < 2 });
   putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
 }
 
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
   const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
-  return made("li", {}, label, cross(`Close the bench of ${text} and end its work`, () => closeBench(number)));
+  return made("li", {}, label, cross(`Close the bench of ${text} and end its work`, () => fetch(`../benches/${number}`, { method: "DELETE" })));
 }
 
 export function benchesPanel() {
@@ -71,7 +69,7 @@ function moment(seconds) {
 /** What is there from earlier: work that was kept, or files that a workbench has left which was killed. */
 export async function offer(what) {
   const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, tell] = OFFERS[what];
-  $(`${what}-field`).hidden = !found.length;
+  hide({ [`${what}-field`]: !found.length });
   $(list).replaceChildren(...found.map((one) => {
     const [name, title, words] = tell(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
     return button("", open, {}, made("span", { text: title }), made("small", { text: words }));

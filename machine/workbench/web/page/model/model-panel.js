@@ -1,8 +1,8 @@
 // Model panel: the file, how it is turned, what overhangs then, the ways it rests, and how large it stands on the platform.
 
-import { $, alike, button, listen, sayIn } from "../../../../view/template/elements.js";
+import { $, alike, button, hide, listen, onData, sayIn, tell } from "../../../../view/template/elements.js";
 import { send } from "../line.js";
-import { fill, listIn, mm2, tellIn } from "../lists.js";
+import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { unitButtons } from "../told.js";
@@ -18,25 +18,24 @@ export function modelPanel() {
   const by = () => TURNS.map((axis) => Number($(`turn-${axis}-typed`).value));
   const turn = () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); };
   for (const axis of TURNS) {
-    const slider = $(`turn-${axis}`), typed = $(`turn-${axis}-typed`);
-    const follow = (from, to) => () => { to.value = from.value; update({ turning: turnedFurther(store.state.rotation, by()) }); };
-    slider.addEventListener("input", follow(slider, typed));
-    typed.addEventListener("input", follow(typed, slider));
-    for (const input of [slider, typed]) input.addEventListener("change", turn);
+    const inputs = [$(`turn-${axis}`), $(`turn-${axis}-typed`)];
+    inputs.forEach((input, k) => {
+      input.addEventListener("input", () => { inputs[1 - k].value = input.value; update({ turning: turnedFurther(store.state.rotation, by()) }); });
+      input.addEventListener("change", turn);
+    });
   }
-  document.querySelectorAll("[data-turn]").forEach(({ dataset }, k, all) => all[k].addEventListener("click", () => send({ do: "turn", axis: dataset.turn, deg: Number(dataset.deg) })));
+  onData("turn", ({ turn: axis, deg }) => send({ do: "turn", axis, deg: Number(deg) }));
   listen("click", { "as-read": () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }) });
   dropping();
   offer("left");
   onNew(({ rotation }) => rotation, () => TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; }));
-  onState((state) => {
-    const { model, overhang_mm2: area } = state;
+  onState(({ model, overhang_mm2: area }) => {
     if (!model) return;
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
     listIn("model-notes", model.notes);
-    tellTiny(state);
+    tellTiny(model);
     tellFile(model);
-    if (area !== null) $("overhang").textContent = mm2(area);
+    if (area !== null) tell({ overhang: mm2(area) });
   });
   subscribe(tellModel);
 }
@@ -45,11 +44,11 @@ const TINY_MM = 10, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a
 const GLTF = /\.(glb|gltf)$/i; // its metres have y up
 
 /** Asks for the unit of a model that is very small. */
-function tellTiny({ model }) {
+function tellTiny(model) {
   const most = Math.max(...model.size_mm), known = GLTF.test(model.name) ? ["metres"] : Object.keys(UNITS);
   const words = known.filter((unit) => most * UNITS[unit] <= MOST_MM);
-  $("tiny").hidden = most >= TINY_MM || !words.length;
-  $("tiny-told").textContent = `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?`;
+  hide({ tiny: most >= TINY_MM || !words.length });
+  tell({ "tiny-told": `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?` });
   unitButtons($("tiny-units"), words, (unit) => {
     if (GLTF.test(model.name)) send({ do: "set", key: "process.rotate_deg", value: "[90, 0, 0]" });
     send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) });
@@ -59,10 +58,9 @@ function tellTiny({ model }) {
 /** The plates of a slicer file to choose from, and whether it keeps settings. */
 function tellFile({ plates, has_settings: has, settings_note: note }) {
   const shown = plates.length > 1 ? plates : [];
-  if ($("plates").dataset.shown !== JSON.stringify(shown)) $("plates").replaceChildren(...shown.map(({ number, name, taken }) =>
+  putNew($("plates"), shown, () => shown.map(({ number, name, taken }) =>
     button(`Plate ${number}${name && ` (${name})`}`, () => send({ do: "plate", plate: number }), { ariaPressed: String(taken), disabled: taken })));
-  $("plates").dataset.shown = JSON.stringify(shown);
-  $("inside").hidden = !has;
+  hide({ inside: !has });
   sayIn("file-settings-note", note);
 }
 
@@ -92,14 +90,14 @@ function tellModel({ state: { model, standing } }) {
 
 export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
+  let shown = null; // the standing that was told last
   const scale = (value) => send({ do: "set", key: "process.scale", value });
   listen("change", { scale: () => scale(scaleBy(Number($("scale").value) / 100 / store.state.scale)) });
+  listen("click", { "scale-as-read": () => scale(null) });
   sides.forEach((side, k) => side.addEventListener("change", () => {
     const { standing } = store.state;
     if (standing) scale(scaleBy(Number(side.value) / standing.size_mm[k]));
   }));
-  let shown = null; // the standing that was told last
-  listen("click", { "scale-as-read": () => scale(null) });
   onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;
     const fresh = problem !== before?.problem || !alike(standing, shown);
@@ -107,7 +105,7 @@ export function sizePanel() {
     const put = (input, value) => { if (fresh) input.value = value; else fill(input, value); };
     put($("scale"), Number((100 * factor).toPrecision(6)));
     sides.forEach((side, k) => put(side, standing.size_mm[k].toFixed(2)));
-    $("fit-told").textContent = standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
+    tell({ "fit-told": standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.` });
     $("fit-told").classList.toggle("refused", Boolean(standing.problem));
   });
 }

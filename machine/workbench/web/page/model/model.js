@@ -1,6 +1,6 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal.
 
-import { $, alike, made, notice, swatch } from "../../../../view/template/elements.js";
+import { $, alike, made, notice, swatches } from "../../../../view/template/elements.js";
 import { sub } from "../../../../view/template/picture/math.js";
 import { AGAIN_MS, newest } from "../line.js";
 import { mm2 } from "../lists.js";
@@ -11,7 +11,6 @@ import { onState, store, subscribe, update } from "../store.js";
 
 const MISSING = "The model has not come from tiltprint, so it is not drawn; it is asked for again with the next news.";
 const MANY_FACES = 100000; // to fetch and draw them takes a moment, which is told
-const MOST_NAMED = 24; // parts, in the legend
 let key = ""; // of the model that is there, or comes
 
 /** The triangles of the model on the bench, where they are others; again(): called where it may come a little later. */
@@ -69,7 +68,7 @@ function look(picture, red) {
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;
   picture.cut(cut && !planes.some((plane) => plane.limbs_mm) ? planes : null, row || search ? colours : fadedColours(colours, part));
   picture.red(cut ? null : red);
-  const entries = cut ? colours.slice(0, planes.length + 1).slice(0, MOST_NAMED).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`)) : [];
+  const entries = cut ? swatches(colours.slice(0, planes.length + 1).map((colour, k) => [colour, `${k + 1}`])) : [];
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));
 }
 

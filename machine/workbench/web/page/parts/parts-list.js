@@ -5,7 +5,7 @@ import { choiceRow, newtons, putTable } from "../lists.js";
 import { store, subscribe } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 
-const HEAD = [["part"], ["cm³"], ["support mm²"], ["rim mm"], ["edge"], ["joint"], ["lock"]];
+const HEAD = ["part", "cm³", "support mm²", "rim mm", "edge", "joint", "lock"];
 const UNKNOWN = "–";
 const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
 

@@ -16,19 +16,17 @@ export function partsPanel() {
     const { front, parts, recommended } = state, place = front.findIndex((row) => row.parts === parts);
     shown = toldOf(state);
     update({ row: null });
-    $("front").max = front.length - 1;
-    $("front").value = Math.max(place, 0);
-    $("front").disabled = front.length < 2;
+    Object.assign($("front"), { max: front.length - 1, value: Math.max(place, 0), disabled: front.length < 2 });
     marksUnder(front, recommended);
     tellRow(front[Math.max(place, 0)], state);
     listIn("front-notes", state.notes);
-    $("recommended").hidden = !recommended;
+    hide({ recommended: !recommended });
   };
   let held = null; // the front whose slider is under the hand: nothing moves it there, not even another front
   const hold = () => { held ||= store.state.front; };
-  /** The slider's row, as the newest front has it. */
+  /** The slider's row as the newest front has it, with its time and plastic; as it was where that has none of so many parts. */
   const follow = (row) => {
-    const newest = rowUnder(row, store.state);
+    const newest = store.state.front.find(({ parts }) => parts === row.parts) || row;
     update({ row: newest });
     tellRow(newest, store.state);
   };
@@ -40,10 +38,7 @@ export function partsPanel() {
   listen("pointerdown", { front: hold });
   for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first
   listen("blur", { front: letGo });
-  listen("input", { front: () => {
-    hold();
-    follow(held[$("front").value]);
-  } });
+  listen("input", { front: () => { hold(); follow(held[$("front").value]); } });
   listen("change", { front: () => {
     const { parts } = (held || store.state.front)[$("front").value];
     held = null;
@@ -64,9 +59,6 @@ export function partsPanel() {
     else if (store.row) follow(store.row);
   });
 }
-
-/** The row in hand as the newest front has it, with its time and plastic; as it was where that has none of so many parts. */
-const rowUnder = (row, { front }) => front.find(({ parts }) => parts === row.parts) || row;
 
 function marksUnder(front, recommended) {
   $("front-marks").replaceChildren(...front.map(({ parts }, place) => {

@@ -1,6 +1,6 @@
 // Planes panel: the chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand.
 
-import { $, alike, disable, hide, listen, tell } from "../../../../view/template/elements.js";
+import { $, alike, disable, hide, listen, onData, tell } from "../../../../view/template/elements.js";
 import { add, dot, RAD, scaled } from "../../../../view/template/picture/math.js";
 import { send } from "../line.js";
 import { fill, mm2 } from "../lists.js";
@@ -32,9 +32,7 @@ export function planesPanel(picture) {
   byPlane("change", {
     "plane-offset": () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
   });
-  document.querySelectorAll("[data-tilt]").forEach((button) => button.addEventListener("click", () => {
-    if (planeNow()) lean(Number(button.dataset.tilt), Number($("plane-towards").value));
-  }));
+  onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), Number($("plane-towards").value)); });
   listen("click", {
     "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(store.state.refused.near),
   });
@@ -72,9 +70,7 @@ function tellAll(moved) {
   hide({ plane: !plane });
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal);
-    fill($("plane-offset"), plane.offset_mm.toFixed(2));
-    fill($("plane-tilt"), tilt.toFixed(1));
-    fill($("plane-towards"), towards.toFixed(1));
+    Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));
     document.querySelectorAll("#plane input, #plane button").forEach((control) => { control.disabled = isLocked(); });
     hide({ limb: Boolean(plane.limbs_mm), "all-above": !plane.limbs_mm });
     $("earlier").disabled ||= part === 2;

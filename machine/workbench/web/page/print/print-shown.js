@@ -1,7 +1,7 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab while anything prints, and what is told of prints outside the page.
 
-import { $, duration, hide, made, tell } from "../../../../view/template/elements.js";
-import { clock, listIn, tellIn } from "../lists.js";
+import { $, duration, hide, optionsOf, tell } from "../../../../view/template/elements.js";
+import { clock, listIn, putNew, tellIn } from "../lists.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
 const FEW = 8;
@@ -30,10 +30,8 @@ export const sure = (whether) => hide({ sure: !whether });
 
 export function showWhich(prints, chosen) {
   hide({ "which-line": prints.length < 2 });
-  const told = prints.map((job) => `${job.name} at ${job.port}: ${job.state}`);
-  if ([...$("which").options].map((option) => option.text).join("\n") !== told.join("\n")) {
-    $("which").replaceChildren(...prints.map((job, k) => made("option", { value: job.number, text: told[k] })));
-  }
+  const entries = prints.map((job) => [job.number, `${job.name} at ${job.port}: ${job.state}`]);
+  putNew($("which"), entries, () => optionsOf(entries));
   $("which").value = chosen;
 }
 

@@ -1,6 +1,6 @@
 // Where to print: the lists of ports and of prints that can be gone on with.
 
-import { $, alike, hide, made } from "../../../../view/template/elements.js";
+import { $, alike, disable, hide, made, tell } from "../../../../view/template/elements.js";
 
 /** What is chosen of a list whose last entry is another one, typed. */
 export function chosenOr(name, typed) {
@@ -41,8 +41,8 @@ export function unforce() {
 
 export function showPorts({ ports, asking, last_printer: last }, before) {
   if (last && !chosen) choosePort(last);
-  $("ask-ports").disabled = asking;
-  $("ports-told").textContent = asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "";
+  disable({ "ask-ports": asking });
+  tell({ "ports-told": asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "" });
   if (alike(ports, before.ports) && $("ports-found").children.length) return;
   offer("port", port(), (ports || []).map((device) => [device.port, device.port, [device.description, device.words].filter(Boolean).join(": ")]));
   if (ports?.length === 1 && !chosen) choosePort({ port: ports[0].port });
@@ -51,7 +51,7 @@ export function showPorts({ ports, asking, last_printer: last }, before) {
 /** Prints that were cut off, those of the last run of the program among them. */
 export function showJournals(journals, before) {
   if (alike(journals, before)) return;
-  $("journals-told").textContent = journals && !journals.length ? "No print of this computer was cut off or cancelled." : "";
+  tell({ "journals-told": journals && !journals.length ? "No print of this computer was cut off or cancelled." : "" });
   offer("journal", chosenOr("journal", "journal-typed"), (journals || []).map(({ path, name, machine, line, written_s }) => (
     [path, name, `on ${machine}, up to line ${line}, ${new Date(1000 * written_s).toLocaleString()}`])));
 }

@@ -1,6 +1,6 @@
 // Setting row: one key of the profile with its label, unit, field, what it means and what it was.
 
-import { made } from "../../../../view/template/elements.js";
+import { button, made, optionsOf } from "../../../../view/template/elements.js";
 
 /** A key that is broken between its words where it is too long for a line. */
 const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
@@ -9,30 +9,30 @@ const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [mad
  * leaves what was typed in, for what has been told meanwhile; explained: the keys whose meaning is shown. */
 export function settingRow(setting, { wrong, set, again, explained }) {
   const { key, label, unit, kind, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
-  const told = made("small", { text: meaningOf(setting), id: `meaning-${key}`, hidden: !explained.has(key) });
+  const meaning = made("small", { text: meaningOf(setting), id: `meaning-${key}`, hidden: !explained.has(key) });
   const refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
-  input.setAttribute("aria-describedby", told.id);
+  input.setAttribute("aria-describedby", meaning.id);
   input.setAttribute("aria-invalid", Boolean(wrong));
-  const back = made("button", { type: "button", text: "↺", title: wasOf(setting), ariaLabel: `${label}: ${wasOf(setting)}`, hidden: !changed && !wrong, onclick: () => set(key, null) });
-  const explain = made("button", { type: "button", text: "?", title: meaningOf(setting), ariaLabel: `${label}: what it means`, ariaExpanded: String(explained.has(key)), onclick: () => {
-    told.hidden = !told.hidden;
-    explain.ariaExpanded = String(!told.hidden);
-    explained[told.hidden ? "delete" : "add"](key);
-  } });
+  const was = wasOf(setting), back = button("↺", () => set(key, null), { title: was, ariaLabel: `${label}: ${was}`, hidden: !changed && !wrong });
+  const turn = () => {
+    meaning.hidden = !meaning.hidden;
+    explain.ariaExpanded = String(!meaning.hidden);
+    explained[meaning.hidden ? "delete" : "add"](key);
+  };
+  const explain = button("?", turn, { title: meaning.textContent, ariaLabel: `${label}: what it means`, ariaExpanded: String(explained.has(key)) });
   const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
   const words = made("span", {}, label, made("small", { className: "key" }, ...breakable(key)));
-  const was = made("small", { className: "was", text: wasOf(setting), hidden: !changed });
-  const row = made("div", { className: changed ? "setting changed" : "setting" }, made("div", { className: "typed" }, made("label", {}, words, input, made("span", { className: "unit", text: unit })), explain, back), refused, was, told, named);
+  const typed = made("div", { className: "typed" }, made("label", {}, words, input, made("span", { className: "unit", text: unit })), explain, back);
+  const row = made("div", { className: changed ? "setting changed" : "setting" }, typed, refused, made("small", { className: "was", text: was, hidden: !changed }), meaning, named);
+  const left = () => {
+    const begun = Boolean(row.dataset.typing);
+    delete row.dataset.typing;
+    return begun;
+  };
   row.dataset.key = key;
   input.addEventListener("input", () => { row.dataset.typing = kind; });
-  input.addEventListener("change", () => set(key, typedIn(input, kind, optional), typedAs(input, kind)));
-  for (const done of ["change", "blur"]) {
-    input.addEventListener(done, () => {
-      if (!row.dataset.typing) return;
-      delete row.dataset.typing;
-      if (done === "blur") again();
-    });
-  }
+  input.addEventListener("change", () => { set(key, typedIn(input, kind, optional), kind === "boolean" ? input.checked : input.value); left(); });
+  input.addEventListener("blur", () => { if (left()) again(); });
   return row;
 }
 
@@ -51,15 +51,13 @@ function wasOf({ unchanged, unit, kind }) {
 
 function inputOf({ kind, choices, least, most }, value) {
   const typed = value ?? "";
-  if (kind === "choice") return made("select", {}, ...choices.map((text) => made("option", { text, value: text, selected: String(text) === String(value) })));
+  if (kind === "choice") return made("select", {}, ...optionsOf(choices.map((text) => [String(text), text]), String(value)));
   if (kind === "boolean") return made("input", { type: "checkbox", checked: value });
   if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: typed });
   if (kind === "block" || kind === "rows") return made("textarea", { value: typed, rows: Math.min(Math.max(String(typed).split("\n").length, 2), 14), spellcheck: false, wrap: kind === "block" ? "off" : "soft" });
   const limits = { ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) };
   return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: typed, ...limits });
 }
-
-const typedAs = (input, kind) => (kind === "boolean" ? input.checked : input.value);
 
 /** What a person has typed or chosen, as --set takes it; null, for nothing where there must be something: as the profile has it. */
 function typedIn(input, kind, optional) {

@@ -1,10 +1,10 @@
 // Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
 // changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
-import { $, alike, button, disable, hide, listen, made, pressed, tell } from "../../../../view/template/elements.js";
+import { $, button, disable, hide, listen, made, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
-import { putRows } from "../lists.js";
-import { keptInTab, onState, store } from "../store.js";
+import { putNew, putRows } from "../lists.js";
+import { keptInTab, onNew, onState, store } from "../store.js";
 import { settingRow } from "./setting-row.js";
 
 const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
@@ -69,8 +69,8 @@ export function settingsPanel() {
     const told = await answer.json();
     settings = told.settings;
     showProfiles(told.profiles);
-    $("command-line").replaceChildren(...told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
-    $("command-field").hidden = !told.command;
+    putNew($("command-line"), told.command, () => told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
+    hide({ "command-field": !told.command });
     list();
   };
   const partsToChoose = ({ parts, part_settings: own, model }) => {
@@ -78,8 +78,7 @@ export function settingsPanel() {
       const keys = own.find((ofPart) => ofPart.part === k + 1)?.keys.length || 0;
       return `part ${k + 1}${keys ? ` (${keys} of its own)` : ""}`;
     })];
-    const chosen = part() < names.length ? part() : 0;
-    $("settings-part").replaceChildren(...names.map((text, k) => made("option", { text, value: k, selected: k === chosen })));
+    $("settings-part").replaceChildren(...optionsOf([...names.entries()], part() < names.length ? part() : 0));
   };
   listen("input", { "search-settings": list });
   listen("change", { "settings-part": () => { wrongs.clear(); fetchAll(); } });
@@ -89,19 +88,20 @@ export function settingsPanel() {
   });
   for (const level of LEVELS) listen("click", { [`level-${level}`]: () => { kept.keep({ level }); list(); } });
   for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
-  const ofSettings = ({ given, part_settings: own, parts, model, rotation, stops, copies } = {}) => [given, own, parts, model?.name, rotation, stops, copies];
-  onState((state, before) => {
-    const fresh = !before || !alike(ofSettings(state), ofSettings(before));
-    if (fresh) partsToChoose(state);
+  onNew(({ given, part_settings: own, parts, model, rotation, stops, copies }) => [given, own, parts, model?.name, rotation, stops, copies], () => {
+    partsToChoose(store.state);
+    missed = true;
+  });
+  onState(() => {
     tellBeside();
-    if (fresh || missed) fetchAll();
+    if (missed) fetchAll();
   });
 }
 
 function showProfiles(profiles) {
   const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
-    const select = made("select", {}, ...names.map((text) => made("option", { text, value: text, selected: text === name })));
-    select.addEventListener("change", () => ask({ do: "profile", kind, name: select.value }, (refusal) => { if (refusal) select.value = name; }));
+    const onchange = ({ target }) => ask({ do: "profile", kind, name: target.value }, (refusal) => { if (refusal) target.value = name; });
+    const select = made("select", { onchange }, ...optionsOf(names.map((text) => [text, text]), name));
     return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
   });
   putRows(rows, $("profiles-list"));

@@ -1,28 +1,29 @@
 // Slices panel: copies and pauses, the parts sliced, what the print takes, what the dry run complains of, and what one piece would cost.
 
-import { $, alike, button, disable, hide, listen, made, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, disable, findingButton, hide, listen, made, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
 import { send } from "../line.js";
 import { cross, listIn, putTable, tellIn } from "../lists.js";
-import { onState, store, update } from "../store.js";
+import { onNew, onState, store, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
   listen("click", {
     again: () => { update({ looking: false }); $("tab-slices").click(); send({ do: "slice" }); },
     look: () => update({ looking: !store.looking }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
   });
-  onState((state, before) => {
-    const { slicing, sliced } = state;
+  onState(({ slicing, sliced, colours }) => {
     disable({ slice: Boolean(slicing) });
     hide({ "stop-slicing": !slicing, "slicing-bar": !slicing });
     tell({ "slicing-told": slicing ? slicing.text : "" });
-    showShares(slicing, state.colours);
+    showShares(slicing, colours);
     toggle("no-slices", !sliced);
     toggle("stale", sliced?.stale);
-    if (alike(sliced, before?.sliced)) return;
+  });
+  onNew(({ sliced }) => sliced, (sliced) => {
+    const { told = [], joints = [], verdict } = sliced || {};
     if (!sliced) update({ looking: false });
-    tellIn("sliced-told", sliced?.told || []);
-    if (sliced) showVerdict(sliced.verdict, showFinding);
-    putTable($("joints"), sliced?.joints || [], JOINT_HEAD, () => (sliced?.joints || []).map(([part, ...texts]) => rowOf(part, texts)));
+    else showVerdict(verdict, showFinding);
+    tellIn("sliced-told", told);
+    putTable($("joints"), joints, JOINT_HEAD, () => joints.map(figuresRow));
     showFindings(sliced, showFinding);
   });
 }
@@ -50,20 +51,16 @@ function showShares(slicing, colours) {
   }));
 }
 
-const JOINT_HEAD = [["joint of part"], ["area"], ["contact"], ["plastic"], ["seam"], ["breaks at"]];
+const JOINT_HEAD = ["joint of part", "area", "contact", "plastic", "seam", "breaks at"];
 
-const rowOf = (title, texts) => made("tr", {}, made("th", { text: title, scope: "row" }), ...texts.map((text) => made("td", { text })));
+/** A row of figures after their title. */
+const figuresRow = ([title, ...texts]) => made("tr", {}, made("th", { text: title, scope: "row" }), ...texts.map((text) => made("td", { text })));
 
 function showFindings(sliced, showFinding) {
   const { findings = [], more_findings: more = 0 } = sliced || {};
-  $("no-findings").hidden = !sliced || findings.length > 0;
-  const rows = findings.map((finding, k) => {
-    const { severity, code, message, part, layer, line } = finding;
-    const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
-    return made("li", {}, button("", () => showFinding(k), { className: severity },
-      made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? `${where}: show it` : "the whole print" })));
-  });
-  $("sliced-findings").replaceChildren(...rows, ...(more ? [made("li", { text: `and ${more} more, in the page of the print` })] : []));
+  hide({ "no-findings": !sliced || findings.length > 0 });
+  const rows = findings.map((finding, k) => findingButton(finding, () => showFinding(k), { whole: "the whole print", ending: ": show it" }));
+  $("sliced-findings").replaceChildren(...[...rows, ...(more ? [`and ${more} more, in the page of the print`] : [])].map((row) => made("li", {}, row)));
 }
 
 export function stopsPanel() {
@@ -74,32 +71,32 @@ export function stopsPanel() {
     adding = true;
     send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
   } });
-  onState(({ copies, copies_told: told, stops, problem }, before) => {
-    $("copies-told").textContent = told;
+  onState(({ copies, copies_told: told, problem }, before) => {
+    tell({ "copies-told": told });
     if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
-    if (alike(stops, before?.stops)) return;
+  });
+  onNew(({ stops }) => stops, (stops) => {
     if (adding) $("stop-at").value = "";
     adding = false;
     const held = $("stops").contains(document.activeElement);
-    $("stops").replaceChildren(made("tbody", {}, ...stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 })))));
+    putTable($("stops"), stops, [], () => stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 }))));
     if (held) $("stop-at").focus(); // the row that had the focus is gone
   });
 }
 
 function stopRow({ part, layer, height_mm: height, change }, remove) {
   const kind = change ? "filament change" : "pause", where = layer === null ? `part ${part}, at ${height} mm` : `part ${part}, before layer ${layer}`;
-  return made("tr", {}, made("td", { text: kind }), made("td", { text: where }), made("td", {}, cross(`Remove the ${kind} of ${where}`, remove)));
+  return rowOf([kind, where, cross(`Remove the ${kind} of ${where}`, remove)]);
 }
 
 export function comparePanel() {
-  onState(({ comparing, compared, sliced }, before) => {
+  onState(({ comparing, compared, sliced }) => {
     disable({ compare: Boolean(comparing || compared.length || !sliced || sliced.stale) });
     hide({ "stop-comparing": !comparing });
     tell({ "comparing-told": comparing });
-    if (alike(compared, before?.compared)) return;
     const [, standing, lying] = compared, shown = compared.filter((alternative) => alternative !== lying || lying.note !== standing.note);
-    putTable($("compared"), shown, [[""], ...shown.map(({ name }) => [name])], () => (
-      standing ? standing.figures.map(([title], k) => rowOf(title, shown.map(({ figures }) => figures[k][1]))) : []));
+    putTable($("compared"), shown, ["", ...shown.map(({ name }) => name)], () => (
+      standing ? standing.figures.map(([title], k) => figuresRow([title, ...shown.map(({ figures }) => figures[k][1])])) : []));
     listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
   });
 }

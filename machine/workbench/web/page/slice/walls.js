@@ -5,7 +5,6 @@ import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js"
 import { store, subscribe, update } from "../store.js";
 
 const PIECE = 7; // numbers of a straight piece: two ends and its height
-
 const BROAD = 1.1; // half the width of a bead, by its height
 
 /** Triangles {places, colours} of a part's walls: an upright band along every piece and a level one on it, as broad as a bead, so
