@@ -73,7 +73,7 @@ export function placeAt(rows, row, share) {
  * The path on the workpiece for drawing: slots, one a row, and an empty one before every row that begins elsewhere than the
  * row before has ended. Slot s goes from points[s] to points[s + 1]; slot(row) tells a row's.
  */
-export function pathOf(rows, chain) {
+function pathOf(rows, chain) {
   const jumps = rows.jumpRow.filter((row) => row > 0), slots = rows.count + jumps.length;
   const texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS; // whole lines of a texture
   const points = new Float32Array(3 * texels), verticals = new Int16Array(2 * texels), sizes = new Uint16Array(2 * texels);
@@ -96,7 +96,7 @@ export function pathOf(rows, chain) {
 }
 
 /** Rows at which something stands to be marked: where an outer wall begins, where filament is pulled back, pushed forward. */
-export function marksOf(rows) {
+function marksOf(rows) {
   const wall = rows.types.map((name) => WALLS.test(name));
   const seams = [], retracts = [], primes = [];
   for (let i = 0; i < rows.count; i++) {
@@ -111,7 +111,7 @@ export function marksOf(rows) {
 }
 
 /** Volume that a row lays, mm3 a second, as the file asks for; 0 where nothing flows. */
-export function flowOf(rows, path, area) {
+function flowOf(rows, path, area) {
   const p = path.points;
   return (i) => {
     if (rows.kind[i] !== KIND.extrude) return 0;

@@ -3,7 +3,7 @@
 import { add, cross, scaled, unit } from "./math.js";
 import { chained, circle, RED, revolved, rgb, trianglesOf, wordOf } from "./solids.js";
 
-export const LEFT = { none: 0, printed: 1, straight: 2 };
+const LEFT = { none: 0, printed: 1, straight: 2 };
 
 /** Corners of all faces and, a part each, which of them are its own. */
 export function surfacesOf({ header, array }) {

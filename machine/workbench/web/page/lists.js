@@ -10,7 +10,7 @@ export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTi
 export const fill = (field, value) => { if (document.activeElement !== field) field.value = value; };
 
 /** A button of a row that takes away what it stands for. */
-export const cross = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
+export const removeButton = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
 
 /** Children of an element, made() where what they tell is new: what has not changed stays, and what is selected in it; a choice of a list
  * that had the keyboard has it again. */

@@ -2,7 +2,7 @@
 
 import { $, button, hide, listen, made, notice, partsInWords, tell } from "../../../../view/template/elements.js";
 import { lineAt, sendFile } from "../line.js";
-import { clock, cross, putRows } from "../lists.js";
+import { clock, putRows, removeButton } from "../lists.js";
 import { onNew } from "../store.js";
 
 const TOLD_MS = 8000;
@@ -47,7 +47,7 @@ function showBenches(benches) {
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
   const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
-  return made("li", {}, label, cross(`Close the bench of ${text} and end its work`, () => fetch(`../benches/${number}`, { method: "DELETE" })));
+  return made("li", {}, label, removeButton(`Close the bench of ${text} and end its work`, () => fetch(`../benches/${number}`, { method: "DELETE" })));
 }
 
 export function benchesPanel() {

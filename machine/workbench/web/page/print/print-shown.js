@@ -10,7 +10,7 @@ let shownState = "";
 
 export const IN_HAND = "in hand";
 /** States in which a print is under way, and in which the tip is away from it. */
-export const LIVE = ["printing", "pausing", "paused", "resuming", "reconnecting", "finishing", "cancelling"];
+const LIVE = ["printing", "pausing", "paused", "resuming", "reconnecting", "finishing", "cancelling"];
 const AWAY = ["pausing", "paused"], COMMANDED = LIVE.filter((state) => state !== "cancelling");
 
 export function hear(prints) {

@@ -3,7 +3,7 @@
 import { $, listen, notice, pressed } from "../../../../view/template/elements.js";
 import { layFacet } from "../model/resting.js";
 import { markAt, markWord } from "../parts/marks-panel.js";
-import { openMenu } from "../parts/parts-list.js";
+import { openMenu } from "../parts/parts-panel.js";
 import { apartNow, pieceMet, shiftsOf } from "../parts/pieces.js";
 import { choosePart, cutLimb, partAt, snapTo } from "../parts/planes.js";
 import { store, subscribe, update } from "../store.js";
