@@ -20,9 +20,9 @@ def on_fake_page(act: str) -> Any:
     """What a function's body gives that runs in place of the page's `main`: by `printPanel`, `$` and what fake_page.js has."""
     assert NODE is not None
     ends = "process.stdout.write(JSON.stringify(given), () => process.exit(0));"
-    names = 'const { printPanel } = modules["page/print-panel"], { $ } = modules["template/page"];'
+    names = 'const { printPanel } = modules["print/print-panel"], { $ } = modules["template/elements"];'
     whole = "\n".join(
-        [FAKE.read_text("utf-8"), bundle(OWN / "print-panel.js"), names, f"const given = (() => {{ {act} }})();", ends]
+        [FAKE.read_text("utf-8"), bundle(OWN / "print" / "print-panel.js"), names, f"const given = (() => {{ {act} }})();", ends]
     )
     run = subprocess.run([NODE, "-"], input=whole, capture_output=True, text=True, timeout=60)
     assert run.returncode == 0, run.stderr

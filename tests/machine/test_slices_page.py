@@ -106,7 +106,7 @@ def test_the_text_follows_the_slider_and_the_slider_the_text(page: Browser) -> N
 def test_the_page_reads_the_text_out_of_its_rows_letter_for_letter(page: Browser, lines: tuple[str, ...]) -> None:
     profile = program()[0]
     block = base64.b64encode(of_print("text", Program(lines, dry_run(lines, profile), None), profile)).decode()
-    names = "{ ...modules['template/block'], ...modules['template/rows'], ...modules['template/gcode-lines'] }"
+    names = "{ ...modules['moves/block'], ...modules['moves/rows'], ...modules['panel/text'] }"
     read = "linesOfRows({ header: block.header, rows: rowsOf(block), patternOf: block.array('text')[0] })"
     all_of = f"((text) => Array.from({{ length: text.count }}, (_, k) => text.line(k + 1)))({read})"
     assert (
@@ -253,7 +253,7 @@ def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench
     browser.click("#tab-slices")
     scene = "box: [[-4, -4, 0], [4, 4, 4]], shifts: [], plane: null, extras: {}"
     walls = "[[-30, -20, 0], [30, 20, 4]].map((place) => ({ places: new Float32Array(place) }))"
-    names = "{ ...modules['template/math'], ...modules['page/picture'] }"
+    names = "{ ...modules['picture/math'], ...modules['scene/picture'] }"
     framed = browser.value(f"(({{ bounds, placesDrawn }}) => bounds(placesDrawn({{ {scene}, walls: {walls} }}).flat()))({names})")
     assert framed == [[-30, -20, 0], [30, 20, 4]]  # the walls of copies, too
     type_in(browser, "copies", 0)

@@ -1,32 +1,25 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
-import { cameraOf, CORNERS, handle, viewButtons } from "./camera.js";
-import { controlsOf } from "./controls.js";
-import { courseOf } from "./course.js";
-import { findingsOf } from "./findings.js";
-import { frontOf } from "./front.js";
-import { keysOf } from "./keys.js";
-import { layerTimes } from "./layer-times.js";
-import { layerSliders } from "./layers.js";
-import { follow } from "./live.js";
-import { add, carried, multiply, RAD, scaled, sub, turned, undone } from "./math.js";
-import { outsideOf } from "./outside.js";
-import { $, bells, duration, notice, themeSwitch } from "./page.js";
-import { cardOf, pictureOf } from "./picture.js";
-import { printOf } from "./print.js";
-import { readoutsOf } from "./readouts.js";
-import { showReport } from "./report.js";
-import { sceneOf } from "./scene.js";
-import { standing } from "./stage.js";
-import { textOf } from "./text.js";
+import { $, bells, duration, listen, notice, tell, themeSwitch, toggle } from "./elements.js";
+import { compileAll, pictureOf, standing } from "./moves/picture.js";
+import { printOf } from "./moves/rows.js";
+import { sceneOf } from "./moves/scene.js";
+import { controlsOf, readoutsOf } from "./panel/controls.js";
+import { follow, outsideOf } from "./panel/outside.js";
+import { findingsOf, frontOf, showReport } from "./panel/report.js";
+import { courseOf, keysOf, layerSliders, layerTimes } from "./panel/sliders.js";
+import { textOf } from "./panel/text.js";
+import { cameraOf, CORNERS, handle, viewButtons } from "./picture/camera.js";
+import { cardOf, sizeOf } from "./picture/gl.js";
+import { add, carried, cornersOf, multiply, RAD, scaled, sub, turned, undone } from "./picture/math.js";
 
 async function main() {
   const gl = cardOf($("canvas")), text = $("tiltprint").textContent.trim();
+  if (gl) compileAll(gl);
   $("tiltprint").textContent = "";
   const print = await printOf(text), { header, rows } = print;
   const ring = bells(), camera = cameraOf(), scene = sceneOf(print, ring);
-  $("title").textContent = header.title;
-  $("summary").textContent = summaryOf(header, rows);
+  tell({ title: header.title, summary: summaryOf(header, rows) });
   showReport(header);
   controlsOf(print, scene, ring);
   frontOf(print, scene);
@@ -34,23 +27,17 @@ async function main() {
   layerSliders(print, scene, ring);
   layerTimes(scene, ring);
   const chooseTheme = themeSwitch((dark) => { scene.dark = dark; ring.ring("theme"); }), player = courseOf(print, scene, ring);
-  const findings = findingsOf(print, scene, ring, camera, player.stop), code = textOf(print, scene, ring, player.stop);
+  const findings = findingsOf(print, scene, ring, camera, player), code = textOf(print, scene, ring, player);
   scene.go(rows.count - 1);
   outsideOf({ scene, findings, code, chooseTheme, camera, bells: ring });
   if (!gl) return withoutPicture();
   const picture = pictureOf(gl, print, scene, camera, ring, findings.showMarkers);
   const fit = fitting(print, scene, camera, picture, ring);
   keysOf({ scene, camera, player, look: picture.moved, fit, chooseTheme });
-  handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
+  handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => { const row = picture.rowAt(event); if (row >= 0) player.go(row); } });
   if (header.live && location.protocol.startsWith("http")) follow(scene, player);
   document.documentElement.dataset.openedMs = performance.now().toFixed(0);
   document.documentElement.dataset.state = "ready";
-}
-
-function goTo(row, scene, player) {
-  if (row < 0) return;
-  player.stop();
-  scene.go(row);
 }
 
 function summaryOf({ time_s: seconds, filament_mm: filament, parts, thinned }, { count, layers }) {
@@ -66,8 +53,7 @@ function fitting(print, scene, camera, picture, ring) {
   const [least, most] = print.box, middle = scaled(add(least, most), 0.5);
   const work = () => standing(print.chain, scene.place, scene.riding).work;
   const fit = () => {
-    const corners = Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => print.box[(i >> axis) & 1][axis]));
-    camera.fit(corners.map((corner) => carried(work(), corner)), picture.canvas.clientWidth / Math.max(picture.canvas.clientHeight, 1));
+    camera.fit(cornersOf(print.box).map((corner) => carried(work(), corner)), sizeOf(picture.canvas));
     picture.ask();
   };
   let before = work();
@@ -81,7 +67,7 @@ function fitting(print, scene, camera, picture, ring) {
     camera.target = add(camera.target, sub(carried(now, middle), carried(before, middle)));
     before = now;
   });
-  $("fit").addEventListener("click", fit);
+  listen("click", { fit });
   viewButtons(camera, bestCorner(print), picture.ask);
   fit();
   return fit;
@@ -97,7 +83,7 @@ function bestCorner({ header, chain }) {
 }
 
 function withoutPicture() {
-  document.body.classList.add("no-picture");
+  toggle("no-picture", true);
   notice("This browser shows no WebGL2, so there is no picture of the print; the report and the findings are complete.", "page");
   $("tab-report").click();
   document.documentElement.dataset.state = "failed";

@@ -30,7 +30,7 @@ from tests.shapes import tee
 
 NASTY = '<img src=x onerror=alert(1)></title><script>alert(2)</script>/*SCRIPT*/<!--DATA-->".stl'
 COARSE = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
-SCRIPTS = sorted([*TEMPLATE.glob("*.js"), *OWN.glob("*.js")])
+SCRIPTS = sorted([*TEMPLATE.rglob("*.js"), *OWN.rglob("*.js")])
 NODE = shutil.which("node")
 
 

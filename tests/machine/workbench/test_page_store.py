@@ -27,6 +27,6 @@ def test_what_a_listener_changes_comes_when_all_have_heard_of_the_change_before(
     assert on_fake_page(asked) == [[0, 0, "model"], [None, 1], [0, 1, "model"], [1, 2, "parts"]]
 
 
-@pytest.mark.parametrize("script", sorted(OWN.glob("*.js")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("script", sorted(OWN.rglob("*.js")), ids=lambda file: file.stem)
 def test_nobody_but_the_store_writes_into_it(script: Path) -> None:
     assert script.stem == "store" or re.findall(r"\bstore(?:\.\w+)+ [-+|&?]*=[^=>].*", script.read_text("utf-8")) == []

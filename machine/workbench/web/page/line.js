@@ -1,6 +1,6 @@
 // Line: state in, commands out; when it is lost the page says so and tries again.
 
-import { made } from "../../../view/template/page.js";
+import { made } from "../../../view/template/elements.js";
 
 export const AGAIN_MS = 1000;
 const CLOSED_CODE = 4404; // of a line whose bench is not open any more

@@ -1,40 +1,28 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { cameraOf, CORNERS, handle, viewButtons } from "../../../view/template/camera.js";
-import { onKeys, viewKeys } from "../../../view/template/keys.js";
-import { $, notice, themeSwitch } from "../../../view/template/page.js";
-import { tabsOf } from "../../../view/template/tabs.js";
-import { axesOf } from "./axes.js";
-import { benchesPanel } from "./benches.js";
-import { clicksOf, press } from "./clicks.js";
-import { devicesPanel } from "./devices.js";
-import { hide, listen, tell, toggle } from "./elements.js";
-import { elapsedTimes } from "./elapsed.js";
-import { facetsOf } from "./facets.js";
-import { handlesOf } from "./handles.js";
-import { keptLook } from "./kept-look.js";
+import { $, disable, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
-import { marksPanel } from "./marks-panel.js";
-import { modelPanel, sizePanel } from "./model-panel.js";
-import { fetchModel, modelOf, pedestalOf } from "./model.js";
-import { obstacleOf } from "./obstacle.js";
-import { partsList } from "./parts-list.js";
-import { partsPanel } from "./parts-panel.js";
-import { pictureOf } from "./picture.js";
-import { apartPanel } from "./pieces.js";
-import { placePanel } from "./place-panel.js";
-import { planesPanel } from "./planes-panel.js";
-import { printFrame } from "./print-frame.js";
-import { titleOfModel } from "./print-news.js";
-import { printPanel } from "./print-panel.js";
-import { problemLine } from "./problem.js";
-import { ringsOf } from "./rings.js";
-import { saveMenu } from "./save-menu.js";
-import { settingsPanel } from "./settings-panel.js";
-import { comparePanel, slicesPanel, stopsPanel } from "./slices-panel.js";
-import { onState, store, subscribe, update } from "./store.js";
-import { thumbnailsOf } from "./thumbnails.js";
-import { wallsOf } from "./walls.js";
+import { benchesPanel, devicesPanel } from "./model/benches.js";
+import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
+import { fetchModel, modelOf, pedestalOf } from "./model/model.js";
+import { facetsOf, thumbnailsOf } from "./model/resting.js";
+import { ringsOf } from "./model/rings.js";
+import { marksPanel } from "./parts/marks-panel.js";
+import { partsList, partsPanel } from "./parts/parts-panel.js";
+import { apartPanel } from "./parts/pieces.js";
+import { handlesOf, obstacleOf, planesPanel } from "./parts/planes.js";
+import { printFrame } from "./print/print-frame.js";
+import { printPanel } from "./print/print-panel.js";
+import { titleOfModel } from "./print/print-shown.js";
+import { axesOf } from "./scene/axes.js";
+import { clicksOf, press } from "./scene/clicks.js";
+import { pictureOf } from "./scene/picture.js";
+import { settingsPanel } from "./settings/settings-panel.js";
+import { saveMenu } from "./slice/save-menu.js";
+import { comparePanel, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
+import { keptLook, onState, store, subscribe, update } from "./store.js";
+import { elapsedTimes, problemLine } from "./told.js";
 
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
@@ -65,11 +53,11 @@ function main() {
     viewButtons(camera, CORNERS[0], picture.ask);
     axesOf(camera, picture);
   } else {
-    document.body.classList.add("no-picture");
+    toggle("no-picture", true);
     $("show-rings").disabled = true;
   }
   keysOf(camera, picture);
-  for (const button of document.querySelectorAll("[data-do]")) button.addEventListener("click", () => send({ do: button.dataset.do }));
+  onData("do", ({ do: name }) => send({ do: name }));
   root.dataset.state = picture ? "ready" : "failed";
 }
 
@@ -83,10 +71,9 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
   toggle("has-model", model);
-  for (const [id, word] of [["undo", undo], ["redo", redo]]) {
-    $(id).disabled = !word;
-    $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);
-  }
+  disable({ undo: !undo, redo: !redo });
+  $("undo").ariaLabel = undo ? `undo: ${undo}` : "undo";
+  $("redo").ariaLabel = redo ? `redo: ${redo}` : "redo";
 }
 
 /** What keys do; undo and redo, but where what is typed has an undo of its own. */

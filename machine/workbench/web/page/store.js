@@ -37,3 +37,43 @@ export function onNew(pick, changed) {
 
 /** listener(state, the one before): for every new state. */
 export const onState = (listener) => subscribe((now, before) => { if (now.state !== before.state) listener(now.state, before.state); });
+
+/** now: an object, at first what was kept or usual has; keep(changes) changes it. Where a browser keeps nothing, a reload forgets. */
+export function keptInTab(name, usual) {
+  const key = `${name} ${location.pathname}`;
+  const kept = { now: { ...usual } };
+  try {
+    Object.assign(kept.now, JSON.parse(sessionStorage.getItem(key) || "{}"));
+  } catch { /* nothing is kept here */ }
+  kept.keep = (changes) => {
+    Object.assign(kept.now, changes);
+    try {
+      sessionStorage.setItem(key, JSON.stringify(kept.now));
+    } catch { /* nothing is kept here */ }
+  };
+  return kept;
+}
+
+const SEEN = ["yaw", "pitch", "target", "distance", "radius"]; // of a camera
+
+/** {restore(): once the model is there, the view that was kept of it}. Call it when the tabs are there. */
+export function keptLook(camera, picture) {
+  const kept = keptInTab("look", { tab: "", camera: null });
+  let waiting = kept.now.camera; // its view comes with its model
+  document.getElementById(`tab-${kept.now.tab}`)?.click();
+  subscribe((now, before) => { if (now.tab !== before.tab) kept.keep({ tab: now.tab }); });
+  addEventListener("pagehide", () => {
+    const model = store.state?.model?.key;
+    if (picture && model) kept.keep({ camera: { model, ...Object.fromEntries(SEEN.map((name) => [name, camera[name]])) } });
+  });
+  return {
+    restore: () => {
+      if (!store.triangles) return;
+      if (waiting?.model === store.state.model?.key) {
+        SEEN.forEach((name) => { camera[name] = waiting[name]; });
+        picture?.ask();
+      }
+      waiting = null;
+    },
+  };
+}

@@ -1,0 +1,169 @@
+// Elements: how both pages find, make, fill and hear their elements, and words that several places say in the same way.
+
+export const $ = (id) => document.getElementById(id);
+
+/** A new element with properties, classes and children; text is only ever put in as text. */
+export function made(tag, { text, className, ...properties } = {}, ...children) {
+  const element = document.createElement(tag);
+  if (text !== undefined) element.textContent = text;
+  if (className) element.className = className;
+  Object.assign(element, properties);
+  element.append(...children);
+  return element;
+}
+
+/** A button with what it does; more: its other properties. */
+export const button = (text, onclick, more = {}, ...children) => made("button", { type: "button", text, onclick, ...more }, ...children);
+
+/** A row of a table; cells: texts and elements. */
+export const rowOf = (cells, tag = "td") => made("tr", {}, ...cells.map((cell) => made(tag, {}, cell)));
+
+/** Entries of a list of choices: [value, text]. */
+export const optionsOf = (entries, chosen) => entries.map(([value, text]) => made("option", { value, text, selected: value === chosen }));
+
+/** What is done at an event of elements, a table by their ids. */
+export const listen = (event, acts) => Object.entries(acts).forEach(([id, act]) => $(id).addEventListener(event, act));
+
+/** What is done at a click on the elements that have a data-NAME, each with its data. */
+export const onData = (name, act, within = document) => within.querySelectorAll(`[data-${name}]`)
+  .forEach((element) => element.addEventListener("click", () => act(element.dataset)));
+
+/** Which elements are hidden, which cannot be pressed, and what texts they have, tables by their ids; what is the same is not read aloud again. */
+const putAll = (property) => (values) => Object.entries(values).forEach(([id, value]) => { if ($(id)[property] !== value) $(id)[property] = value; });
+export const hide = putAll("hidden");
+export const disable = putAll("disabled");
+export const tell = putAll("textContent");
+
+/** A text that is seen where there is one. */
+export function sayIn(id, text) {
+  tell({ [id]: text });
+  hide({ [id]: !text });
+}
+
+export const pressed = (id, whether) => $(id).setAttribute("aria-pressed", whether);
+export const toggle = (name, whether) => document.body.classList.toggle(name, Boolean(whether));
+export const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+
+/** Terms with their texts, and with classes of those that have one. */
+export const termsOf = (pairs) => pairs.flatMap(([name, text, className]) => [made("dt", { text: name }), made("dd", { text, className })]);
+
+/** A patch of a colour. */
+export function swatch(colour) {
+  const mark = made("span", { className: "swatch" });
+  mark.style.backgroundColor = colour;
+  return mark;
+}
+
+/** Seconds as 1h 6m 15s, as everywhere in the program. */
+export function duration(seconds) {
+  const whole = Math.round(seconds), [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return hours ? `${hours}h ${minutes}m ${rest}s` : minutes ? `${minutes}m ${rest}s` : `${rest}s`;
+}
+
+/** The same where a minute more or less is nothing. */
+export const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
+
+export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
+
+/** Dark or light, as changed(dark) is told: what the system prefers until a person says otherwise, by the button or what this gives. */
+export function themeSwitch(changed) {
+  const system = matchMedia("(prefers-color-scheme: dark)"), dark = () => told ?? system.matches;
+  let told = null;
+  const show = () => { document.documentElement.dataset.theme = dark() ? "dark" : "light"; changed(dark()); };
+  const tell = (value) => { told = value; show(); };
+  system.addEventListener("change", show);
+  $("theme").addEventListener("click", () => tell(!dark()));
+  show();
+  return tell;
+}
+
+const NOTICES = new Map(); // what is said now, by what it is about
+
+/** Says something over the picture, or ("") says it no more; shown is what began to be said last.
+ * What one thing says stays until the same thing takes it back: a picture that is ready does not wipe away a warning. */
+export function notice(text, about) {
+  if (NOTICES.get(about) !== text) NOTICES.delete(about); // what is said anew goes to the end
+  if (text) NOTICES.set(about, text);
+  sayIn("notice", [...NOTICES.values()].at(-1) || "");
+}
+
+const UNTYPED = ["range", "radio", "checkbox", "button", "file"]; // inputs into which no letter goes
+
+/** Whether the element in focus needs a key itself, so that it is no command: a field that is typed into, a list, which goes to the entry
+ * of a letter, a slider, a button. */
+export function needsKey({ key, target: { tagName, type } }) {
+  if (["SELECT", "TEXTAREA"].includes(tagName) || (tagName === "INPUT" && !UNTYPED.includes(type))) return true;
+  if (tagName === "INPUT" && ["range", "radio"].includes(type) && /^(Arrow|Page|Home|End)/.test(key)) return true;
+  return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);
+}
+
+/** Has something done when the browser next draws, once however often it is asked for by then. */
+export function nextFrame(act) {
+  let asked = false;
+  const begin = () => {
+    asked = false;
+    act();
+  };
+  return () => {
+    if (!asked) requestAnimationFrame(begin);
+    asked = true;
+  };
+}
+
+/** Who is told what has changed: row, layers, colours, look. */
+export function bells() {
+  const heard = new Map();
+  return {
+    on: (names, listener) => names.split(" ").forEach((name) => heard.set(name, [...(heard.get(name) || []), listener])),
+    ring: (...names) => new Set(names.flatMap((name) => heard.get(name) || [])).forEach((listener) => listener()),
+  };
+}
+
+/** A finding as a button that goes there, where it has a place. */
+export function findingButton({ severity, code, message, part, layer, line }, onclick, { whole = "the whole file", ending = "", ...more } = {}) {
+  const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
+  return button("", onclick, { className: severity, ...more }, made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? where + ending : whole }));
+}
+
+/** An element put where a place of the picture is seen, in pixels; null: it is not. */
+export function putAt(element, place) {
+  element.hidden = !place;
+  if (place) element.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
+}
+
+/** Colours with words, so many that they have room. */
+export const swatches = (entries) => entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text));
+
+/** chosen(panel's id) is called with every choice. */
+export function tabsOf(chosen) {
+  const all = [...document.querySelectorAll("[role=tab]")];
+  const choose = (tab) => {
+    all.forEach((each) => {
+      each.setAttribute("aria-selected", each === tab);
+      each.tabIndex = each === tab ? 0 : -1;
+      $(each.getAttribute("aria-controls")).hidden = each !== tab;
+    });
+    chosen(tab.getAttribute("aria-controls"));
+  };
+  all.forEach((tab, k) => {
+    tab.addEventListener("click", () => choose(tab));
+    tab.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      const next = all[(k + step + all.length) % all.length];
+      choose(next);
+      next.focus();
+      event.stopPropagation();
+    });
+  });
+}
+
+/** What single keys do, where no element needs them itself; closed(): they do nothing now. */
+export function onKeys(keys, closed) {
+  addEventListener("keydown", (event) => {
+    const act = keys[event.key] || keys[event.key.toLowerCase()];
+    if (!act || event.ctrlKey || event.metaKey || event.altKey || closed() || needsKey(event)) return;
+    event.preventDefault();
+    act(event);
+  });
+}

@@ -1,0 +1,105 @@
+// Pace: a picture only after a change; where the whole takes long, a coarse one at once and the whole piece by piece when all rests.
+
+import { notice } from "../elements.js";
+import { clamp } from "../picture/math.js";
+
+const SLOW_MS = 50;
+const LONG_MS = 600; // a whole picture that takes longer is preceded by a coarse one also where only a choice has changed
+const TOLD_MS = 1500; // and of one that takes longer it is told how far it is
+const PIECE_MS = 120; // of a whole picture at a time: so long may a hand wait
+const LEAST = 5000; // beads in a piece
+const STILL_MS = 180;
+const AT_FIRST = 100000; // beads, before it is known how fast pictures come
+const COARSE_ROWS = 120000; // of so many rows every second layer makes a quick picture
+const COARSEST = 32;
+
+/** {ask, moved}: ask() after any change, moved() whenever eye or slider move. Pictures never pile up: each waits for the card. */
+export function paceOf(gl, painter, count) {
+  const { dataset } = document.documentElement;
+  let state = "idle", timer = 0; // the timer runs while eye or slider move
+  let stale = false, hasty = false, unbegun = false; // changed since; by a movement; only a coarse picture is there
+  let level = Math.max(doublings(count / COARSE_ROWS), 2), piece = AT_FIRST / 4, spent = 0, whole = { ms: 0, rows: 1 };
+  const tell = (now) => { state = dataset.picture = now; };
+  const expectedMs = () => whole.ms * Math.max(painter.rows() / whole.rows, 1);
+  const slow = () => {
+    if (!whole.ms || !hasty) return count > AT_FIRST && (!whole.ms || expectedMs() > LONG_MS);
+    return expectedMs() > SLOW_MS;
+  };
+  const draw = () => {
+    if (stale && slow()) {
+      painter.coarse(level);
+      [stale, hasty, unbegun] = [false, false, true];
+      return false;
+    }
+    if (stale || unbegun) {
+      painter.begin();
+      [stale, hasty, unbegun, spent] = [false, false, false, 0];
+    }
+    painter.step(piece);
+    return true;
+  };
+  const learn = (fine, took) => {
+    dataset.firstMs ||= performance.now().toFixed(0);
+    if (!fine) {
+      dataset.coarseMs = took.toFixed(0);
+      level = took > SLOW_MS ? Math.min(level * 2, COARSEST) : took < SLOW_MS / 5 ? Math.max(level / 2, 2) : level;
+      return;
+    }
+    spent += took;
+    piece = Math.max(Math.ceil(piece * clamp(PIECE_MS / Math.max(took, 1), 0.5, 2)), LEAST);
+    const left = painter.left(), rows = painter.rows();
+    if (!left) {
+      whole = { ms: spent, rows: Math.max(rows, 1) };
+      dataset.pictureMs = spent.toFixed(0);
+      dataset.wholeMs ||= performance.now().toFixed(0);
+    }
+    progress(left && expectedMs() + spent > TOLD_MS ? 1 - left / Math.max(rows, 1) : 1);
+  };
+  const next = () => {
+    if (stale) return queue();
+    if (!unbegun && !painter.left()) return tell("idle");
+    if (timer) tell("waiting"); else queue();
+  };
+  const begin = () => {
+    if (!painter.ready()) return tell("idle");
+    tell("drawing");
+    const start = performance.now(), fine = draw();
+    finished(gl, () => {
+      if (!gl.isContextLost()) learn(fine, performance.now() - start);
+      next();
+    });
+  };
+  const queue = () => { tell("asked"); requestAnimationFrame(begin); };
+  const ask = () => {
+    stale = true;
+    if (state === "idle" || state === "waiting") queue();
+  };
+  const rest = () => {
+    timer = 0;
+    if (state === "waiting") queue();
+  };
+  const moved = () => {
+    clearTimeout(timer);
+    timer = setTimeout(rest, STILL_MS);
+    hasty = true;
+    ask();
+  };
+  return { ask, moved };
+}
+
+/** Calls back when the card has done all that it was told, or will never do it. */
+function finished(gl, then) {
+  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl.flush();
+  const look = () => {
+    if (!gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) return setTimeout(look, 3);
+    gl.deleteSync(fence);
+    return then();
+  };
+  setTimeout(look, 1);
+}
+
+const progress = (share) => notice(share < 1 ? `Drawing every move: ${Math.floor(100 * share)} %` : "", "drawing");
+
+/** The next power of two, from 1 on. */
+const doublings = (x) => 2 ** Math.ceil(Math.log2(Math.max(x, 1)));

@@ -1,0 +1,96 @@
+// Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
+
+import { $, duration, listen, made, optionsOf, partsInWords, swatch, swatches, tabsOf, toggle } from "../elements.js";
+import { RAMP, typeColour } from "../moves/colours.js";
+import { KIND } from "../moves/rows.js";
+import { mix } from "../picture/math.js";
+import { hex } from "../picture/solids.js";
+
+export function controlsOf(print, scene, bells) {
+  const { parts } = print.header, posed = parts.filter((part) => part.base);
+  for (const name of Object.keys(scene.on)) {
+    const box = $(`show-${name}`);
+    box.checked = scene.on[name];
+    box.addEventListener("change", () => { scene.on[name] = box.checked; bells.ring("look"); });
+  }
+  const choices = { "colour-by": ["mode", "colours"], others: ["others", "look"], model: ["model", "look"], risky: ["risky", "model"] };
+  for (const [id, [key, bell]] of Object.entries(choices)) {
+    if (["mode", "model"].includes(key)) $(id).value = scene[key];
+    listen("change", { [id]: () => { scene[key] = $(id).value; bells.ring(bell); } });
+  }
+  $("stand").append(...optionsOf(posed.map(({ index }) => [index, `part ${index}`])));
+  listen("change", {
+    frame: () => { scene.riding = $("frame").value === "workpiece"; bells.ring("frame"); },
+    stand: () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)),
+  });
+  listen("input", { apart: () => { scene.apart = Number($("apart").value); bells.ring("look"); } });
+  toggle(print.rows.count ? "has-paths" : "no-paths", true);
+  toggle("no-solids", !print.surfaces && !posed.length);
+  toggle("one-part", parts.length < 2);
+  typeBoxes(print, scene, bells);
+  tabsOf((panel) => toggle("reporting", panel === "report"));
+}
+
+/** A box for every kind of line in the print, with its share of the time. */
+function typeBoxes({ rows }, scene, bells) {
+  const seconds = new Float64Array(rows.types.length);
+  let whole = 0;
+  for (let i = 0; i < rows.count; i++) {
+    const took = rows.time[i] - (i ? rows.time[i - 1] : 0);
+    whole += took;
+    if (rows.kind[i] === KIND.extrude) seconds[rows.type[i]] += took;
+  }
+  rows.types.forEach((name, place) => {
+    if (!seconds[place]) return;
+    const onchange = ({ target }) => { scene.hidden[target.checked ? "delete" : "add"](place); bells.ring("colours"); };
+    const share = made("span", { className: "share", text: `${((100 * seconds[place]) / whole).toFixed(1)} %` });
+    $("types").append(made("label", {}, made("input", { type: "checkbox", checked: true, onchange }), swatch(typeColour(name)), name || "not told", share));
+  });
+}
+
+const TITLES = { kind: "kind of line", layer: "layer time" }; // where the title is not the word itself
+
+export function showLegend({ rows, header }, { mode, tried }, legend) {
+  const title = tried ? `as ${partsInWords(tried.parts)}` : (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "");
+  const parts = tried ? tried.colours.map((colour, k) => [colour, `${k + 1}`]) : header.parts.map(({ colour, index }) => [colour, index ? `${index}` : "the file"]);
+  const entries = swatches(mode === "kind" && !tried ? kindEntries(rows) : parts);
+  $("legend").replaceChildren(made("b", { text: title }), ...(legend && !tried ? scaleOf(legend) : entries));
+}
+
+function scaleOf({ marks }) {
+  const scale = made("div", { className: "scale" });
+  scale.style.backgroundImage = `linear-gradient(to right, ${RAMP.map(hex).join(", ")})`;
+  return [scale, made("div", { className: "marks" }, ...marks.map((text) => made("span", { text })))];
+}
+
+function kindEntries(rows) {
+  const used = new Set(rows.type.filter((_, i) => rows.kind[i] === KIND.extrude));
+  return [...used].sort((a, b) => a - b).map((place) => [typeColour(rows.types[place]), rows.types[place] || "not told"]);
+}
+
+const KINDS = ["travel", "", "retraction", "turning the table", "wipe", "prime"];
+
+export function readoutsOf(print, scene, bells) {
+  const { rows, header, flow } = print, letters = [header.machine.tilt.letter, header.machine.turn.letter];
+  const axis = (k, digits) => () => scene.place[k].toFixed(digits);
+  const pushed = () => mix(scene.row ? rows.filament[scene.row - 1] : 0, rows.filament[scene.row], scene.share) * 1e-5;
+  const told = [
+    ["line", "line", (i) => rows.line[i]], ["time", "time", () => duration(scene.time())],
+    ["x", "X", axis(0, 3)], ["y", "Y", axis(1, 3)], ["z", "Z", axis(2, 3)], ["e", "E", () => pushed().toFixed(3)],
+    ["tilt", letters[0], axis(3, 3)], ["turn", letters[1], axis(4, 3)],
+    ["part", "part", (i) => rows.part[i] || "–"], ["layer", "layer", (i) => rows.layer[i] || "–"],
+    ["type", "doing", (i) => KINDS[rows.kind[i]] || rows.types[rows.type[i]] || "extruding"],
+    ["speed", "speed", (i) => `${(rows.speed[i] / 1000).toFixed(1)} ${rows.kind[i] === KIND.rotate ? "°/s" : "mm/s"}`],
+    ["size", "bead", (i) => (rows.width[i] ? [rows.width[i], rows.height[i]].map((x) => (x / 1000).toFixed(2)).join(" × ") : "–")],
+    ["flow", "flow", (i) => (flow(i) ? `${flow(i).toFixed(2)} mm³/s` : "–")],
+    ["fan", "fan", (i) => `${Math.round(rows.fan[i] / 2.55)} %`],
+    ["nozzle", "nozzle", (i) => (rows.nozzle[i] ? `${(rows.nozzle[i] / 10).toFixed(0)} °C` : "–")],
+    ["bed", "bed", (i) => (rows.bed[i] ? `${(rows.bed[i] / 10).toFixed(0)} °C` : "–")],
+  ];
+  const less = ["fan", "flow", "nozzle", "bed", "size"];
+  for (const [id, label] of told) {
+    const className = less.includes(id) ? "less" : id === "type" ? "wide" : "";
+    $("readouts").append(made("dt", { text: label, className: less.includes(id) ? "less" : "" }), made("dd", { className }, made("output", { id: `readout-${id}`, ariaLive: "off" })));
+  }
+  bells.on("row", () => { for (const [id, , of] of told) $(`readout-${id}`).textContent = rows.count ? of(scene.row) : "–"; });
+}

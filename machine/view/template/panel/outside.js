@@ -1,0 +1,80 @@
+// Outside: with whom the page talks: the workbench's page in which it may lie, and the server of a running print.
+
+import { $, duration, hide, listen, onData, tell, toggle } from "../elements.js";
+
+/** The workbench says {tiltprint: "finding", finding}, {..: "line", line}, {..: "text", text: the file}, {..: "theme", dark}, {..: "view", yaw, pitch in
+ * radians}; it is told the latter, too, when a hand has turned the view. */
+export function outsideOf({ scene, findings, code, chooseTheme, camera, bells }) {
+  if (parent === window || location.origin === "null") return;
+  toggle("inside", true);
+  const say = (word, more = {}) => parent.postMessage({ tiltprint: word, ...more }, location.origin);
+  const heard = {
+    finding: ({ finding }) => findings.open(finding),
+    line: ({ line }) => scene.goToLine(line),
+    text: ({ text }) => code.take(text),
+    theme: ({ dark }) => chooseTheme(dark),
+    view: ({ yaw, pitch }) => {
+      Object.assign(camera, { yaw, pitch });
+      bells.ring("look");
+    },
+  };
+  addEventListener("message", ({ data, origin, source }) => {
+    if (source === parent && origin === location.origin) heard[data?.tiltprint]?.(data);
+  });
+  for (const turned of ["pointerup", "keyup", "click"]) addEventListener(turned, () => say("view", { yaw: camera.yaw, pitch: camera.pitch }));
+  let asked = false;
+  listen("click", { "tab-code": () => { if (!asked && code.needed()) say("text"); asked = true; } });
+  addEventListener("keydown", (event) => { if (event.key === "Escape" && !$("help").open) say("leave"); });
+  say("ready");
+}
+
+const ASK_EVERY_MS = 1000;
+const OVER = ["done", "cancelled", "left", "declined", "failed"], AWAY = ["pausing", "paused"]; // the tip, from the print
+const NOT_ARRIVED = "that has not arrived: use the terminal, or the printer's own switch";
+
+/** Follows a running print, asking the computer that served the page for what the printer has acknowledged. */
+export function follow(scene, player) {
+  hide({ live: false });
+  orders();
+  const [pause, resume] = ["pause", "resume"].map((name) => document.querySelector(`[data-order=${name}]`));
+  let shown = -1;
+  const ask = async () => {
+    const state = await fetch("state", { cache: "no-store" }).then((answer) => answer.json()).catch(() => null);
+    tell({ live: state ? liveTold(state) : "the print's computer does not answer" });
+    if (!state) return setTimeout(ask, 5 * ASK_EVERY_MS);
+    const over = OVER.includes(state.state), away = AWAY.includes(state.state);
+    hide({ orders: over });
+    [pause.hidden, resume.hidden] = [away, !away];
+    if (state.file_line && state.file_line !== shown && !player.playing) {
+      shown = state.file_line;
+      scene.goToLine(state.file_line);
+    }
+    return over ? null : setTimeout(ask, ASK_EVERY_MS);
+  };
+  ask();
+}
+
+/** The buttons, which do what keys in the terminal do; a stop is asked about once more, an emergency stop is not. */
+function orders() {
+  const sure = (asked) => hide({ "stop-surely": !asked, stop: asked });
+  listen("click", { stop: () => sure(true), "go-on": () => sure(false) });
+  onData("order", async ({ order }) => {
+    sure(false);
+    const answer = await fetch(`order/${order}`, { method: "POST" }).catch(() => null);
+    if (!answer?.ok) tell({ live: NOT_ARRIVED });
+  });
+}
+
+function liveTold(told) {
+  const heat = (name, value, target) => value != null && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
+  return [
+    told.share ? `${told.state} ${Math.floor(100 * told.share)} %` : told.state,
+    told.file_line && `line ${told.file_line}`,
+    heat("nozzle", told.nozzle_c, told.nozzle_target_c),
+    heat("bed", told.bed_c, told.bed_target_c),
+    told.heat_is_old && told.nozzle_c != null && "as last known",
+    told.left_s && `${duration(told.left_s)} left`,
+    told.message,
+    told.warning,
+  ].filter(Boolean).join(" · ");
+}

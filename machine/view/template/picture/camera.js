@@ -1,0 +1,143 @@
+// Camera: an eye that circles a target, z up, moved by mouse, fingers and keys.
+
+import { add, bounds, clamp, cross, dot, length, moved, multiply, perspective, RAD, scaled, sub } from "./math.js";
+
+const FARTHEST_MM = 1000; // behind the work: room for the machine
+const MARGIN = 1.12;
+export const HALF_HEIGHT = Math.tan(15 * RAD); // of the picture at distance 1
+
+export function cameraOf() {
+  const camera = { target: [0, 0, 0], distance: 300, yaw: -55 * RAD, pitch: 24 * RAD, radius: 100 };
+  const outward = () => {
+    const { yaw, pitch } = camera;
+    return [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
+  };
+  camera.eye = () => add(camera.target, scaled(outward(), camera.distance));
+  camera.right = () => [-Math.sin(camera.yaw), Math.cos(camera.yaw), 0];
+  camera.up = () => cross(outward(), camera.right());
+  camera.toEye = () => {
+    const [r, u, o] = [camera.right(), camera.up(), outward()];
+    return multiply([r[0], u[0], o[0], 0, r[1], u[1], o[1], 0, r[2], u[2], o[2], 0, 0, 0, 0, 1], moved(scaled(camera.eye(), -1)));
+  };
+  camera.lens = (aspect) => {
+    const far = camera.distance + Math.max(8 * camera.radius, FARTHEST_MM);
+    return perspective(HALF_HEIGHT, aspect, camera.distance / 40, far);
+  };
+  /** How the eye sees what a matrix puts somewhere, {toEye, toClip}, in a picture of a size. */
+  camera.seen = ([width, height]) => {
+    const view = camera.toEye(), lens = camera.lens(width / height);
+    return (matrix) => {
+      const toEye = multiply(view, matrix);
+      return { toEye, toClip: multiply(lens, toEye) };
+    };
+  };
+  /** From where and along what a place of the picture is seen, as placeOn gives it. */
+  camera.sight = ([x, y]) => {
+    const across = add(scaled(camera.right(), x), scaled(camera.up(), y));
+    return [camera.eye(), add(scaled(outward(), -1), scaled(across, HALF_HEIGHT))];
+  };
+  camera.orbit = (dx, dy) => {
+    camera.yaw -= dx;
+    camera.pitch = clamp(camera.pitch + dy, -89.5 * RAD, 89.5 * RAD);
+  };
+  /** Shifts the target across the view; dx, dy in picture heights. */
+  camera.pan = (dx, dy) => {
+    const span = 2 * HALF_HEIGHT * camera.distance;
+    camera.target = add(camera.target, add(scaled(camera.right(), -dx * span), scaled(camera.up(), dy * span)));
+  };
+  /** Comes nearer by a factor towards a place of the picture (-1..1, y times the aspect). */
+  camera.zoom = (factor, x = 0, y = 0) => {
+    const next = clamp(camera.distance * factor, 0.5, 40 * camera.radius), span = HALF_HEIGHT * (camera.distance - next);
+    camera.target = add(camera.target, add(scaled(camera.right(), x * span), scaled(camera.up(), y * span)));
+    camera.distance = next;
+  };
+  /** Brings places into view about their middle, in a picture of a size. */
+  camera.fit = (places, [width, height]) => {
+    const [least, most] = bounds(places.flat());
+    camera.target = scaled(add(least, most), 0.5);
+    camera.radius = Math.max(length(sub(most, least)) / 2, 1);
+    const axes = [camera.right(), camera.up(), outward()];
+    const needed = places.map((place) => {
+      const [x, y, near] = axes.map((axis) => dot(axis, sub(place, camera.target)));
+      return near + Math.max((Math.abs(x) * height) / width, Math.abs(y)) / HALF_HEIGHT;
+    });
+    camera.distance = MARGIN * Math.max(...needed, 1);
+  };
+  return camera;
+}
+
+export const CORNERS = [-55, 55, -125, 125];
+const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
+
+/** The buttons that look from a side, or a corner, degrees; from that at first. */
+export function viewButtons(camera, corner, changed) {
+  const look = (name) => {
+    [camera.yaw, camera.pitch] = (VIEWS[name] || [corner, 24]).map((angle) => angle * RAD);
+    changed();
+  };
+  for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => look(button.dataset.view));
+  look("corner");
+}
+
+/** Where on the canvas an event is: -1..1 upwards, and as far across as the canvas is wider than high. */
+export function placeOn(canvas, { clientX, clientY }) {
+  const { left, top, width, height } = canvas.getBoundingClientRect();
+  return [((clientX - left) / width * 2 - 1) * (width / height), 1 - ((clientY - top) / height) * 2];
+}
+
+/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. */
+export function handle(canvas, camera, { changed, pressed }) {
+  const fingers = new Map();
+  let path = 0;
+  const mean = (k) => [...fingers.values()].reduce((sum, place) => sum + place[k] / fingers.size, 0);
+  const middle = () => [mean(0), mean(1)];
+  const spread = () => {
+    const [a, b] = [...fingers.values()];
+    return b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : 0;
+  };
+  canvas.addEventListener("pointerdown", (event) => {
+    if (fingers.size === 0) path = 0;
+    fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    canvas.setPointerCapture(event.pointerId);
+    canvas.focus({ preventScroll: true, focusVisible: false });
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (!fingers.has(event.pointerId)) return;
+    const [from, wide] = [middle(), spread()];
+    fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    const to = middle(), dx = to[0] - from[0], dy = to[1] - from[1];
+    const shifts = fingers.size > 1 || event.buttons & 6 || event.shiftKey;
+    path += Math.abs(dx) + Math.abs(dy);
+    if (shifts) camera.pan(dx / canvas.clientHeight, dy / canvas.clientHeight);
+    else camera.orbit(dx * 0.008, dy * 0.008);
+    if (fingers.size === 2 && wide > 0 && spread() > 0) camera.zoom(wide / spread(), ...placeOn(canvas, { clientX: to[0], clientY: to[1] }));
+    changed();
+  });
+  const lift = (event) => {
+    if (event.type === "pointerup" && fingers.size === 1 && path < 4 && event.button === 0) pressed(event);
+    fingers.delete(event.pointerId);
+  };
+  canvas.addEventListener("pointerup", lift);
+  canvas.addEventListener("pointercancel", lift);
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    const step = event.deltaMode === 1 ? event.deltaY * 16 : event.deltaY;
+    camera.zoom(Math.exp(clamp(step, -240, 240) * 0.0016), ...placeOn(canvas, event));
+    changed();
+  }, { passive: false });
+}
+
+/** What turns, shifts and zooms the view, and looks from a side. */
+export function viewKeys(camera, look) {
+  const turn = 6 * RAD, shift = 0.05, views = ["corner", "front", "side", "top"];
+  const arrow = (x, y) => (event) => {
+    if (event.shiftKey) camera.pan(-x * shift, y * shift); else camera.orbit(-x * turn, y * turn);
+    look();
+  };
+  const zoom = (factor) => () => { camera.zoom(factor); look(); };
+  return {
+    ArrowLeft: arrow(-1, 0), ArrowRight: arrow(1, 0), ArrowUp: arrow(0, 1), ArrowDown: arrow(0, -1), "+": zoom(0.85), "=": zoom(0.85), "-": zoom(1 / 0.85),
+    ...Object.fromEntries(views.map((name, k) => [k + 1, () => document.querySelector(`[data-view=${name}]`).click()])),
+  };
+}

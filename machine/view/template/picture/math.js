@@ -1,0 +1,89 @@
+// Math: vectors of three numbers and 4 x 4 matrices, column by column as WebGL takes them.
+
+export const RAD = Math.PI / 180;
+export const clamp = (x, least, most) => Math.min(Math.max(x, least), most);
+export const mix = (a, b, t) => a + (b - a) * t;
+export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+export const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+export const scaled = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const length = (a) => Math.hypot(a[0], a[1], a[2]);
+export const unit = (a) => scaled(a, 1 / (length(a) || 1));
+
+export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+
+export function multiply(a, b) {
+  const out = new Array(16);
+  for (let column = 0; column < 4; column++)
+    for (let row = 0; row < 4; row++) {
+      let sum = 0;
+      for (let k = 0; k < 4; k++) sum += a[k * 4 + row] * b[column * 4 + k];
+      out[column * 4 + row] = sum;
+    }
+  return out;
+}
+
+export const moved = (v) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, v[0], v[1], v[2], 1];
+
+/** Right-handed rotation about a unit axis (Rodrigues' formula). */
+export function rotated(axis, angle) {
+  const [x, y, z] = axis, c = Math.cos(angle), s = Math.sin(angle), k = 1 - c;
+  return [
+    x * x * k + c, x * y * k + z * s, x * z * k - y * s, 0,
+    x * y * k - z * s, y * y * k + c, y * z * k + x * s, 0,
+    x * z * k + y * s, y * z * k - x * s, z * z * k + c, 0,
+    0, 0, 0, 1,
+  ];
+}
+
+/** The inverse of a rotation with a shift. */
+export function undone(m) {
+  const back = [m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, 0, 0, 0, 1];
+  const shift = carried(back, [m[12], m[13], m[14]]);
+  back[12] = -shift[0]; back[13] = -shift[1]; back[14] = -shift[2];
+  return back;
+}
+
+export const turned = (m, v) => [
+  m[0] * v[0] + m[4] * v[1] + m[8] * v[2],
+  m[1] * v[0] + m[5] * v[1] + m[9] * v[2],
+  m[2] * v[0] + m[6] * v[1] + m[10] * v[2],
+];
+export const carried = (m, v) => add(turned(m, v), [m[12], m[13], m[14]]);
+
+/** A place on the screen, each coordinate -1..1, and its distance w; w <= 0 lies behind the eye. */
+export function projected(m, v) {
+  const w = m[3] * v[0] + m[7] * v[1] + m[11] * v[2] + m[15];
+  const p = carried(m, v);
+  return [p[0] / w, p[1] / w, p[2] / w, w];
+}
+
+export function perspective(height, aspect, near, far) {
+  const f = 1 / height;
+  return [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
+}
+
+/** Least and greatest corner of points x, y, z after each other; [] where there are none. */
+export function bounds(points) {
+  const least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < points.length; i++) {
+    const k = i % 3, x = points[i];
+    if (x < least[k]) least[k] = x;
+    if (x > most[k]) most[k] = x;
+  }
+  return points.length ? [least, most] : [];
+}
+
+/** The eight corners of a box [least, most]; the bits of a corner's place tell at which end of each axis it lies. */
+export const cornersOf = (box) => Array.from({ length: 8 }, (_, k) => [0, 1, 2].map((axis) => box[(k >> axis) & 1][axis]));
+
+/** How many of the rising numbers are at most x. */
+export function countUpTo(rising, x) {
+  let low = 0, high = rising.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (rising[middle] <= x) low = middle + 1; else high = middle;
+  }
+  return low;
+}

@@ -1,0 +1,180 @@
+// Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
+
+import { $, alike, button, listen, made, putAt, swatch } from "../../../../view/template/elements.js";
+import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
+import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/solids.js";
+import { newest, send } from "../line.js";
+import { choiceRow, fill, putTable, removeButton } from "../lists.js";
+import { modelSize } from "../model/model-panel.js";
+import { alongWay, gripOf } from "../scene/grip.js";
+import { onState, store, subscribe, update } from "../store.js";
+
+const MARK_KINDS = {
+  keep: { word: "no cut", colour: [118, 66, 214] }, no_seam: { word: "no seam", colour: [0, 128, 122] }, no_support: { word: "no support", colour: [196, 24, 126] },
+  support: { word: "support", colour: [196, 128, 0] },
+};
+const MODIFIER = { word: "modifier", colour: [84, 92, 104] }; // of a plan or a model file: shown, not changed
+const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a face's byte
+const BOX_SIDES = [0, 1, 2].flatMap((axis) => [{ axis, end: "min_mm", name: `least ${"xyz"[axis]}` }, { axis, end: "max_mm", name: `greatest ${"xyz"[axis]}` }]);
+const BEYOND_MM = 3; // of the model's box, to which modifiers without sides are drawn
+const PAINT = 0.6; // faces are painted in darker colours, which no part has
+const AROUND_MM = 1; // of the corners that are clicked, so that a box reaches through the surface
+const THINNEST_MM = 0.2, STEP_MM = 0.5;
+
+/** A box's own axes: a model that was turned has taken them along. */
+const axesOf = ({ axes }) => axes || [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+/** A place that is told along a box's own axes, in the platform's frame. */
+const fromBox = (zone, place) => axesOf(zone).reduce((sum, axis, k) => add(sum, scaled(axis, place[k])), [0, 0, 0]);
+
+/** The colours of all corners, marked faces in those of their first kind. */
+export function markedOver(bits, colours) {
+  if (!bits) return colours;
+  const words = new Uint32Array(colours.buffer), inks = KIND_NAMES.map((kind) => wordOf(scaled(MARK_KINDS[kind].colour, PAINT)));
+  bits.forEach((byte, face) => {
+    if (byte) words.fill(inks[31 - Math.clz32(byte & -byte)], 3 * face, 3 * face + 3);
+  });
+  return colours;
+}
+
+const sameMark = (a, b) => Boolean(a && b) && a.kind === b.kind && a.number === b.number;
+const kindNow = () => $("mark-kind").value;
+export const markWord = () => MARK_KINDS[kindNow()].word;
+const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
+
+const boxes = () => store.state.zones.filter((zone) => zone.min_mm).map((zone) => (sameMark(store.zoneHand, zone) ? store.zoneHand : zone));
+/** The boxes of modifiers as far as the model reaches. */
+function modifiers() {
+  const size = modelSize(store.state), far = Math.hypot(...size) + BEYOND_MM;
+  const reach = (axes, axis) => (axes || axis === 2 ? far : size[axis] / 2 + BEYOND_MM);
+  const within = (corner, axes) => corner.map((x, axis) => Math.max(-reach(axes, axis), Math.min(reach(axes, axis), x)));
+  return store.state.modifiers.map((own) => ({ ...own, min_mm: within(own.min_mm, own.axes), max_mm: within(own.max_mm, own.axes) }));
+}
+const boxNow = () => boxes().find((zone) => sameMark(zone, store.zone)) || null;
+const facesNow = () => store.state.zones.find((zone) => sameMark(zone, store.zone) && zone.point_mm);
+
+/** A click on the model where faces or a corner of a box are marked. */
+export function markAt(place) {
+  if (store.clicks === "faces") return send({ do: "mark", kind: kindNow(), point_mm: fine(place), angle_deg: Number($("mark-angle").value) });
+  if (!store.corner) return update({ corner: place });
+  const [least, most] = bounds([...store.corner, ...place]);
+  update({ clicks: "", corner: null });
+  addBox(least.map((x) => x - AROUND_MM), most.map((x) => x + AROUND_MM));
+}
+
+function addBox(least, most) {
+  const kind = kindNow();
+  update({ zone: { kind, number: store.state.zones.filter((zone) => zone.kind === kind).length + 1 }, zoneHand: null });
+  send({ do: "mark", kind, min_mm: fine(least), max_mm: fine(most) });
+}
+
+const holdBox = (zone) => update({ zoneHand: zone });
+
+function putBox(zone) {
+  holdBox(zone);
+  send({ do: "mark", kind: zone.kind, number: zone.number, min_mm: fine(zone.min_mm), max_mm: fine(zone.max_mm), axes: zone.axes || null });
+}
+
+/** A box with one side somewhere else, never thinner than it can be. */
+function withSide(zone, { axis, end }, at) {
+  const limit = end === "min_mm" ? zone.max_mm[axis] - THINNEST_MM : zone.min_mm[axis] + THINNEST_MM;
+  const value = end === "min_mm" ? Math.min(at, limit) : Math.max(at, limit);
+  return { ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) };
+}
+
+const sidePlace = (zone, { axis, end }) => fromBox(zone, [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2)));
+
+function chooseMark(zone) {
+  update({ zone: zone && { kind: zone.kind, number: zone.number }, zoneHand: null });
+  if (facesNow()) $("mark-angle").value = facesNow().angle_deg;
+}
+
+export function marksPanel(picture) {
+  listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: Number($("mark-angle").value) }); } });
+  listen("click", { "mark-middle": () => {
+    update({ clicks: "" });
+    const [x, y, z] = modelSize(store.state), low = store.state.pedestal_mm;
+    addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
+  } });
+  const knobs = BOX_SIDES.map((side) => knobOf(side, picture)), numbers = BOX_SIDES.map(numberOf);
+  $("mark-handles").replaceChildren(...knobs);
+  $("mark-numbers").replaceChildren(...numbers.map((input, k) => made("label", {}, `${BOX_SIDES[k].name} `, input)));
+  picture?.drawn.push(() => {
+    const zone = store.tab === "parts" && store.triangles ? boxNow() : null;
+    $("mark-handles").hidden = !zone;
+    if (zone) knobs.forEach((knob, k) => {
+      putAt(knob, picture.placeOf(sidePlace(zone, BOX_SIDES[k])));
+      knob.style.backgroundColor = `rgb(${MARK_KINDS[zone.kind].colour})`;
+    });
+  });
+  const take = (faceMarks, key) => {
+    update({ faceMarks });
+    document.documentElement.dataset.marks = key;
+  };
+  const fetchMarks = newest({ read: async (answer) => new Uint8Array(await answer.arrayBuffer()), take });
+  onState((state, before) => {
+    const changed = !alike(state.zones, before?.zones), gone = before && !state.busy && changed && store.zone && !state.zones.some((zone) => sameMark(zone, store.zone));
+    if (changed || (state.problem && state.problem !== before?.problem)) update({ zoneHand: null, ...(gone ? { zone: null } : {}) });
+    fetchMarks(state.marks, `marks/${state.marks}`);
+  });
+  subscribe((now) => {
+    const zone = boxNow();
+    $("mark-numbers").hidden = !zone;
+    if (zone) BOX_SIDES.forEach(({ axis, end }, k) => fill(numbers[k], zone[end][axis].toFixed(2)));
+    const { zones, modifiers } = now.state;
+    putTable($("marks"), [zones, modifiers, now.zone], [], () => [...zones.map((mark) => markRow(mark, sameMark(mark, now.zone))), ...modifiers.map(modifierRow)]);
+    if (picture && now.triangles) showMarks(picture);
+  });
+}
+
+/** Boxes and marked faces in the picture, where parts are looked at. */
+function showMarks(picture) {
+  const { tab, state, zone: chosen, faceMarks } = store, seen = tab === "parts" && state.model ? [...modifiers(), ...boxes()] : [];
+  picture.extra("marks", JSON.stringify([seen, chosen]), () => seen.flatMap((zone) => boxDrawn(zone, sameMark(zone, chosen))));
+  picture.marks(tab === "parts" ? faceMarks : null);
+}
+
+const sideTitle = ({ axis, end }) => `${end} ${axis}`;
+
+/** A knob that moves one side of the chosen box. */
+function knobOf(side, picture) {
+  const knob = button("xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), null, { ariaLabel: `${side.name} of the box: drag, or arrow keys` });
+  knob.dataset.side = sideTitle(side);
+  gripOf(knob, {
+    take: (event) => {
+      const zone = boxNow(), along = alongWay(picture, sidePlace(zone, side), axesOf(zone)[side.axis], event);
+      return along && { zone, along };
+    },
+    move: ({ zone, along }, event) => holdBox(withSide(zone, side, zone[side.end][side.axis] + along(event))),
+    put: () => { if (store.zoneHand) putBox(store.zoneHand); },
+    drop: () => holdBox(null),
+    step: (sign) => holdBox(withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM)),
+  });
+  return knob;
+}
+
+/** A field for one side of the chosen box. */
+function numberOf(side) {
+  const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${side.name}, mm` });
+  input.dataset.side = sideTitle(side);
+  input.addEventListener("change", () => { if (boxNow()) putBox({ ...boxNow(), [side.end]: boxNow()[side.end].map((x, k) => (k === side.axis ? Number(input.value) : x)) }); });
+  return input;
+}
+
+/** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */
+function boxDrawn(zone, chosen) {
+  const { kind, min_mm: least, max_mm: most } = zone, { colour } = MARK_KINDS[kind] || MODIFIER, seen = (corners) => corners.map((place) => fromBox(zone, place));
+  const sides = trianglesOf([{ corners: seen(boxCorners(least, most)), colour: [...colour, 200] }]);
+  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: [...colour, 255] }]), over: chosen }];
+}
+
+const modifierRow = ({ settings }) => made("tr", {}, made("td", {}, swatch(`rgb(${MODIFIER.colour})`), MODIFIER.word), made("td", { text: settings, colSpan: 2 }));
+
+function markRow(zone, chosen) {
+  const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
+  const remove = removeButton(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
+  const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
+    : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
+  const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [[where], [remove]], () => chooseMark(zone));
+  row.querySelector("input").ariaLabel = name;
+  return row;
+}

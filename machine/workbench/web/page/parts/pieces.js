@@ -1,0 +1,119 @@
+// Pieces: the parts as bodies of their own, drawn apart along their printing directions, so that the faces of the cuts are seen.
+
+import { $, listen } from "../../../../view/template/elements.js";
+import { blockOf } from "../../../../view/template/moves/block.js";
+import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
+import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/model.js";
+import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
+import { newest } from "../line.js";
+import { mm2, newtons } from "../lists.js";
+import { cornersAt, faceMet } from "../scene/triangles.js";
+import { store, subscribe, update } from "../store.js";
+
+const CUT_MM = 2e-3; // within which a corner lies in the plane of a cut: places come in thousandths of a mm
+const PALER = [190, 194, 199]; // what parts that are not chosen fade to
+const FADED = 0.6, CUT_WHITE = 0.5, ARROW_DARK = 0.35;
+const ARROW_OVER = 0.02, ARROW_SPAN = 0.5; // of the model's size: how far above a part its arrow begins, and for which size it is drawn
+
+/** {header, parts: [{part, range, foot: of its arrow, way, box, cut}], places, marks, span} of the server's block. */
+async function piecesIn(bytes) {
+  const block = await blockOf(bytes), surfaces = surfacesOf(block);
+  if (!surfaces) return null;
+  const { places, marks, parts, apart } = surfaces, bases = parts.slice(1).map(({ part }) => part.base);
+  const [low, high] = bounds(places), span = length(sub(high, low));
+  const described = parts.map(({ part, range }, k) => {
+    const [least, most] = bounds(places.subarray(3 * range[0], 3 * range[1])), planes = bases.slice(Math.max(k - 1, 0));
+    let top = 0;
+    for (let i = 3 * range[0]; i < 3 * range[1]; i += 3) top = Math.max(top, dot(part.base.normal, [places[i], places[i + 1], places[i + 2]]) - part.base.offset_mm);
+    const foot = add(part.base.centre_mm, scaled(part.direction, top + ARROW_OVER * span)), tip = add(foot, scaled(part.direction, 0.3 * ARROW_SPAN * span));
+    return { part, range, foot, way: apart.get(part), box: bounds([...least, ...most, ...tip]), cut: cutFaces(places, range, planes) };
+  });
+  return { header: block.header, parts: described, places, marks, span };
+}
+
+/** Which faces of a range lie in one of the planes. */
+function cutFaces(places, [first, end], planes) {
+  const cut = new Uint8Array((end - first) / 3), within = ({ normal: [x, y, z], offset_mm: offset }, at) => {
+    for (let k = at; k < at + 9; k += 3) if (Math.abs(places[k] * x + places[k + 1] * y + places[k + 2] * z - offset) > CUT_MM) return false;
+    return true;
+  };
+  for (let face = 0; face < cut.length; face++) cut[face] = planes.some((plane) => within(plane, 3 * first + 9 * face));
+  return cut;
+}
+
+/** How far each part is from its place when they are drawn apart by a share of the model's size. */
+export const shiftsOf = ({ parts, span }, share) => parts.map(({ way }) => scaled(way, share * span));
+
+/** A part's colour, paler where it is not the chosen one (0: all are). */
+const fadedRgb = (colour, part, chosen) => rgb(colour).map((x, k) => (chosen && chosen !== part ? mix(x, PALER[k], FADED) : x));
+
+/** The colours of parts, those that are not chosen paler. */
+export const fadedColours = (colours, chosen) => colours.map((colour, k) => hex(fadedRgb(colour, k + 1, chosen)));
+
+/** Colours of all corners: the parts', paler those not chosen, light the cuts, red what needs support. */
+const pieceColours = (pieces, chosen) => surfaceColours(pieces, ({ part, range, cut }) => {
+  const plain = fadedRgb(part.colour, part.index, chosen), light = wordOf(plain.map((x) => mix(x, 255, CUT_WHITE)), 254), colour = wordOf(plain, 254);
+  return (face) => (cut[face - range[0] / 3] ? light : colour);
+}, "printed");
+
+/** Their drawing: {draw(seenAt, shifts), paint(chosen)}; seenAt(shift): how the eye sees what is shifted so. */
+export function piecesOn(gl, pieces, chosen) {
+  const solid = solidOf(gl, { places: pieces.places, colours: pieceColours(pieces, chosen) });
+  const tipped = pieces.parts.map(({ part, foot }) => ({ ...part, base: { ...part.base, radius_mm: 1, centre_mm: foot } }));
+  const arrows = solidOf(gl, arrowsOf(tipped, (part) => rgb(part.colour).map((x) => mix(x, 0, ARROW_DARK)), ARROW_SPAN * pieces.span));
+  const share = arrows.corners / pieces.parts.length;
+  return {
+    draw: (seenAt, shifts) => pieces.parts.forEach(({ range }, k) => {
+      const seen = seenAt(shifts[k]);
+      solid.draw(seen, { range });
+      arrows.draw(seen, { range: [k * share, (k + 1) * share] });
+    }),
+    paint: (number) => solid.paint(pieceColours(pieces, number)),
+    free: () => [solid, arrows].forEach((drawing) => drawing.free()),
+  };
+}
+
+/** The number of the part that a ray of the platform's frame meets first; 0: none. */
+export function pieceMet({ places, parts }, shifts, [from, along]) {
+  let best = 0, least = Infinity;
+  parts.forEach(({ part, range }, k) => {
+    const corners = places.subarray(3 * range[0], 3 * range[1]), start = sub(from, shifts[k]);
+    const face = faceMet({ corners, count: (range[1] - range[0]) / 3 }, start, along);
+    if (face < 0) return;
+    const [a, b, c] = cornersAt(corners, face), normal = cross(sub(b, a), sub(c, a)), far = dot(normal, sub(a, start)) / dot(normal, along);
+    if (far < least) [best, least] = [part.index, far];
+  });
+  return best;
+}
+
+/** By which share of the model's size the parts are drawn apart now. */
+export const apartNow = () => (store.pieces && store.tab === "parts" && !store.hand && !store.state.search ? store.apart : 0);
+
+export function apartPanel(picture) {
+  const keyOf = ({ model, rotation, cuts, given, parts }) => (parts && model.drawn ? JSON.stringify([model.key, rotation, cuts, given]) : "");
+  const take = (pieces) => {
+    $("parts-fit").textContent = pieces ? pieces.header.fit : "";
+    update({ pieces });
+    document.documentElement.dataset.pieces = pieces ? pieces.parts.length : "";
+  };
+  const fetchPieces = newest({ read: async (answer) => piecesIn(new Uint8Array(await answer.arrayBuffer())), take, begin: () => update({ pieces: null }) });
+  $("apart").disabled = !picture;
+  listen("input", { apart: () => {
+    update({ apart: Number($("apart").value) });
+    picture.fit();
+  } });
+  subscribe(({ state, tab, pieces, part, apart }, before) => {
+    $("apart-line").hidden = !state.parts || !state.model.drawn;
+    if (tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) fetchPieces(keyOf(state), "pieces");
+    picture?.pieces(apartNow() ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
+    $("joint-told").textContent = jointInWords(pieces ? pieces.parts.map(({ part: { joint } }) => joint).filter(Boolean) : [], part);
+  });
+}
+
+/** What the joint of the chosen part bears, else the weakest of all. */
+function jointInWords(joints, chosen) {
+  const joint = joints.find(({ part }) => part === chosen) || joints.find(({ weakest }) => weakest);
+  if (!joint) return "";
+  const force = `breaks at about ${newtons(joint.load_n)}, pushed sideways ${joint.arm_mm.toFixed(0)} mm away, or pulled off at ${newtons(joint.tension_n)}`;
+  return `The joint of part ${joint.part}${joint.weakest ? ", the weakest," : ""} has ${mm2(joint.area_mm2)}, a seam of ${joint.seam_mm.toFixed(0)} mm and ${force}.`;
+}

@@ -1,0 +1,174 @@
+// Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
+// whatever becomes of this page.
+
+import { $, alike, disable, hide, listen, made, needsKey, notice, sayIn, tell } from "../../../../view/template/elements.js";
+import { withWholeOptions } from "../lists.js";
+import { onNew, onState, update } from "../store.js";
+import { handPanel, keepHeats, showHand, showHeats, webcamPanel } from "./at-printer.js";
+import { followIn } from "./print-frame.js";
+import { askToNotify, hear, notifyOver, showBar, showPrint, showProgress, showWhich, silence, sure, titleOfPrints } from "./print-shown.js";
+import { OWN_PAGE, printsLine, stopsAsked } from "./prints-line.js";
+
+/** What is chosen of a list whose last entry is another one, typed. */
+function chosenOr(name, typed) {
+  const chosen = document.querySelector(`.ports input[name=${name}]:checked`);
+  return chosen ? chosen.value || $(typed).value.trim() : "";
+}
+
+const port = () => chosenOr("port", "port-typed");
+
+let chosen = false; // by a person, now or the last time, or because no other one was found
+
+/** Whether there is a printer that needs not be asked for. */
+const printerIsChosen = () => chosen && Boolean(port());
+const printerChosen = () => { chosen = true; };
+
+function choosePort({ port: name, baud = $("baud").value, sim_speed: speed = $("sim-speed").value }) {
+  $("baud").value = baud;
+  $("sim-speed").value = speed;
+  const listed = [...$("ports").querySelectorAll("input[name=port]")].find(({ value }) => value && value === name);
+  if (!listed) $("port-typed").value = name;
+  (listed || $("port-other")).checked = true;
+  printerChosen();
+  showPort();
+}
+
+const SERVERS = /^(octoprint|moonraker|duet):/i;
+
+/** What the chosen port is asked for besides. */
+function showPort() {
+  const simulated = port() === "sim", server = SERVERS.test(port());
+  hide({ "sim-speed-line": !simulated, "baud-line": simulated || server, "follow-server": !server, "send-only-line": !server, "port-hint": !$("port-other").checked });
+}
+
+function unforce() {
+  $("force").checked = false;
+  hide({ "force-line": true });
+}
+
+function showPorts({ ports, asking, last_printer: last }, before) {
+  if (last && !chosen) choosePort(last);
+  disable({ "ask-ports": asking });
+  tell({ "ports-told": asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "" });
+  if (alike(ports, before.ports) && $("ports-found").children.length) return;
+  offer("port", port(), (ports || []).map((device) => [device.port, device.port, [device.description, device.words].filter(Boolean).join(": ")]));
+  if (ports?.length === 1 && !chosen) choosePort({ port: ports[0].port });
+}
+
+/** Prints that were cut off, those of the last run of the program among them. */
+function showJournals(journals, before) {
+  if (alike(journals, before)) return;
+  tell({ "journals-told": journals && !journals.length ? "No print of this computer was cut off or cancelled." : "" });
+  offer("journal", chosenOr("journal", "journal-typed"), (journals || []).map(({ path, name, machine, line, written_s }) => (
+    [path, name, `on ${machine}, up to line ${line}, ${new Date(1000 * written_s).toLocaleString()}`])));
+}
+
+/** A list of rows [value, name, words], of which one can be chosen; now: the one that is. */
+const offer = (name, now, rows) => $(`${name}s-found`).replaceChildren(...rows.map(([value, title, words]) => made("label", { className: "port" },
+  made("input", { type: "radio", name, value, checked: value === now }), made("span", {}, made("b", { text: title }), made("small", { text: words })))));
+
+const STOP_KEY = "e";
+
+export function printPanel() {
+  let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
+  const socket = printsLine((told) => { const before = state; state = told; show(before); }, refused, () => stops.expired());
+  const follow = followIn(() => print());
+  const send = (command) => { problem(""); socket.send(command); };
+  const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
+  const print = () => state.prints.find((job) => job.number === chosen) || null;
+  const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => !job.over);
+  const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
+
+  function show(before) {
+    const known = before.prints.map((job) => job.number), fresh = state.prints.findLast((job) => !known.includes(job.number));
+    if (fresh && chosen && (fresh.holder === OWN_PAGE || !running().includes(print()))) chosen = fresh.number; // the stop beside a hand stays its print's
+    else if (!print()) chosen = (running().at(-1) || state.prints.at(-1) || { number: 0 }).number;
+    const lost = state.prints.find((job) => mine.has(job.number) && job.holder !== OWN_PAGE);
+    if (lost) notice(`Another page has taken over the command of the print of ${lost.name}.`, "taken");
+    taken = (lost || running().find((job) => job.number === taken && job.holder !== OWN_PAGE))?.number || 0;
+    if (!taken) notice("", "taken");
+    mine = new Set(state.prints.filter((job) => job.holder === OWN_PAGE).map((job) => job.number));
+    showPorts(state, before);
+    showJournals(state.journals, before.journals);
+    showWhich(state.prints, chosen);
+    showPrint(print(), commands());
+    follow();
+    hear(state.prints);
+    showHand(print(), commands());
+    keepHeats(state.prints);
+    showHeats(print());
+    titleOfPrints(running());
+    notifyOver(state.prints, OWN_PAGE);
+    showBar(running(), print());
+    stops.told();
+    document.documentElement.dataset.printing = print() ? (print().over ? "over" : print().state) : "";
+  }
+
+  setInterval(() => {
+    if (print()?.progress) showProgress(print()); // its temperatures grow old
+    if (!state.prints.some((job) => silence(job))) return;
+    showPrint(print(), commands());
+    showBar(running(), print());
+  }, 1000);
+  const where = () => ({ port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value) });
+  const check = () => {
+    send({ do: "check", ...where(), send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
+    unforce();
+  };
+  /** To the print, checked at once where its printer is known and free, for a check moves and heats nothing. */
+  const toPrint = () => {
+    update({ looking: false });
+    $("tab-printing").click();
+    if (printerIsChosen() && !state.prints.some((job) => !job.over && job.port === port())) check();
+  };
+  for (const event of ["change", "input"]) listen(event, { ports: () => { printerChosen(); showPort(); unforce(); } });
+  listen("focus", {
+    "port-typed": () => { $("port-other").checked = true; $("ports").dispatchEvent(new Event("change")); },
+    "journal-typed": () => { $("journal-other").checked = true; },
+  });
+  listen("click", {
+    check, "verdict-print": toPrint, "bar-print": toPrint, "ask-ports": () => send({ do: "ports", baud: where().baud }),
+    hand: () => { send({ do: "hand", ...where() }); unforce(); },
+    "follow-server": () => send({ do: "follow", port: port() }),
+    "go-on-with": () => send({ do: "go_on", ...where(), journal: chosenOr("journal", "journal-typed"), machine: $("rest-machine").value.trim() }),
+    cancel: () => { sure(true); $("go-on").focus(); }, "go-on": () => sure(false), begin: askToNotify,
+  });
+  for (const button of $("run").querySelectorAll("[data-print]")) button.addEventListener("click", () => { sure(false); command(button.dataset.print); });
+  webcamPanel(print);
+  handPanel((asked) => command("by_hand", asked));
+  listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });
+  listen("change", { which: () => { chosen = Number($("which").value); sure(false); show(state); } });
+  for (const id of ["feed", "flow"]) {
+    const letGo = () => delete $(id).dataset.held;
+    listen("input", { [id]: () => { $(id).dataset.held = true; $(`${id}-told`).textContent = `${$(id).value} %`; } });
+    for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first, if any
+    listen("blur", { [id]: letGo });
+    listen("change", { [id]: () => { letGo(); command(id, { percent: Number($(id).value) }); } });
+  }
+  const stop = () => stops.press(Number($("emergency").dataset.print));
+  listen("click", { emergency: stop });
+  const byKey = (event) => {
+    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || needsKey(event) || $("emergency").hidden) return;
+    event.preventDefault();
+    event.stopPropagation();
+    stop();
+  };
+  addEventListener("keydown", byKey, true);
+  $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
+  onNew(({ sliced }) => sliced && [sliced.key, sliced.stale], () => { unforce(); problem(""); }); // what was found of others
+  onState(({ lacking: { slices: why } }) => {
+    $("check").disabled = Boolean(why);
+    sayIn("unsliced", why && `Nothing to print: ${why}.`);
+    follow();
+  });
+}
+
+function problem(text) {
+  $("print-problem").replaceChildren(...withWholeOptions(text));
+  $("print-problem").hidden = !text;
+}
+
+function refused({ problem: text, forcible }) {
+  problem(text);
+  if (forcible) $("force-line").hidden = false;
+}

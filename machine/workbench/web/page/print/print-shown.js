@@ -1,0 +1,161 @@
+// Print shown: a print's checks, its progress and its end, the bar on every tab while anything prints, and what is told of prints outside the page.
+
+import { $, duration, hide, optionsOf, tell } from "../../../../view/template/elements.js";
+import { clock, listIn, putNew, tellIn } from "../lists.js";
+
+const SILENT_MS = 5000; // a print that goes on is told five times a second
+const FEW = 8;
+const HEARD = new Map(); // by the number of a print: what was heard of it last, and when
+let shownState = "";
+
+export const IN_HAND = "in hand";
+/** States in which a print is under way, and in which the tip is away from it. */
+const LIVE = ["printing", "pausing", "paused", "resuming", "reconnecting", "finishing", "cancelling"];
+const AWAY = ["pausing", "paused"], COMMANDED = LIVE.filter((state) => state !== "cancelling");
+
+export function hear(prints) {
+  for (const { number, state, told_s: told } of prints) {
+    const word = `${state} ${told}`;
+    if (HEARD.get(number)?.word !== word) HEARD.set(number, { word, at: performance.now() });
+  }
+}
+
+/** That a print which goes on has not been heard of for a while: it may hang, or what lies between; "" where it has. */
+export function silence({ number, state, over, progress }) {
+  const past = performance.now() - (HEARD.get(number)?.at ?? Infinity);
+  return !over && progress && state !== "uploading" && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
+}
+
+export const sure = (whether) => hide({ sure: !whether });
+
+export function showWhich(prints, chosen) {
+  hide({ "which-line": prints.length < 2 });
+  const entries = prints.map((job) => [job.number, `${job.name} at ${job.port}: ${job.state}`]);
+  putNew($("which"), entries, () => optionsOf(entries));
+  $("which").value = chosen;
+}
+
+const BEFORE = { checking: "checking …", uploading: "handing the file over", printing: "starting", cancelling: "ending" }; // any moment is known
+
+/** What stands above a print: how it is, or how it has ended. */
+function stateOf(print) {
+  const { state, over, progress, starts } = print;
+  if (over) return print.sentence;
+  if (progress) return state === "uploading" ? progress.message : stateTold(print);
+  return state === "ready" ? (starts ? "ready to print" : "ready to be handed over") : BEFORE[state] || "";
+}
+
+export function showPrint(print, commands) {
+  hide({ run: !print });
+  if (!print) return void ($("printer-field").open = true);
+  const { state, over, progress, figures, server, starts, resumes } = print, uploads = state === "uploading";
+  const runs = [...LIVE, IN_HAND].includes(state), asking = !runs && !uploads && (!over || state === "refused"), paused = AWAY.includes(state);
+  tell({
+    "run-title": `${resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`, "run-state": stateOf(print),
+    "run-news": `${print.name}: ${over ? print.sentence : [state, progress?.warning].filter(Boolean).join(": ")}`, // a reader need not hear every per cent
+    "ask-told": print.question || (starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
+      : "The server keeps the file; nothing prints before somebody starts it there."),
+    "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Leave it", "pause": paused ? "Resume" : "Pause",
+    "sure-told": `Cancel this print? ${server ? "The server ends it, as its own macros say." : "The heaters go off, and what is printed stays as it is."}`,
+    "held-told": print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.",
+  });
+  hide({
+    "run-ask": state !== "ready" || !commands, "run-live": !progress || (over && progress.state === "uploading"), "run-upload": !uploads || !commands, "leave-printing": !server,
+    "run-commands": !COMMANDED.includes(state) || !commands, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
+  });
+  if (!COMMANDED.includes(state) || !commands) sure(false);
+  $("run-state").className = over ? state : "";
+  $("pause").dataset.print = paused ? "resume" : "pause";
+  $("run-log").href = `prints/${print.number}/log`;
+  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on all the same` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-findings", asking && figures ? figures.findings : []);
+  listIn("run-words", print.words.slice(-FEW));
+  listIn("run-said", runs || uploads || over ? print.said.filter((line) => !print.log || !line.includes(print.log)).slice(-FEW) : []);
+  tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
+  if (progress) showProgress(print);
+  const kind = `${print.number} ${over ? "over" : runs ? "runs" : state}`;
+  if (shownState !== kind) { $("printer-field").open = over; $("rest-field").open = false; }
+  shownState = kind;
+  if (over && print.forcible && commands) hide({ "force-line": false });
+}
+
+function stateTold(print) {
+  const { state, share, left_s: left, message, warning } = print.progress;
+  return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message, warning].filter(Boolean).join(" · ");
+}
+
+const figuresTold = ({ lines, time_s: time, filament_mm: filament, filament_g: grams, costs, errors }) =>
+  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m (${grams.toFixed(1)} g${costs ? `, ${costs}` : ""}) of filament${errors ? `, ${errors} error${errors === 1 ? "" : "s"} in the dry run` : ""}`;
+
+/** How long ago a moment was, in seconds since 1970. */
+function ago(moment_s) {
+  const past_s = Math.max(0, Date.now() / 1000 - moment_s), [size, unit] = past_s < 60 ? [1, "s"] : past_s < 3600 ? [60, "min"] : [3600, "h"];
+  return `${Math.floor(past_s / size)} ${unit} ago`;
+}
+
+export function showProgress(print) {
+  const { progress, state, over } = print, old = over || progress.heat_is_old || silence(print);
+  const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
+  const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target ? ` of ${target.toFixed(0)}` : ""} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
+  $("run-progress").value = progress.share || 0;
+  if (progress.state === "uploading") return tellIn("run-told", []);
+  hide({ "run-progress": state === IN_HAND });
+  tellIn("run-told", [
+    progress.part != null && ["part", of(progress.part, progress.parts)],
+    progress.layer != null && ["layer", of(progress.layer, progress.layers)],
+    heat("nozzle", progress.nozzle_c, progress.nozzle_target_c),
+    heat("bed", progress.bed_c, progress.bed_target_c),
+    Object.keys(progress.at).length && ["position", Object.entries(progress.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
+    (progress.total != null || progress.acknowledged) && ["line", of(progress.acknowledged, progress.total)],
+    [over ? "took" : "so far", duration(progress.elapsed_s)],
+    !over && progress.left_s != null && ["done at", clock(Date.now() / 1000 + progress.left_s)],
+  ].filter(Boolean));
+  for (const [id, percent] of [["feed", progress.feed_percent], ["flow", progress.flow_percent]]) {
+    if ($(id).dataset.held) continue;
+    $(id).value = percent;
+    tell({ [`${id}-told`]: `${Math.round(percent)} %` });
+  }
+}
+
+/** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
+export function showBar(running, looked) {
+  const shown = running.includes(looked) ? looked : running.at(-1);
+  hide({ "bar-told": !shown, "emergency": !shown, "print-bar": !shown && $("stop-told").hidden });
+  if (!shown) return;
+  tell({ "bar-told": `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown) : shown.state}` });
+  $("emergency").dataset.print = shown.number;
+}
+
+let model = "", percent = null;
+const heard = new Map(); // state by the number of a print that this page commands
+
+const tellTitle = () => { document.title = [percent === null ? "" : `${percent} %`, model, "tiltprint"].filter(Boolean).join(" – "); };
+
+/** The model's name in the title. */
+export function titleOfModel(name) {
+  model = name;
+  tellTitle();
+}
+
+/** How far the newest print that runs is, in the title; null: none runs. */
+export function titleOfPrints(running) {
+  const share = running.at(-1)?.progress?.share;
+  percent = running.length && share != null ? Math.floor(100 * share) : null;
+  tellTitle();
+}
+
+/** Asked as a print begins, for a hand has just pressed a button: may the browser say when it is over? */
+export function askToNotify() {
+  if (globalThis.Notification?.permission === "default" && globalThis.navigator?.userActivation?.isActive !== false) Notification.requestPermission();
+}
+
+/** Says of prints that this page commands that they are over, where the page itself is not seen. */
+export function notifyOver(prints, page) {
+  for (const { number, holder, state, over, name, sentence } of prints) {
+    const ended = over && LIVE.includes(heard.get(number));
+    if (ended && globalThis.Notification?.permission === "granted" && document.hidden !== false) {
+      new Notification(`${name}: ${sentence}`, { tag: `${location.pathname} ${number}` });
+    }
+    if (holder === page || heard.has(number)) heard.set(number, state);
+  }
+}

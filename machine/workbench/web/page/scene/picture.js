@@ -1,0 +1,224 @@
+// Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
+
+import { nextFrame } from "../../../../view/template/elements.js";
+import { bodiesOf, FROM_BELOW, ON_PLATE } from "../../../../view/template/picture/bodies.js";
+import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
+import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
+import { add, bounds, carried, cornersOf, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
+import { beside, cutsOf, planesOf } from "../../../../view/template/picture/model.js";
+import { bodyOf, boxEdges, MOST_CUTS, solidOf, trianglesOf } from "../../../../view/template/picture/solids.js";
+import { markedOver } from "../parts/marks-panel.js";
+import { piecesOn } from "../parts/pieces.js";
+import { paintedRed, planeBefore, standingBy } from "./triangles.js";
+
+const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156], PLANE_COLOUR = [30, 120, 190];
+const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
+const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
+const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on
+
+/** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
+export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shifts, walls, plane, pedestal, extras }) {
+  const shifted = (box, shift) => box.map((corner) => add(corner, shift));
+  const stood = () => [
+    ...[...(walls || []).values()].map(({ places }) => shifted(bounds(places), scaled(place, -1))), pedestal ? bounds(pedestal.vertices) : [],
+    ...[[0, 0, 0], ...copies].map((shift) => shifted(box, shift)),
+  ];
+  const whole = pieces ? pieces.parts.map((part, k) => shifted(part.box, shifts[k])) : stood();
+  const rim = plane ? beside(plane.normal).flatMap((way) => [1, -1].map((sign) => add(plane.centre_mm, scaled(way, sign * plane.radius_mm)))) : [];
+  const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((shape) => shape?.places.length)
+    .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
+  return [...whole.filter((box) => box.length).flatMap(cornersOf), ...rim, ...around];
+}
+
+/** Drawings of the walls of parts, by the walls; those that were there before are kept. */
+function wallsOn(gl, walls, before = new Map()) {
+  const kept = new Map([...(walls || []).values()].map((wall) => [wall, before.get(wall) || solidOf(gl, wall)]));
+  before.forEach((drawing, wall) => { if (!kept.has(wall)) drawing.free(); });
+  return kept;
+}
+
+/** Drawing for things [{solid, lines, matrix, strength, over: before all else}]. */
+function thingsOn(gl, things) {
+  const bodies = things.map(({ solid, lines, matrix = IDENTITY, ...look }) => ({ body: bodyOf(gl, { solid, lines }), matrix, look: { ...look, lift: ON_FACES } }));
+  return {
+    draw: (seenAs) => bodies.forEach(({ body, matrix, look }) => body.draw(seenAs(matrix), look)),
+    free: () => bodies.forEach(({ body }) => body.free()),
+  };
+}
+
+/** What lies on the bench, drawn when the browser next draws: what the scene has is put there by the calls at the end, and what is in
+ * `drawn` is called after every picture. null: there is no WebGL2. */
+export function pictureOf(canvas, camera) {
+  const gl = cardOf(canvas);
+  if (!gl) return null;
+  const scene = {
+    model: null, matrix: IDENTITY, place: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
+    walls: null, plane: null, pedestal: null, machine: null, dark: false, extras: {},
+  };
+  const drawn = [], toldOf = {}, stale = new Map(); // by the name of what is to be made anew before it is drawn: whether its colours alone are others
+  let card = {}, frame = null, colours = null, count = 0, placed = "";
+  const inks = {
+    model: () => markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours)),
+    pieces: () => scene.chosen,
+  };
+  /** What makes what the card holds, of what the scene has, by its name; more: extras. */
+  const makers = {
+    table: () => bodyOf(gl, scene.machine ? bodiesOf(scene.machine, scene.dark).table : {}),
+    model: () => scene.model && solidOf(gl, { places: scene.model.corners, colours: inks.model() }),
+    pedestal: () => scene.pedestal && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR) }),
+    pieces: () => scene.pieces && piecesOn(gl, scene.pieces, scene.chosen),
+    walls: (before) => wallsOn(gl, scene.walls, before),
+    plane: () => {
+      const { discs, rims } = scene.plane ? planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR) : {};
+      return bodyOf(gl, { solid: discs, lines: rims });
+    },
+  };
+  const renew = () => {
+    for (const [name, coloursAlone] of stale) {
+      const before = card[name];
+      if (coloursAlone && before) before.paint(inks[name]());
+      else {
+        card[name] = makers[name](before);
+        before?.free?.();
+      }
+    }
+    stale.clear();
+  };
+  const bodies = () => Math.floor(MOST_FACES / Math.max(scene.model?.count || 0, 1));
+  const draw = () => {
+    if (gl.isContextLost()) return;
+    renew();
+    const size = sizeOf(canvas), plate = camera.seen(size), seenAs = (matrix) => plate(multiply(moved(scene.place), matrix)), below = camera.eye()[2] < 0;
+    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0;
+    if (outgrown(canvas)) [canvas.width, canvas.height] = size;
+    frame.begin(...size);
+    if (!below) card.table.draw(ground, { lift: ON_PLATE });
+    if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
+    else if (card.model) {
+      card.walls.forEach((wall) => wall.draw(ground));
+      for (const shift of [[0, 0, 0], ...scene.copies.slice(0, bodies())]) {
+        card.model.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost });
+        card.pedestal?.draw(seenAs(moved(shift)), { ghost });
+      }
+    }
+    if (below) card.table.draw(ground, { ...FROM_BELOW, lift: ON_PLATE });
+    card.plane.draw(flat, { strength: 0.3, lift: ON_FACES });
+    Object.keys(scene.extras).forEach((name) => card[name].draw(seenAs));
+    frame.show();
+    scene.toClip = flat.toClip;
+    drawn.forEach((act) => act());
+    document.documentElement.dataset.drawn = ++count;
+  };
+  const ask = nextFrame(draw);
+  const anew = (name, coloursAlone = false) => {
+    stale.set(name, coloursAlone && (stale.get(name) ?? true));
+    ask();
+  };
+  /** Another value of the scene, and what the card has of it anew. */
+  const take = (key, name = key, coloursAlone = false) => (value) => {
+    if (value === scene[key]) return;
+    scene[key] = value;
+    anew(name, coloursAlone);
+  };
+  /** More to draw under a name: things(), see thingsOn, made where what it tells is new. */
+  const extra = (name, told, things) => {
+    if ((toldOf[name] ?? "") === told) return;
+    toldOf[name] = told;
+    scene.extras[name] = things();
+    makers[name] = () => thingsOn(gl, scene.extras[name]);
+    anew(name);
+  };
+  /** The model alone, drawn into a corner of the canvas and taken from there before that is seen. */
+  const thumbnail = (rows, into) => {
+    const { matrix, box } = standingBy(rows, scene.model.vertices, 0), eye = cameraOf(), { width, height } = into;
+    eye.fit(cornersOf(box), [width, height]);
+    frame.begin(Math.max(canvas.width, width), Math.max(canvas.height, height));
+    gl.viewport(0, 0, width, height);
+    card.model.draw(eye.seen([width, height])(matrix));
+    frame.show();
+    const flat = into.getContext("2d");
+    flat.clearRect(0, 0, width, height);
+    flat.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
+  };
+  outlive(gl, () => {}, () => {
+    [card, frame] = [{}, frameOf(gl, 4)];
+    Object.keys(makers).forEach((name) => stale.set(name, false));
+    ask();
+  });
+  new ResizeObserver(ask).observe(canvas);
+  return {
+    ask,
+    drawn,
+    extra,
+    machine: (machine, dark) => { Object.assign(scene, { machine, dark }); anew("table"); },
+    show: (model) => {
+      Object.assign(scene, { model, red: null, marks: null });
+      colours = new Uint8Array(12 * (model?.count || 0));
+      anew("model");
+    },
+    stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
+    red: take("red", "model", true),
+    /** A byte of each face: the kinds of zones it is marked for. */
+    marks: take("marks", "model", true),
+    cut: (planes, colours) => {
+      const drawable = planes && planes.length <= MOST_CUTS;
+      scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
+      ask();
+    },
+    /** The parts as bodies of their own, each shifted, in place of the model; chosen: the number of the part that stands out, 0: all. */
+    pieces: (found, shifts, chosen) => {
+      if (scene.pieces !== found) anew("pieces");
+      else if (found && scene.chosen !== chosen) anew("pieces", true);
+      Object.assign(scene, { pieces: found, shifts, chosen });
+      ask();
+    },
+    /** The walls of what is sliced, triangles of each part, with the model and its copies as ghosts about them; null: none. */
+    walls: take("walls"),
+    /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
+    plane: take("plane"),
+    /** The triangles of what the model stands on, in the platform's frame, or none. */
+    pedestal: take("pedestal"),
+    /** Where the middle of all that is drawn but the walls stands on the plate, and its copies, from there. */
+    place(place, copies) {
+      const told = JSON.stringify([place, copies, scene.box]);
+      if (told === placed) return;
+      placed = told;
+      Object.assign(scene, { place, copies });
+      const boxes = copies.slice(bodies()).flatMap((shift) => boxEdges(...scene.box.map((corner) => add(corner, shift))));
+      extra("copies", boxes.length ? told : "", () => (boxes.length ? [{ lines: trianglesOf([{ corners: boxes, colour: [...MODEL_COLOUR, 255] }]) }] : []));
+      ask();
+    },
+    /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
+    placeOf: (place) => {
+      const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
+      return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
+    },
+    eye: () => sub(camera.eye(), scene.place),
+    carried: (place) => carried(scene.matrix, place),
+    box: () => scene.box,
+    matrix: () => scene.matrix,
+    /** Small pictures of the model as it would stand by rows of rotations, [[rows, canvas of two dimensions]]. */
+    thumbnails: (wanted) => {
+      if (gl.isContextLost() || !scene.model) return;
+      renew();
+      card.model.paint(paintedRed(scene.model.count, null, MODEL_COLOUR, colours));
+      wanted.forEach(([rows, into]) => thumbnail(rows, into));
+      anew("model", true);
+    },
+    /** All that is drawn brought into view, and other places. */
+    fit: (others = []) => {
+      camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), sizeOf(canvas));
+      ask();
+    },
+    /** From where and along what an event on the canvas looks, in the frame of the platform, the model in its middle. */
+    sight: (event) => {
+      const [eye, along] = camera.sight(placeOn(canvas, event));
+      return [sub(eye, scene.place), along];
+    },
+    /** The same in the frame of the model as it is read. */
+    ray(event) {
+      const back = undone(scene.matrix), [eye, along] = this.sight(event);
+      return [carried(back, eye), turned(back, along)];
+    },
+  };
+}

@@ -1,0 +1,121 @@
+// Triangles: the model as it is read, what of it overhangs for a rotation, and the face under a finger.
+
+import { add, bounds, carried, cross, dot, length, mix, multiply, RAD, rotated, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
+import { RED, wordOf } from "../../../../view/template/picture/solids.js";
+
+/** {vertices, faces, corners: places of the triangles' corners, normals, areas, reach_mm: of the farthest vertex from the middle} of the server's bytes. */
+export function trianglesFrom(buffer) {
+  const [points, count] = new Uint32Array(buffer, 0, 2);
+  const vertices = new Float32Array(new Float64Array(buffer, 8, 3 * points)), faces = new Uint32Array(buffer, 8 + 24 * points, 3 * count);
+  const corners = new Float32Array(9 * count), normals = new Float32Array(3 * count), areas = new Float32Array(count);
+  for (let i = 0; i < 3 * count; i++) for (let k = 0; k < 3; k++) corners[3 * i + k] = vertices[3 * faces[i] + k];
+  for (let face = 0; face < count; face++) {
+    const [a, b, c] = cornersAt(corners, face), across = cross(sub(b, a), sub(c, a)), size = length(across);
+    areas[face] = size / 2;
+    normals.set(scaled(across, 1 / (size || 1)), 3 * face);
+  }
+  const middle = points ? scaled(add(...bounds(vertices)), 0.5) : [0, 0, 0];
+  let reach = 1;
+  for (let i = 0; i < vertices.length; i += 3) reach = Math.max(reach, Math.hypot(vertices[i] - middle[0], vertices[i + 1] - middle[1], vertices[i + 2] - middle[2]));
+  return { vertices, faces, corners, normals, areas, count, reach_mm: reach };
+}
+
+export const cornersAt = (corners, face) => [0, 3, 6].map((k) => [corners[9 * face + k], corners[9 * face + k + 1], corners[9 * face + k + 2]]);
+
+/** Which faces overhang too far when a direction points up, and their area; what lies on the platform does not. */
+export function overhanging({ vertices, faces, normals, areas, count }, up, limit, platform) {
+  const [x, y, z] = up, heights = new Float32Array(vertices.length / 3), red = new Uint8Array(count);
+  let least = Infinity, area = 0;
+  for (let i = 0; i < heights.length; i++) {
+    heights[i] = vertices[3 * i] * x + vertices[3 * i + 1] * y + vertices[3 * i + 2] * z;
+    if (heights[i] < least) least = heights[i];
+  }
+  least += platform;
+  for (let face = 0, k = 0; face < count; face++, k += 3) {
+    if (normals[k] * x + normals[k + 1] * y + normals[k + 2] * z >= limit) continue;
+    if (heights[faces[k]] <= least && heights[faces[k + 1]] <= least && heights[faces[k + 2]] <= least) continue;
+    red[face] = 1;
+    area += areas[face];
+  }
+  return { red, area };
+}
+
+/** Colours of all corners, the faces that are marked red. */
+export function paintedRed(count, red, colour, into = new Uint8Array(12 * count)) {
+  const words = new Uint32Array(into.buffer), plain = wordOf(colour, 254), marked = wordOf(RED);
+  for (let face = 0, k = 0; face < count; face++, k += 3) words[k] = words[k + 1] = words[k + 2] = red && red[face] ? marked : plain;
+  return into;
+}
+
+const EDGE_SLACK = 1e-9; // of a triangle's side: a ray along an edge, as one through the middle of a square, would slip between two faces by rounding
+
+/** The first face that a ray meets, from a place along a direction in the frame of the triangles; -1: none. */
+export function faceMet({ corners, count }, from, along) {
+  let best = -1, least = Infinity;
+  for (let face = 0; face < count; face++) {
+    const [a, b, c] = cornersAt(corners, face), one = sub(b, a), other = sub(c, a);
+    const across = cross(along, other), turn = dot(one, across);
+    if (Math.abs(turn) < 1e-12) continue;
+    const to = sub(from, a), u = dot(to, across) / turn;
+    if (u < -EDGE_SLACK || u > 1 + EDGE_SLACK) continue;
+    const beyond = cross(to, one), v = dot(along, beyond) / turn;
+    if (v < -EDGE_SLACK || u + v > 1 + EDGE_SLACK) continue;
+    const far = dot(other, beyond) / turn;
+    if (far > 0 && far < least) [best, least] = [face, far];
+  }
+  return best;
+}
+
+/** Where a ray meets a face. */
+export function placeMet({ corners, normals }, face, from, along) {
+  const normal = [0, 1, 2].map((k) => normals[3 * face + k]), [corner] = cornersAt(corners, face);
+  return add(from, scaled(along, dot(normal, sub(corner, from)) / dot(normal, along)));
+}
+
+/** The matrix that turns the model by rows of a rotation, sets it on a pedestal so high, 0 the platform, and centres it. */
+export function standingBy(rows, vertices, lift) {
+  const [a, b, c] = rows, least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < vertices.length; i += 3)
+    for (let k = 0; k < 3; k++) {
+      const x = rows[k][0] * vertices[i] + rows[k][1] * vertices[i + 1] + rows[k][2] * vertices[i + 2];
+      if (x < least[k]) least[k] = x;
+      if (x > most[k]) most[k] = x;
+    }
+  const shift = vertices.length ? [-(least[0] + most[0]) / 2, -(least[1] + most[1]) / 2, lift - least[2]] : [0, 0, 0];
+  const matrix = [a[0], b[0], c[0], 0, a[1], b[1], c[1], 0, a[2], b[2], c[2], 0, ...shift, 1];
+  return { matrix, box: [add(least, shift), add(most, shift)] };
+}
+
+/** Rows of a rotation: turns about x, then y, then z, degrees, after another rotation. */
+export function turnedFurther(rows, [x, y, z]) {
+  const turn = multiply(rotated([0, 0, 1], z * RAD), multiply(rotated([0, 1, 0], y * RAD), rotated([1, 0, 0], x * RAD)));
+  const columns = [0, 1, 2].map((k) => turned(turn, rows.map((row) => row[k])));
+  return [0, 1, 2].map((k) => columns.map((column) => column[k]));
+}
+
+/** A plane of the platform's frame in the frame of the model as it is read. */
+export function planeBefore({ normal, offset_mm: offset }, matrix) {
+  return { normal: turned(undone(matrix), normal), offset_mm: offset - dot(normal, matrix.slice(12, 15)) };
+}
+
+/** Middle and reach of what a plane cuts of the triangles, without what later planes have taken: {centre_mm, radius_mm}, or null.
+ * All in the frame of the platform, in which `matrix` puts the triangles. */
+export function sectionOf({ corners, count }, plane, later, matrix) {
+  const heights = (place, { normal, offset_mm: offset }) => dot(normal, place) - offset, found = [];
+  const own = planeBefore(plane, matrix), [x, y, z] = own.normal, high = [0, 0, 0];
+  for (let face = 0, at = 0; face < count; face++, at += 9) { // most faces lie on one side, so nothing is made for them
+    for (let k = 0, i = at; k < 3; k++, i += 3) high[k] = corners[i] * x + corners[i + 1] * y + corners[i + 2] * z - own.offset_mm;
+    if (high[0] > 0 === high[1] > 0 && high[1] > 0 === high[2] > 0) continue;
+    const around = cornersAt(corners, face);
+    for (let k = 0; k < 3; k++) {
+      const n = (k + 1) % 3;
+      if (high[k] > 0 === high[n] > 0) continue;
+      const place = carried(matrix, around[k].map((x, axis) => mix(x, around[n][axis], high[k] / (high[k] - high[n]))));
+      if (later.every((other) => heights(place, other) <= 0)) found.push(place);
+    }
+  }
+  if (!found.length) return null;
+  const [least, most] = bounds(found.flat()), centre = scaled(add(least, most), 0.5);
+  const middle = sub(centre, scaled(plane.normal, heights(centre, plane)));
+  return { centre_mm: middle, radius_mm: Math.max(...found.map((place) => length(sub(place, middle))), 1) };
+}

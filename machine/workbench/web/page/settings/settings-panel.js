@@ -1,0 +1,221 @@
+// Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
+// changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
+
+import { $, button, disable, hide, listen, made, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
+import { ask, send } from "../line.js";
+import { putNew, putRows } from "../lists.js";
+import { keptInTab, onNew, onState, store } from "../store.js";
+
+const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
+const KINDS = ["machine", "material", "process"];
+const KIND_OF = { machine: "machine", material: "material", process: "process", search: "process" };
+const kept = keptInTab("settings", { level: "simple", folded: [] });
+
+export function settingsPanel() {
+  const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
+  const explained = new Set();
+  let settings = [], missed = false, changedOnly = false; // missed: they have not come
+  const part = () => Number($("settings-part").value) || 0;
+  const set = (key, value, typed) => {
+    const of = part();
+    ask(of ? { do: "set_part", part: of, key, value } : { do: "set", key, value }, (refusal) => {
+      if (of !== part()) return;
+      if (refusal) {
+        wrongs.set(key, { text: refusal, typed });
+        tellBeside();
+        list();
+      } else if (wrongs.delete(key)) fetchAll();
+    });
+  };
+  /** What is refused stands beside its field, whatever is told next. */
+  const tellBeside = () => {
+    const beside = [...wrongs.values()].some(({ text }) => text === store.state.problem);
+    if (beside && store.tab === "settings") $("problem").hidden = true;
+  };
+  const sought = () => $("search-settings").value.toLowerCase().split(/\s+/).filter(Boolean).map(stem);
+  const shown = (setting) => {
+    const marked = setting.changed || wrongs.has(setting.key), words = sought();
+    if (changedOnly) return marked && hasWords(setting, words);
+    return words.length ? hasWords(setting, words) : marked || LEVELS.indexOf(setting.level) <= LEVELS.indexOf(kept.now.level);
+  };
+  const list = () => {
+    const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0;
+    if (changedOnly && !changed.length) return showChanged(false);
+    tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : "No setting has these words.", "only-changed": `${changed.length} changed` });
+    disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
+    tellTakeBack(changed, part());
+    for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
+    const groups = groupedBy(rows, ({ group }) => group);
+    putRows([...groups].flatMap(([group, own]) => {
+      const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
+      const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key)]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
+      return [title, ...(folded ? [] : own.map(row))];
+    }), $("settings-list"));
+  };
+  const fold = (group, folded) => {
+    kept.keep({ folded: [...kept.now.folded.filter((name) => name !== group), ...(folded ? [group] : [])] });
+    list();
+  };
+  const showChanged = (only) => {
+    changedOnly = only;
+    pressed("only-changed", only);
+    list();
+  };
+  const fetchAll = async () => {
+    const asked = part(), answer = await fetch(`settings.json?part=${asked}`).catch(() => null);
+    missed = !answer; // the line is lost: the next state asks again
+    if (!answer?.ok || asked !== part()) return;
+    const told = await answer.json();
+    settings = told.settings;
+    showProfiles(told.profiles);
+    putNew($("command-line"), told.command, () => told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
+    hide({ "command-field": !told.command });
+    list();
+  };
+  const partsToChoose = ({ parts, part_settings: own, model }) => {
+    const names = ["all parts", ...Array.from({ length: model ? Math.max(parts, 1) : 0 }, (_, k) => {
+      const keys = own.find((ofPart) => ofPart.part === k + 1)?.keys.length || 0;
+      return `part ${k + 1}${keys ? ` (${keys} of its own)` : ""}`;
+    })];
+    $("settings-part").replaceChildren(...optionsOf([...names.entries()], part() < names.length ? part() : 0));
+  };
+  listen("input", { "search-settings": list });
+  listen("change", { "settings-part": () => { wrongs.clear(); fetchAll(); } });
+  listen("click", {
+    "only-changed": () => showChanged(!changedOnly), "copy-command": () => copyText($("command-line"), $("copy-command")),
+    "reset-settings": () => send(part() ? { do: "reset_part", part: part() } : { do: "reset" }),
+  });
+  for (const level of LEVELS) listen("click", { [`level-${level}`]: () => { kept.keep({ level }); list(); } });
+  for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
+  onNew(({ given, part_settings: own, parts, model, rotation, stops, copies }) => [given, own, parts, model?.name, rotation, stops, copies], () => {
+    partsToChoose(store.state);
+    missed = true;
+  });
+  onState(() => {
+    tellBeside();
+    if (missed) fetchAll();
+  });
+}
+
+function showProfiles(profiles) {
+  const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
+    const onchange = ({ target }) => ask({ do: "profile", kind, name: target.value }, (refusal) => { if (refusal) target.value = name; });
+    const select = made("select", { onchange }, ...optionsOf(names.map((text) => [text, text]), name));
+    return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
+  });
+  putRows(rows, $("profiles-list"));
+}
+
+/** A word finds its plural, too, and the other way round. */
+const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); // a key stays whole
+
+/** The words by which a setting is found, those that say most first. */
+const textsOf = ({ key, label, title, synonyms, meaning, about }) => [`${label} ${key}`, synonyms, `${title} ${meaning} ${about}`].map((text) => text.toLowerCase());
+const hasWords = (setting, words) => words.every((word) => textsOf(setting).join(" ").includes(word));
+
+/** How late the words that are sought come: 0, where the label is these alone, 1, where it or the key has one. */
+function farFrom(setting, words) {
+  if (!words.length || setting.label.toLowerCase().split(/\s+/).map(stem).join(" ") === words.join(" ")) return 0;
+  return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));
+}
+
+function groupedBy(rows, nameOf) {
+  const groups = new Map();
+  for (const row of rows) groups.set(nameOf(row), [...(groups.get(nameOf(row)) || []), row]);
+  return groups;
+}
+
+/** Whose changes there are, with a button for each profile that has some, and one for all. */
+function tellTakeBack(changed, part) {
+  const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
+  for (const kind of KINDS) {
+    const count = counts.get(kind)?.length || 0;
+    tell({ [`reset-${kind}`]: `Those of the ${kind} (${count})` });
+    hide({ [`reset-${kind}`]: part > 0 || !count || counts.size < 2 });
+  }
+  const all = part ? `Take back what part ${part} has of its own` : counts.size === 1 ? `Take the changes of the ${[...counts.keys()][0]} back` : "Take all changes back";
+  tell({ "reset-settings": `${all} (${changed.length})` });
+}
+
+function groupTitle(own, folded, turn) {
+  const [{ group, title, about }] = own, told = JSON.stringify([title, own.length, folded]);
+  const more = { title: `${about}.`, ariaExpanded: String(!folded) }, words = () => [made("span", { text: title }), made("small", { text: own.length })];
+  return { id: `group ${group}`, told, make: () => made("h2", {}, button("", turn, more, ...words())) };
+}
+
+/** A text into the clipboard, or marked for the person to take where the browser allows no more. */
+async function copyText(element, button) {
+  const range = document.createRange();
+  range.selectNodeContents(element);
+  getSelection().removeAllRanges();
+  getSelection().addRange(range);
+  const copied = await navigator.clipboard?.writeText(element.textContent).then(() => true, () => false);
+  button.textContent = copied ? "Copied" : "Marked: copy it by Ctrl+C";
+  setTimeout(() => { button.textContent = "Copy"; }, 3000);
+}
+
+/** A key that is broken between its words where it is too long for a line. */
+const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
+
+/** wrong: {text, typed}, what was refused last; set(key, value, typed) asks for a value, null: as it was; again(): called when a person
+ * leaves what was typed in, for what has been told meanwhile; explained: the keys whose meaning is shown. */
+function settingRow(setting, { wrong, set, again, explained }) {
+  const { key, label, unit, kind, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
+  const meaning = made("small", { text: meaningOf(setting), id: `meaning-${key}`, hidden: !explained.has(key) });
+  const refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
+  input.setAttribute("aria-describedby", meaning.id);
+  input.setAttribute("aria-invalid", Boolean(wrong));
+  const was = wasOf(setting), back = button("↺", () => set(key, null), { title: was, ariaLabel: `${label}: ${was}`, hidden: !changed && !wrong });
+  const turn = () => {
+    meaning.hidden = !meaning.hidden;
+    explain.ariaExpanded = String(!meaning.hidden);
+    explained[meaning.hidden ? "delete" : "add"](key);
+  };
+  const explain = button("?", turn, { title: meaning.textContent, ariaLabel: `${label}: what it means`, ariaExpanded: String(explained.has(key)) });
+  const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
+  const words = made("span", {}, label, made("small", { className: "key" }, ...breakable(key)));
+  const typed = made("div", { className: "typed" }, made("label", {}, words, input, made("span", { className: "unit", text: unit })), explain, back);
+  const row = made("div", { className: changed ? "setting changed" : "setting" }, typed, refused, made("small", { className: "was", text: was, hidden: !changed }), meaning, named);
+  const left = () => {
+    const begun = Boolean(row.dataset.typing);
+    delete row.dataset.typing;
+    return begun;
+  };
+  row.dataset.key = key;
+  input.addEventListener("input", () => { row.dataset.typing = kind; });
+  input.addEventListener("change", () => { set(key, typedIn(input, kind, optional), kind === "boolean" ? input.checked : input.value); left(); });
+  input.addEventListener("blur", () => { if (left()) again(); });
+  return row;
+}
+
+/** What a key means and what it may be, as a sentence. */
+function meaningOf({ meaning, least, most }) {
+  const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
+  return `${meaning.charAt(0).toUpperCase()}${meaning.slice(1)}${range}.`;
+}
+
+/** What a key has without the change, where that is short enough to be read. */
+function wasOf({ unchanged, unit, kind }) {
+  if (kind === "block" || kind === "rows") return "Take the profile's own back";
+  const value = unchanged === null || unchanged === "" ? "nothing" : unchanged === true ? "on" : unchanged === false ? "off" : `${unchanged} ${unit}`.trim();
+  return `The profile has ${value}`;
+}
+
+function inputOf({ kind, choices, least, most }, value) {
+  const typed = value ?? "";
+  if (kind === "choice") return made("select", {}, ...optionsOf(choices.map((text) => [String(text), text]), String(value)));
+  if (kind === "boolean") return made("input", { type: "checkbox", checked: value });
+  if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: typed });
+  if (kind === "block" || kind === "rows") return made("textarea", { value: typed, rows: Math.min(Math.max(String(typed).split("\n").length, 2), 14), spellcheck: false, wrap: kind === "block" ? "off" : "soft" });
+  const limits = { ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) };
+  return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: typed, ...limits });
+}
+
+/** What a person has typed or chosen, as --set takes it; null, for nothing where there must be something: as the profile has it. */
+function typedIn(input, kind, optional) {
+  if (kind === "boolean") return `${input.checked}`;
+  const text = kind === "block" ? input.value : input.value.trim();
+  if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // which TOML reads, too
+  if (!text) return optional ? "" : null;
+  return kind === "numbers" ? `[${text}]` : text;
+}

@@ -1,0 +1,145 @@
+// Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, and what one piece would cost.
+
+import { $, disable, findingButton, hide, listen, made, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
+import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
+import { send } from "../line.js";
+import { listIn, putTable, removeButton, tellIn } from "../lists.js";
+import { onNew, onState, store, subscribe, update } from "../store.js";
+
+export function slicesPanel(showFinding) {
+  listen("click", {
+    again: () => { update({ looking: false }); $("tab-slices").click(); send({ do: "slice" }); },
+    look: () => update({ looking: !store.looking }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
+  });
+  onState(({ slicing, sliced, colours }) => {
+    disable({ slice: Boolean(slicing) });
+    hide({ "stop-slicing": !slicing, "slicing-bar": !slicing });
+    tell({ "slicing-told": slicing ? slicing.text : "" });
+    showShares(slicing, colours);
+    toggle("no-slices", !sliced);
+    toggle("stale", sliced?.stale);
+  });
+  onNew(({ sliced }) => sliced, (sliced) => {
+    const { told = [], joints = [], verdict } = sliced || {};
+    if (!sliced) update({ looking: false });
+    else showVerdict(verdict, showFinding);
+    tellIn("sliced-told", told);
+    putTable($("joints"), joints, JOINT_HEAD, () => joints.map(figuresRow));
+    showFindings(sliced, showFinding);
+  });
+}
+
+/** Whether it can be printed, in one sentence, with a button for what a button can do. */
+function showVerdict({ kind, text, finding, remedy }, showFinding) {
+  $("verdict").className = `sliced ${kind}`;
+  tell({ "verdict-told": `${text}.` });
+  hide({ "verdict-show": finding < 0, "verdict-print": kind !== "ready", "bar-print": kind !== "ready" });
+  sayIn("verdict-remedy", remedy?.text || "");
+  $("verdict-remedy").onclick = () => send(remedy.command);
+  $("verdict-show").onclick = () => showFinding(finding);
+}
+
+/** Of every part how much is sliced; the whole as one bar where there is one part. */
+function showShares(slicing, colours) {
+  const shares = slicing ? slicing.shares : [], ready = shares.filter((share) => share === 1).length;
+  if (shares.length) $("slicing-bar").value = shares.reduce((sum, share) => sum + share, 0) / shares.length;
+  else $("slicing-bar").removeAttribute("value");
+  $("slicing-ready").textContent = shares.length > 1 ? `${ready} of ${shares.length} parts sliced` : "";
+  $("slicing-parts").replaceChildren(...(shares.length > 1 ? shares : []).map((share, k) => {
+    const bar = made("progress", { max: 1, value: share });
+    bar.setAttribute("aria-label", `part ${k + 1}`);
+    return made("li", { className: share === 1 ? "ready" : "" }, swatch(colours[k]), `part ${k + 1}`, bar);
+  }));
+}
+
+const JOINT_HEAD = ["joint of part", "area", "contact", "plastic", "seam", "breaks at"];
+
+/** A row of figures after their title. */
+const figuresRow = ([title, ...texts]) => made("tr", {}, made("th", { text: title, scope: "row" }), ...texts.map((text) => made("td", { text })));
+
+function showFindings(sliced, showFinding) {
+  const { findings = [], more_findings: more = 0 } = sliced || {};
+  hide({ "no-findings": !sliced || findings.length > 0 });
+  const rows = findings.map((finding, k) => findingButton(finding, () => showFinding(k), { whole: "the whole print", ending: ": show it" }));
+  $("sliced-findings").replaceChildren(...[...rows, ...(more ? [`and ${more} more, in the page of the print`] : [])].map((row) => made("li", {}, row)));
+}
+
+export function stopsPanel() {
+  let adding = false; // what was typed stays until it is taken
+  listen("change", { copies: () => send({ do: "copies", count: Number($("copies").value) }) });
+  listen("submit", { "add-stop": (event) => {
+    event.preventDefault();
+    adding = true;
+    send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
+  } });
+  onState(({ copies, copies_told: told, problem }, before) => {
+    tell({ "copies-told": told });
+    if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
+  });
+  onNew(({ stops }) => stops, (stops) => {
+    if (adding) $("stop-at").value = "";
+    adding = false;
+    const held = $("stops").contains(document.activeElement);
+    putTable($("stops"), stops, [], () => stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 }))));
+    if (held) $("stop-at").focus(); // the row that had the focus is gone
+  });
+}
+
+function stopRow({ part, layer, height_mm: height, change }, remove) {
+  const kind = change ? "filament change" : "pause", where = layer === null ? `part ${part}, at ${height} mm` : `part ${part}, before layer ${layer}`;
+  return rowOf([kind, where, removeButton(`Remove the ${kind} of ${where}`, remove)]);
+}
+
+export function comparePanel() {
+  onState(({ comparing, compared, sliced }) => {
+    disable({ compare: Boolean(comparing || compared.length || !sliced || sliced.stale) });
+    hide({ "stop-comparing": !comparing });
+    tell({ "comparing-told": comparing });
+    const [, standing, lying] = compared, shown = compared.filter((alternative) => alternative !== lying || lying.note !== standing.note);
+    putTable($("compared"), shown, ["", ...shown.map(({ name }) => name)], () => (
+      standing ? standing.figures.map(([title], k) => figuresRow([title, ...shown.map(({ figures }) => figures[k][1])])) : []));
+    listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
+  });
+}
+
+const PIECE = 7; // numbers of a straight piece: two ends and its height
+const BROAD = 1.1; // half the width of a bead, by its height
+
+/** Triangles {places, colours} of a part's walls: an upright band along every piece and a level one on it, as broad as a bead, so
+ * that a slope has no gaps. bytes: as the server gives them. */
+function bandsOf(bytes, colour) {
+  const values = new Float32Array(bytes), way = [...values.subarray(0, 3)], count = (values.length - 3) / PIECE;
+  const places = new Float32Array(36 * count), colours = new Uint32Array(12 * count).fill(wordOf(rgb(colour), 254));
+  for (let k = 0, at = 0; k < count; k++) {
+    const from = 3 + PIECE * k, begin = [...values.subarray(from, from + 3)], end = [...values.subarray(from + 3, from + 6)];
+    const up = scaled(way, values[from + 6] / 2), side = scaled(unit(cross(way, sub(end, begin))), BROAD * values[from + 6]);
+    for (const [middle, half] of [[[0, 0, 0], up], [up, side]])
+      for (const [place, sign] of [[begin, -1], [end, -1], [end, 1], [begin, -1], [end, 1], [begin, 1]])
+        for (let axis = 0; axis < 3; axis++) places[at++] = place[axis] + middle[axis] + sign * half[axis];
+  }
+  return { places, colours: new Uint8Array(colours.buffer) };
+}
+
+/** The parts of the slices that are made, or lie there and are not out of date, while the slices are looked at. */
+export function wallsOf(picture) {
+  let number = 0, asked = new Set(); // of the slices whose walls are there, or asked for
+  const fetchPart = async (part, of) => {
+    asked.add(part);
+    const answer = await fetch(`walls/${of}/${part}`).catch(() => null);
+    if (number !== of) return;
+    if (!answer) asked.delete(part); // the line is lost: the next state asks again
+    if (answer?.ok) update({ walls: new Map(store.walls).set(part, bandsOf(await answer.arrayBuffer(), store.state.colours[part - 1] || PLAIN)) });
+  };
+  subscribe(({ state: { slicing, sliced }, tab, triangles }) => {
+    const slices = tab !== "slices" ? null : slicing || (sliced && !sliced.stale ? sliced : null);
+    if (slices && slices.number !== number) {
+      [number, asked] = [slices.number, new Set()];
+      return update({ walls: new Map() });
+    }
+    slices?.ready.filter((part) => !asked.has(part)).forEach((part) => fetchPart(part, number));
+    const shown = slices && triangles && store.walls.size > 0;
+    picture.walls(shown ? store.walls : null);
+    document.documentElement.dataset.walls = shown ? [...store.walls.keys()].sort((a, b) => a - b).join(" ") : "";
+  });
+}
