@@ -18,7 +18,7 @@ from typing import Any
 from starlette.responses import HTMLResponse
 
 from machine.view.page import hash_source
-from machine.workbench.work.observable import Observable
+from machine.workbench.session.base import Observable
 from profiles.errors import PlanError
 
 LETTERS = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"  # without I, L, O, 0 and 1, which look alike
@@ -170,14 +170,14 @@ class Door(Observable):
         same = [device for device in self.devices if secrets.compare_digest(device.digest, digest)]
         return same[0] if same else None
 
-    def unpair(self, number: object) -> None:
+    def unpair(self, *, device: int) -> None:
         """Let a device go: its lines end now. Raises PlanError where it is not there."""
-        device = next((device for device in self.devices if device.number == number), None)
-        if device is None:
+        paired = next((paired for paired in self.devices if paired.number == device), None)
+        if paired is None:
             raise PlanError("this device is not paired any more")
-        self.devices.remove(device)
-        device.gone.set()
-        self._say(f"{device.name} is not paired any more")
+        self.devices.remove(paired)
+        paired.gone.set()
+        self._say(f"{paired.name} is not paired any more")
         self.notify()
 
     def reopen(self) -> None:

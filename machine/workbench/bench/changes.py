@@ -1,12 +1,13 @@
-"""Changes: the commands that change the bench at once, each with the new bench that it makes. Nothing here writes or waits.
+"""Changes: the commands that change the bench at once. Nothing here writes or waits.
 
-All are given the bench, on which a model lies, and give the same bench where they change nothing; they raise PlanError for what
-cannot be done.
+Each takes a bench on which a model lies, and what the page sends by name; it returns the new bench, or the same one where it
+changes nothing. They raise PlanError for what cannot be done.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import radians
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -16,7 +17,7 @@ from machine.planning.stops import parse_stops
 from machine.workbench.bench.bench import Bench, laid_down, with_parts, with_rotation
 from machine.workbench.bench.part_settings import with_part_setting, without_part_settings
 from machine.workbench.bench.planes import planned_part
-from machine.workbench.bench.values import Command, Direction, Rotation, check_number
+from machine.workbench.bench.values import Direction, Rotation, check_number
 from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.errors import PlanError
@@ -24,147 +25,86 @@ from profiles.profile import Profile
 
 TURN_DIGITS = 15  # so that quarter turns are exact
 MOST_STOPS = 1000
+TurnDeg = Annotated[float, Field(ge=-360, le=360)]
 
 
-class Change(Command):
-    """A command that makes another bench at once."""
-
-    def change(self, bench: Bench) -> Bench:
-        """The bench after it."""
-        raise NotImplementedError
-
-
-class Turn(Change):
+def turn(bench: Bench, *, axis: Literal["x", "y", "z"], deg: TurnDeg) -> Bench:
     """Turn the model about an axis of the machine."""
-
-    do: Literal["turn"] = "turn"
-    word: ClassVar = "turn the model"
-    axis: Literal["x", "y", "z"]
-    deg: Annotated[float, Field(ge=-360, le=360)]
-
-    def change(self, bench: Bench) -> Bench:
-        axis = np.eye(3)["xyz".index(self.axis)]
-        return with_rotation(bench, _rounded(about(axis, radians(self.deg)) @ np.array(bench.rotation)))
+    return with_rotation(bench, _rounded(about(np.eye(3)["xyz".index(axis)], radians(deg)) @ np.array(bench.rotation)))
 
 
-class Stand(Change):
+def stand(bench: Bench, *, rotation: Rotation) -> Bench:
     """Turn the model as the rows of a rotation say."""
-
-    do: Literal["stand"] = "stand"
-    word: ClassVar = "lay the model down"
-    rotation: Rotation
-
-    def change(self, bench: Bench) -> Bench:
-        return with_rotation(bench, self.rotation)
+    return with_rotation(bench, rotation)
 
 
-class Lay(Change):
+def lay(bench: Bench, *, normal: Direction) -> Bench:
     """Lay the model down on a side of this outward normal, in its own frame."""
-
-    do: Literal["lay"] = "lay"
-    word: ClassVar = "lay a face down"
-    normal: Direction
-
-    def change(self, bench: Bench) -> Bench:
-        return with_rotation(bench, _rounded(laid_down(bench, np.array(self.normal))))
+    return with_rotation(bench, _rounded(laid_down(bench, np.array(normal))))
 
 
-class Take(Change):
+def take(bench: Bench, *, parts: int) -> Bench:
     """Take the row of the front that has this number of parts."""
-
-    do: Literal["take"] = "take"
-    word: ClassVar = "take another number of parts"
-    parts: int
-
-    def change(self, bench: Bench) -> Bench:
-        numbers = [row.parts for row in bench.rows]
-        if self.parts not in numbers:
-            allowed = ", ".join(map(str, numbers)) or "nothing, for no parts have been found,"
-            raise PlanError(f"parts is {self.parts}: {allowed} is allowed")
-        taken = with_parts(bench, self.parts)
-        return bench if taken.cuts == bench.cuts else taken
+    numbers = [row.parts for row in bench.rows]
+    if parts not in numbers:
+        allowed = ", ".join(map(str, numbers)) or "nothing, for no parts have been found,"
+        raise PlanError(f"parts is {parts}: {allowed} is allowed")
+    taken = with_parts(bench, parts)
+    return bench if taken.cuts == bench.cuts else taken
 
 
-class Lock(Change):
+def lock(bench: Bench, *, part: int, locked: bool = False) -> Bench:
     """Lock the plane of a part, or unlock it."""
-
-    do: Literal["lock"] = "lock"
-    word: ClassVar = "lock a plane"
-    part: int
-    locked: bool = False
-
-    def change(self, bench: Bench) -> Bench:
-        part = planned_part(bench, self.part)
-        locked = bench.locked | {part} if self.locked else bench.locked - {part}
-        return bench if locked == bench.locked else replace(bench, locked=locked)
+    plane = frozenset({planned_part(bench, part)})
+    after = bench.locked | plane if locked else bench.locked - plane
+    return bench if after == bench.locked else replace(bench, locked=after)
 
 
-class SetPart(Change):
+def set_part(bench: Bench, *, part: int, key: str, value: str | None = None) -> Bench:
     """Give a part alone another value of a key of the process; null: as all parts have it."""
-
-    do: Literal["set_part"] = "set_part"
-    word: ClassVar = "set a part"
-    part: int
-    key: str
-    value: str | None = None
-
-    def change(self, bench: Bench) -> Bench:
-        return _with_settings(bench, with_part_setting(bench.profile, _part(bench, self.part), self.key, self.value))
+    return _with_settings(bench, with_part_setting(bench.profile, _part(bench, part), key, value))
 
 
-class ResetPart(Change):
+def reset_part(bench: Bench, *, part: int) -> Bench:
     """Clear what a part has of its own."""
-
-    do: Literal["reset_part"] = "reset_part"
-    word: ClassVar = "take a part's changes back"
-    part: int
-
-    def change(self, bench: Bench) -> Bench:
-        return _with_settings(bench, without_part_settings(bench.profile, _part(bench, self.part)))
+    return _with_settings(bench, without_part_settings(bench.profile, _part(bench, part)))
 
 
-class AddStop(Change):
+def add_stop(bench: Bench, *, kind: Literal["pause", "filament_change"], at: str) -> Bench:
     """A pause before a layer or height, written as the options of `export` take it; pauses come first, as they do there."""
-
-    do: Literal["add_stop"] = "add_stop"
-    word: ClassVar = "add a pause"
-    kind: Literal["pause", "filament_change"]
-    at: str
-
-    def change(self, bench: Bench) -> Bench:
-        (stop,) = parse_stops([self.at], []) if self.kind == "pause" else parse_stops([], [self.at])
-        if stop in bench.stops:
-            return bench
-        if len(bench.stops) >= MOST_STOPS:
-            raise PlanError(f"there are {len(bench.stops)} pauses: {MOST_STOPS} are allowed")
-        return replace(bench, stops=tuple(sorted((*bench.stops, stop), key=lambda stop: stop.change)))
+    (stop,) = parse_stops([at], []) if kind == "pause" else parse_stops([], [at])
+    if stop in bench.stops:
+        return bench
+    if len(bench.stops) >= MOST_STOPS:
+        raise PlanError(f"there are {len(bench.stops)} pauses: {MOST_STOPS} are allowed")
+    return replace(bench, stops=tuple(sorted((*bench.stops, stop), key=lambda stop: stop.change)))
 
 
-class RemoveStop(Change):
+def remove_stop(bench: Bench, *, number: int) -> Bench:
     """Take a pause away, numbered from 1."""
-
-    do: Literal["remove_stop"] = "remove_stop"
-    word: ClassVar = "take a pause away"
-    number: int
-
-    def change(self, bench: Bench) -> Bench:
-        number = check_number("number", self.number, 1, len(bench.stops))
-        return replace(bench, stops=(*bench.stops[: number - 1], *bench.stops[number:]))
+    check_number("number", number, 1, len(bench.stops))
+    return replace(bench, stops=(*bench.stops[: number - 1], *bench.stops[number:]))
 
 
-class Copies(Change):
+def copies(bench: Bench, *, count: int) -> Bench:
     """Another number of copies on the plate."""
-
-    do: Literal["copies"] = "copies"
-    word: ClassVar = "print another number of copies"
-    count: int
-
-    def change(self, bench: Bench) -> Bench:
-        count = check_number("--copies", self.count, 1, MOST_COPIES)  # as the option is refused
-        return bench if count == bench.copies else replace(bench, copies=count)
+    check_number("--copies", count, 1, MOST_COPIES)  # as the option is refused
+    return bench if count == bench.copies else replace(bench, copies=count)
 
 
-CHANGES = (Turn, Stand, Lay, Take, Lock, SetPart, ResetPart, AddStop, RemoveStop, Copies)
+# The name of a command -> the function that does it, and the word for its step in the history.
+CHANGES: dict[str, tuple[Callable[..., Bench], str]] = {
+    "turn": (turn, "turn the model"),
+    "stand": (stand, "lay the model down"),
+    "lay": (lay, "lay a face down"),
+    "take": (take, "take another number of parts"),
+    "lock": (lock, "lock a plane"),
+    "set_part": (set_part, "set a part"),
+    "reset_part": (reset_part, "take a part's changes back"),
+    "add_stop": (add_stop, "add a pause"),
+    "remove_stop": (remove_stop, "take a pause away"),
+    "copies": (copies, "print another number of copies"),
+}
 
 
 def _part(bench: Bench, part: int) -> int:

@@ -1,13 +1,14 @@
 """Marks: boxes and faces on which a person wants no cut, no seam, no support or support: the zones of the plan."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from machine.workbench.bench.bench import Bench
-from machine.workbench.bench.values import Command, Point, Rotation, check_number
+from machine.workbench.bench.values import Point, Rotation, check_number
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
@@ -16,90 +17,63 @@ from mdp.search.plan_reading import MOST_ZONES
 from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones
 from profiles.errors import PlanError
 
-WORDS = {
+WORDS = {  # for the step in the history of a mark of each kind
     "keep": "mark: no cut here",
     "no_seam": "mark: no seam here",
     "no_support": "mark: no support here",
     "support": "mark: support here",
 }
 Kind = Literal["keep", "no_seam", "no_support", "support"]
+GrownDeg = Annotated[float, Field(ge=0, le=MOST_GROWN_DEG)]
 
 
-class Marking(Command):
-    """A command that gives other zones; it is run in a process, for it may read the model's mesh."""
-
-    kind: Kind
-
-    @property
-    def step(self) -> str:
-        """The word for its step in the history."""
-        raise NotImplementedError
-
-    def zones(self, bench: Bench) -> Zones:
-        """The zones after it. Raises PlanError."""
-        raise NotImplementedError
-
-
-class Mark(Marking):
-    """A further zone: a box, along `axes` where it leans, or the faces around a point as far as an angle; in place of the zone
-    `number`, if one is given."""
-
-    do: Literal["mark"] = "mark"
-    number: int | None = None
-    min_mm: Point | None = None
-    max_mm: Point | None = None
-    axes: Rotation | None = None
-    point_mm: Point | None = None
-    angle_deg: Annotated[float, Field(ge=0, le=MOST_GROWN_DEG)] | None = None
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        needed = ("min_mm", "max_mm") if self.point_mm is None else ("angle_deg",)
-        for key in needed:
-            if getattr(self, key) is None:
-                raise ValueError(f"{key} is missing")
-        if self.min_mm and self.max_mm and not all(low < high for low, high in zip(self.min_mm, self.max_mm, strict=True)):
-            raise ValueError(f"min_mm is {list(self.min_mm)} and max_mm {list(self.max_mm)}: each number of min_mm must be less")
-        return self
-
-    @property
-    def step(self) -> str:
-        return WORDS[self.kind]
-
-    def zones(self, bench: Bench) -> Zones:
-        zones: tuple[AnyZone, ...] = getattr(bench.zones, self.kind)
-        index = len(zones) if self.number is None else check_number("number", self.number, 1, len(zones)) - 1
-        if index >= MOST_ZONES:
-            raise PlanError(f"there are {index} zones of {self.kind}: {MOST_ZONES} are allowed")
-        return _with(bench.zones, self.kind, (*zones[:index], self._zone(bench), *zones[index + 1 :]))
-
-    def _zone(self, bench: Bench) -> AnyZone:
-        if self.min_mm is not None and self.max_mm is not None and self.point_mm is None:
-            return Zone(self.min_mm, self.max_mm, self.axes)
-        assert self.point_mm is not None
-        assert self.angle_deg is not None
-        zone = Grown(self.point_mm, self.angle_deg)
-        if (away_mm := zone.away_mm(workpiece_mesh(bench))) > FARTHEST_MM:
-            raise PlanError(
-                f"point_mm is {list(self.point_mm)}, {away_mm:.3g} mm from the model: up to {FARTHEST_MM:g} is allowed"
-            )
-        return zone
+def mark(
+    bench: Bench,
+    *,
+    kind: Kind,
+    number: int | None = None,
+    min_mm: Point | None = None,
+    max_mm: Point | None = None,
+    axes: Rotation | None = None,
+    point_mm: Point | None = None,
+    angle_deg: GrownDeg | None = None,
+) -> Zones:
+    """With a further zone: a box, along `axes` where it leans, or the faces around a point as far as an angle; in place of the
+    zone `number`, if one is given. Reads the model's mesh. Raises PlanError."""
+    zone = _box(min_mm, max_mm, axes) if point_mm is None else _grown(bench, point_mm, angle_deg)
+    zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
+    index = len(zones) if number is None else check_number("number", number, 1, len(zones)) - 1
+    if index >= MOST_ZONES:
+        raise PlanError(f"there are {index} zones of {kind}: {MOST_ZONES} are allowed")
+    return _with(bench.zones, kind, (*zones[:index], zone, *zones[index + 1 :]))
 
 
-class Unmark(Marking):
-    """Without the zone `number` of a kind."""
+def _box(min_mm: Point | None, max_mm: Point | None, axes: Rotation | None) -> Zone:
+    if min_mm is None or max_mm is None:
+        raise PlanError(f"{'min_mm' if min_mm is None else 'max_mm'} is missing")
+    if not all(low < high for low, high in zip(min_mm, max_mm, strict=True)):
+        raise PlanError(f"min_mm is {list(min_mm)} and max_mm {list(max_mm)}: each number of min_mm must be less")
+    return Zone(min_mm, max_mm, axes)
 
-    do: Literal["unmark"] = "unmark"
-    number: int
 
-    @property
-    def step(self) -> str:
-        return "take a mark away"
+def _grown(bench: Bench, point_mm: Point, angle_deg: float | None) -> Grown:
+    if angle_deg is None:
+        raise PlanError("angle_deg is missing")
+    zone = Grown(point_mm, angle_deg)
+    if (away_mm := zone.away_mm(workpiece_mesh(bench))) > FARTHEST_MM:
+        raise PlanError(f"point_mm is {list(point_mm)}, {away_mm:.3g} mm from the model: up to {FARTHEST_MM:g} is allowed")
+    return zone
 
-    def zones(self, bench: Bench) -> Zones:
-        zones: tuple[AnyZone, ...] = getattr(bench.zones, self.kind)
-        index = check_number("number", self.number, 1, len(zones)) - 1
-        return _with(bench.zones, self.kind, (*zones[:index], *zones[index + 1 :]))
+
+def unmark(bench: Bench, *, kind: Kind, number: int) -> Zones:
+    """Without the zone `number` of a kind. Raises PlanError."""
+    zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
+    index = check_number("number", number, 1, len(zones)) - 1
+    return _with(bench.zones, kind, (*zones[:index], *zones[index + 1 :]))
+
+
+# The commands that give other zones by their names; each runs in a process, for it may read the model's mesh.
+MARKINGS: dict[str, Callable[..., Zones]] = {"mark": mark, "unmark": unmark}
 
 
 def _with(zones: Zones, kind: str, several: tuple[AnyZone, ...]) -> Zones:

@@ -24,7 +24,7 @@ from machine.printing.job import PrintJob
 from machine.printing.journal_folder import ResumableJournal, resumable_journals
 from machine.printing.ports import answer_words, ask_ports, known_ports, port_json
 from machine.workbench.printing.running_print import RunningPrint
-from machine.workbench.work.observable import Observable
+from machine.workbench.session.base import Observable
 from profiles.errors import OutputError, PrinterError
 from profiles.folders import state_folder
 

@@ -13,7 +13,6 @@ from typing import Any, Generic, TypeVar
 from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench, History, Step
 from machine.workbench.work.folders import Received
-from machine.workbench.work.observable import Observable
 from machine.workbench.work.worker_pool import CLOSED, TaskQueue, WorkerPools
 from profiles.errors import UserError
 
@@ -29,6 +28,33 @@ asking: ContextVar[str] = ContextVar("asking", default="")  # the page that is o
 def hear_from(page: object) -> None:
     """All that the running task does from now on, and begins, is for the page of this name, if it is one."""
     asking.set(page if isinstance(page, str) and len(page) <= LONGEST_ASK else "")
+
+
+class Observable:
+    """All from the event loop. listeners: called with every change, before whoever waits for it; closed: no more come."""
+
+    def __init__(self) -> None:
+        self.version, self.closed = 0, False
+        self.listeners: list[Callable[[], None]] = []
+        self._changed = asyncio.Event()
+
+    def notify(self) -> None:
+        """Let the pages know that something has changed."""
+        self.version += 1
+        self._changed.set()
+        self._changed = asyncio.Event()
+        for listen in self.listeners:
+            listen()
+
+    async def changed(self, seen: int) -> None:
+        """Return when there is something newer than the version that was seen."""
+        while self.version == seen:
+            await self._changed.wait()
+
+
+async def in_loop(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, Value]) -> Value:
+    """The result of a coroutine that runs in another event loop; to cancel the waiting cancels it there."""
+    return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, loop))
 
 
 class SessionBase(Observable):

@@ -1,18 +1,19 @@
 """Planes in a person's hand, tried as they move and taken when they can be cut; zones, and the planes that they drive away."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import hypot, inf
 
 from machine.workbench.bench.bench import Bench, with_cuts, with_zones
-from machine.workbench.bench.marks import Marking
-from machine.workbench.bench.planes import Cuts, Edit, Snap, check_unlocked
-from machine.workbench.bench.values import Asked
+from machine.workbench.bench.planes import Cuts, Edit, check_unlocked, snap
+from machine.workbench.bench.values import Asked, vector_of
 from machine.workbench.session.base import Derived, SessionBase, asking
 from machine.workbench.session.placement import Readiness
 from mdp.plane import Plane
 from mdp.search.neck import REACH_DEG, REACH_SHARE
+from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Obstacle, Trial
+from mdp.zone import Zones
 from profiles.errors import PlanError
 
 REST_S = 0.1  # how long a hand must rest before what it holds is tried more closely
@@ -49,19 +50,21 @@ class PlaneTrials:
         self._held = None
         self._figures.follow()
 
-    async def take(self, edit: Edit) -> None:
-        """Take planes that can be cut. Raises PlanError for those that cannot."""
-        bench, self.refused = self._session.bench, None
-        cuts = edit.cuts(bench)
+    async def take(self, edit: Edit, nearer: Asked | None = None) -> None:
+        """Take planes that can be cut. nearer: the command that puts the plane at the nearest place. Raises PlanError for those
+        that cannot be cut."""
+        bench, cuts, self.refused = self._session.bench, edit.cuts, None
         trial = await self.attempt(bench, cuts)
-        if trial.refused and edit.near and edit.nearer is not None:
+        if trial.refused and edit.near:
             with self._session.waiting("looking for the nearest place that can be cut"):
-                nearest: Cuts | None = await self._readiness.ask("nearest", bench, edit.orders(bench))
+                nearest: Cuts | None = await self._readiness.ask("nearest", bench, edit.orders)
             if nearest is not None:
                 cuts, trial = nearest, await self.attempt(bench, nearest)
         if trial.refused:
             self.settle()
-            raise self._refusal(trial, edit)
+            self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
+            nowhere = "; shifted along its normal it cannot be cut either" if edit.near else ""
+            raise PlanError(f"{edit.reason}part {trial.refused_part} cannot be cut off: {trial.refused}{nowhere}")
         self.trial = bench, cuts, trial
         self._session.do(edit.word, with_cuts(bench, cuts))
 
@@ -76,15 +79,9 @@ class PlaneTrials:
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
             raise PlanError(f"there is no neck near the plane of part {part}: {where}")
-        await self.take(Snap.of({"part": part, "normal": neck.normal.tolist(), "offset_mm": neck.offset_mm}))
-
-    def _refusal(self, trial: Trial, edit: Edit) -> PlanError:
-        """Why planes cannot be cut; what is known of that is kept."""
-        why, nearer = f"{edit.instead}part {trial.refused_part} cannot be cut off: {trial.refused}", edit.nearer
-        if edit.near and nearer is not None:
-            why += "; shifted along its normal it cannot be cut either"
-        self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
-        return PlanError(why)
+        normal, offset_mm = vector_of(neck.normal), float(neck.offset_mm)
+        nearer = {"do": "move", "part": part, "normal": list(normal), "offset_mm": offset_mm, "near": True}
+        await self.take(snap(bench, part, PlannedPart(normal, offset_mm)), nearer)
 
     async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
         """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
@@ -117,9 +114,9 @@ class PlaneTrials:
                 return
             self.trial = tried = bench, cuts, trial
 
-    async def mark(self, marking: Marking) -> None:
-        """Take other zones; planes that they forbid go, and the reason is told. Raises PlanError for what makes no sense, and
-        where a plane that would go is locked."""
+    async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
+        """Take other zones; planes that they forbid go, and the reason is told. word: for the step in the history. Raises
+        PlanError for what makes no sense, and where a plane that would go is locked."""
         before, removed = self._session.bench, list[str]()
         bench = with_zones(before, await self._session.quick.run("mark", before, marking))
         while bench.cuts:
@@ -131,7 +128,7 @@ class PlaneTrials:
                 raise PlanError(f"the plane of part {trial.refused_part} is locked and would be in the way: {trial.refused}")
             removed.append(trial.refused)
             bench = with_cuts(bench, tuple(cut for cut in bench.cuts if cut is not part))
-        self._session.do(marking.step, bench, _removed_in_words(marking.step, removed))
+        self._session.do(word, bench, _removed_in_words(word, removed))
 
 
 def _removed_in_words(word: str, reasons: Sequence[str]) -> str:

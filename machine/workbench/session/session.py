@@ -172,7 +172,7 @@ class Session(SessionBase):
         given = replace(bench.given, settings=tuple(setting for setting in bench.given.settings if setting not in gone))
         return with_profile(bench, given, profile_as_given(given, bench.profile))
 
-    async def open_in_unit(self, unit: str) -> None:
+    async def open_in_unit(self, *, unit: str) -> None:
         """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
         waits = self.unscaled
         if waits is None or unit not in waits.units:
@@ -187,7 +187,7 @@ class Session(SessionBase):
         self.unscaled = None
         self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
 
-    async def open_plate(self, plate: int) -> None:
+    async def open_plate(self, *, plate: int) -> None:
         """Put another plate of the slicer file on the bench there. Raises UserError."""
         model = self.bench.model
         if model is None or plate not in model.plates:
@@ -207,7 +207,7 @@ class Session(SessionBase):
         await self.take_given(f"take the settings of {model.name}", lambda given: with_given(given, inside))
         self.settings_note = model.key, note
 
-    async def open_demo(self, name: str) -> None:
+    async def open_demo(self, *, name: str) -> None:
         """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")

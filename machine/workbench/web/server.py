@@ -1,5 +1,6 @@
 """Server: the page, and all addresses of the workbench: models, files and lines of its sessions, and the benches themselves."""
 
+import asyncio
 import re
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ from starlette.background import BackgroundTask
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from machine.notices import say
@@ -26,14 +27,13 @@ from machine.workbench.bench.page_words import page_words
 from machine.workbench.bench.settings import export_command, file_stem, settings_list, settings_of
 from machine.workbench.bench.values import is_small_number
 from machine.workbench.printing.prints import Prints
-from machine.workbench.session.base import hear_from
+from machine.workbench.session.base import hear_from, in_loop
 from machine.workbench.session.commands import Need, check_need
 from machine.workbench.session.placement import pedestal_key
 from machine.workbench.session.session import Session, Workbench
 from machine.workbench.session.slicing import Slices
 from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
 from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
-from machine.workbench.web.sessions_thread import SessionsThread
 from machine.workbench.web.snapshot import marks_key
 from machine.workbench.web.uploads import ProfileFiles, Uploads
 from profiles.errors import PlanError
@@ -184,10 +184,10 @@ def bench_routes(workbench: Workbench) -> list[Route]:
 
 @dataclass(frozen=True)
 class Served:
-    """What all pages are served: the benches in their own event loop, the prints, the files that pages send."""
+    """What all pages are served: the benches, the event loop in which they live, the prints, the files that pages send."""
 
     workbench: Workbench
-    sessions: SessionsThread
+    benches: asyncio.AbstractEventLoop
     prints: Prints
     uploads: Uploads
 
@@ -207,15 +207,33 @@ def lan_application(served: Served, door: Door, lan: Lan, port: int) -> ASGIApp:
 
 
 def _router(served: Served, page: tuple[bytes, str], further: Sequence[BaseRoute] = ()) -> ASGIApp:
-    """What is of the prints, and further, is answered in the server's own event loop, all else in that of the sessions."""
+    """What is of the prints, and further, is answered in the server's own event loop, all else in that of the benches, so that an
+    emergency stop waits for nothing that a bench has the processor do."""
     workbench, prints = served.workbench, served.prints
     of_prints = [
         Route(BELOW + "prints/{print:int}/log", print_log(prints)),
         Route(BELOW + "prints/{print:int}/webcam", print_webcam(prints)),
-        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench, served.sessions)),
+        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench, served.benches)),
     ]
-    others = served.sessions.application(_of_sessions(workbench, page, served.uploads))
+    others = answered_in(served.benches, _of_sessions(workbench, page, served.uploads))
     return Router([*of_prints, *further], redirect_slashes=False, default=others)
+
+
+def answered_in(loop: asyncio.AbstractEventLoop, app: ASGIApp) -> ASGIApp:
+    """An application that runs in another event loop than its server."""
+
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+        server = asyncio.get_running_loop()
+
+        async def received() -> Message:
+            return await in_loop(server, receive())  # type: ignore[arg-type]
+
+        async def sent(message: Message) -> None:
+            await in_loop(server, send(message))  # type: ignore[arg-type]
+
+        await in_loop(loop, app(scope, received, sent))  # type: ignore[arg-type]
+
+    return answer
 
 
 def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads) -> ASGIApp:

@@ -47,7 +47,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         near_neck,
         nearest,
     )
-} | {"mark": lambda tell, bench, marking: marking.zones(bench)}
+} | {"mark": lambda tell, bench, marking: marking(bench)}
 
 
 def load() -> None:
