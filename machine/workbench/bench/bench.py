@@ -208,7 +208,7 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
         return replace(bench, cuts=before.cuts)
     start = _placing(before)
     if turn is not None:
-        start = start.after(Placing.of(before.model.mesh(), turn, 0.0))
+        start = start.after(Placing.of(before.model, turn, 0.0))
     move = _placing(bench, factor).after(start)
     planes = {part: moved_part(part, move) for part in before.cuts or ()}
     cuts = None if before.cuts is None else tuple(planes[part] for part in before.cuts)
@@ -219,17 +219,18 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
 def _placing(bench: Bench, factor: float = 1.0) -> Placing:
     """How the model on a bench stands on the platform."""
     assert bench.model is not None
-    return Placing.of(bench.model.mesh(), bench.turned, bench.profile.search.pedestal_mm, factor)
+    return Placing.of(bench.model, bench.turned, bench.profile.search.pedestal_mm, factor)
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """The front of a search, cut by the row that it has chosen. A limb may be named by another point there than it was before."""
+    """The front of a search with its prices, cut by the row that it has chosen. A limb may be named by another point there than
+    it was before."""
     chosen = next(row for row in rows if row.chosen)
     parts = planned_parts(chosen)
     same_cuts = {before: _same_cuts(before, parts) for before in bench.cuts or ()}
     names = {before: min(same, key=partial(_apart_mm, before)) for before, same in same_cuts.items() if same}
     cuts, locked = (tuple(names.get(part, part) for part in several) for several in (bench.cuts or (), bench.locked))
-    named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked))
+    named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked), priced=True)
     return with_cuts(named, parts)
 
 

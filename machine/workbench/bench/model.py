@@ -113,13 +113,13 @@ class Placing:
     shift_mm: Floats
 
     @classmethod
-    def of(cls, mesh: Mesh, turned: Floats | None, lift_mm: float, factor: float = 1.0) -> "Placing":
-        """A mesh set on the platform, or on a pedestal. turned: None, it stands as it is read; factor: by how much it was scaled
+    def of(cls, model: Model, turned: Floats | None, lift_mm: float, factor: float = 1.0) -> "Placing":
+        """A model set on the platform, or on a pedestal. turned: None, it stands as it is read; factor: by how much it was scaled
         when it was read."""
         lift = np.array([0.0, 0.0, lift_mm])
         if turned is None:
             return cls(np.eye(3), factor, lift)
-        places = mesh.vertices @ turned.T
+        places = model.mesh().vertices @ turned.T
         low, high = places.min(axis=0), places.max(axis=0)
         return cls(turned, factor, lift - (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]))
 

@@ -28,16 +28,21 @@ ORDER = ("process", "material", "search", "machine")  # what is changed most com
 BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
 
 
+def key_of(setting: str) -> str:
+    """The key of a setting KEY=VALUE."""
+    return setting.partition("=")[0].strip()
+
+
 def with_setting(given: Given, key: str, value: str | None) -> Given:
     """The same with another value for a key, spelled in one line; None: as the profile has it."""
-    others = tuple(setting for setting in given.settings if setting.partition("=")[0].strip() != key)
+    others = tuple(setting for setting in given.settings if key_of(setting) != key)
     return replace(given, settings=others if value is None else (*others, f"{key}={_in_one_line(value)}"))
 
 
 def with_given(given: Given, inside: Given) -> Given:
     """The same with another material and further settings, which replace those of the same keys."""
-    keys = {setting.partition("=")[0].strip() for setting in inside.settings}
-    others = (setting for setting in given.settings if setting.partition("=")[0].strip() not in keys)
+    keys = set(map(key_of, inside.settings))
+    others = (setting for setting in given.settings if key_of(setting) not in keys)
     return replace(given, material=inside.material, settings=(*others, *inside.settings))
 
 
@@ -108,7 +113,7 @@ def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[st
     whether a person has changed it, and then what the profile has. part: of this part alone, what it may have of its own; 0: of
     all."""
     if part == 0:
-        changed = {setting.partition("=")[0].strip() for setting in given.settings}
+        changed = set(map(key_of, given.settings))
         unchanged = {row["key"]: row["value"] for row in _all_rows(_unchanged(given))} if changed else {}
         return [
             {
@@ -221,7 +226,7 @@ def export_command(bench: Bench) -> str:
     words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
     settings = list(given.settings)
     if not bench.planned and bench.turned is not None:
-        settings = [setting for setting in settings if setting.partition("=")[0].strip() != "process.rotate_deg"]
+        settings = [setting for setting in settings if key_of(setting) != "process.rotate_deg"]
         settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.12g}' for angle in turns_deg(bench))}]")
     words += [word for setting in settings for word in ("--set", setting)]
     if bench.model.plate is not None:

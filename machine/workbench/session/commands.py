@@ -17,7 +17,8 @@ from machine.workbench.bench.values import Arguments, Asked, Direction, Mm, argu
 from machine.workbench.session.session import Session
 from machine.workbench.work.cutting import SearchWay
 from mdp.ranking.ranker import CLASSIC
-from profiles.errors import PlanError
+from profiles.errors import PlanError, ProfileError
+from profiles.profile import SECTIONS
 
 ProfileKind = Literal["machine", "material", "process"]
 Work = Coroutine[Any, Any, None] | None  # what a command still has to do
@@ -88,6 +89,8 @@ def take_neck(session: Session, *, part: int) -> Work:
 
 def set_value(session: Session, *, key: str, value: str | None = None) -> Work:
     """Another value for a key of the profile, as --set has it; null: as the profile has it."""
+    if "=" in key or key.partition(".")[0] not in SECTIONS:
+        raise ProfileError(f"{key!r} is not a key of a profile")
     before = session.bench.profile
     return session.take_given(f"set {key}", lambda given: with_typed(given, key, value, before), key)
 
@@ -124,6 +127,7 @@ ACTS: dict[str, Callable[..., Any]] = {
 }
 FUNCTIONS: dict[str, Callable[..., Any]] = {name: change for name, (change, _) in CHANGES.items()} | EDITS | MARKINGS | ACTS
 COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()}
+LONG = ("search", "slice", "compare")  # what `stop` ends, also while it waits for its turn
 NEEDS = {"compare": Need.SLICES} | dict.fromkeys(
     ("demo", "unit", "dismiss", "undo", "redo", "set", "reset", "profile"), Need.NOTHING
 )  # what lies on the bench for all others is a model
@@ -138,8 +142,11 @@ def obey(session: Session, asked: Asked) -> None:
         if isinstance(named, str):
             session.hear_name(named)
     name, arguments = read_command(asked, COMMANDS)
-    # What is to be stopped ends at once, whatever its bench is busy with.
-    act = session.stop() if name == "stop" else partial(perform, session, name, arguments)
+    act: Callable[[], Work] = partial(perform, session, name, arguments)
+    if name == "stop":  # what is to be stopped ends at once, whatever its bench is busy with
+        act = session.stop()
+    elif name in LONG:
+        act = session.unless_stopped(name, act)
     session.command(act, asked.get("ask"))
 
 

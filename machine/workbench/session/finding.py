@@ -41,10 +41,10 @@ class Finding(Derived[Found]):
         """Have another process ready for the next one."""
         self._session.start(self._session.long.warm())
 
-    def take_best(self, bench: Bench, searched: Searched) -> str:
+    def take_best(self, bench: Bench, searched: Searched | None) -> str:
         """Take the best that a search of a bench had met when it was stopped; its prices are told when they are known. What
-        became of it, as a sentence."""
-        best, now = searched.best, self._session.bench
+        became of it, as a sentence. searched: None, it had not begun."""
+        best, now = None if searched is None else searched.best, self._session.bench
         if best is None or not best.planes or self._key_of(now) != self._key_of(bench):
             return "The search was stopped before it had cut anything: all is as it was."
         taken = with_front(now, [replace(best, chosen=True)])
@@ -73,5 +73,7 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
     def accept(prices: dict[int, FrontRow]) -> None:
         session.become(session.history.amended(with_prices(session.bench, prices)))
 
-    prices_now = Derived(session, lambda bench: None if bench.priced else bench, price, accept=accept)
+    prices_now = Derived(
+        session, lambda bench: None if bench.priced else (bench.sought, bench.rows, bench.locked), price, accept=accept
+    )
     return prices_now

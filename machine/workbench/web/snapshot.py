@@ -222,7 +222,7 @@ def _state(session: Session) -> dict[str, Any]:
         "copies_told": _copies_told(session),
         "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
-        "benches": [asdict(bench) for bench in session.benches],
+        "benches": session.benches,
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }

@@ -399,3 +399,51 @@ def test_a_stop_ends_the_search_at_once_though_a_command_before_it_is_still_exec
             assert (is_seeking(session), session.stopped) == (False, "")
 
     assert when_done(work).stopped == "The search was stopped before it had cut anything: all is as it was."
+
+
+def test_a_stop_reaches_work_that_still_waits_for_its_turn() -> None:
+    async def work(session: Session) -> None:
+        async with session.turn:
+            for name in ("search", "slice", "stop"):
+                obey(session, {"do": name})
+        await settled(session)
+        assert (is_seeking(session), session.slicing.progress, session.slicing.number) == (False, None, 0)
+        stopped.append(session.stopped)
+        obey(session, {"do": "slice"})
+
+    stopped: list[str] = []
+    session = when_done(work)
+    assert session.slicing.number == 1
+    assert stopped == [
+        "The search was stopped before it had cut anything: all is as it was. Slicing was stopped: there are no slices."
+    ]
+
+
+def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a_front_that_was_found_has_its_own() -> None:
+    rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0, chosen=True))
+    priced: list[int] = []
+
+    async def work(session: Session) -> None:
+        async def price(task: str, bench: Bench, row: int, **more: Any) -> Any:
+            priced.append(row)
+            for _ in range(5):
+                await asyncio.sleep(0)
+            return replace(bench.rows[row], time_s=60.0)
+
+        session.long.run = price  # type: ignore[assignment, method-assign]
+        session.do("find", replace(with_front(session.bench, rows), priced=False))
+        for count in (2, 3):
+            await asyncio.sleep(0)
+            obey(session, {"do": "copies", "count": count})
+
+    bench = when_done(work).bench
+    assert (priced, bench.priced, bench.copies) == ([0, 1], True, 3)
+    assert with_front(replace(bench, priced=False), rows).priced
+
+
+@pytest.mark.parametrize("key", ["", "=:", "walls"])
+def test_what_is_no_key_is_not_set(key: str) -> None:
+    async def work(session: Session) -> None:
+        obey(session, {"do": "set", "key": key, "value": ":"})
+
+    assert when_done(work).problem == f"{key!r} is not a key of a profile"
