@@ -55,16 +55,16 @@ class PlaneTrials:
         that cannot be cut."""
         bench, cuts, self.refused = self._session.bench, edit.cuts, None
         trial = await self.attempt(bench, cuts)
-        if trial.refused and edit.near:
+        if trial.rejected and edit.near:
             with self._session.waiting("looking for the nearest place that can be cut"):
                 nearest: Cuts | None = await self._readiness.ask("nearest", bench, edit.orders)
             if nearest is not None:
                 cuts, trial = nearest, await self.attempt(bench, nearest)
-        if trial.refused:
+        if trial.rejected:
             self.settle()
             self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
             nowhere = "; shifted along its normal it cannot be cut either" if edit.near else ""
-            raise PlanError(f"{edit.reason}part {trial.refused_part} cannot be cut off: {trial.refused}{nowhere}")
+            raise PlanError(f"{edit.reason}part {trial.rejected_part} cannot be cut off: {trial.rejected}{nowhere}")
         self.trial = bench, cuts, trial
         self._session.do(edit.word, with_cuts(bench, cuts))
 
@@ -121,12 +121,12 @@ class PlaneTrials:
         bench = with_zones(before, await self._session.quick.run("mark", before, marking))
         while bench.cuts:
             trial = await self.attempt(bench, bench.cuts)
-            if not trial.refused:
+            if not trial.rejected:
                 break
-            part = bench.cuts[trial.refused_part - 2]
+            part = bench.cuts[trial.rejected_part - 2]
             if part in bench.locked:
-                raise PlanError(f"the plane of part {trial.refused_part} is locked and would be in the way: {trial.refused}")
-            removed.append(trial.refused)
+                raise PlanError(f"the plane of part {trial.rejected_part} is locked and would be in the way: {trial.rejected}")
+            removed.append(trial.rejected)
             bench = with_cuts(bench, tuple(cut for cut in bench.cuts if cut is not part))
         self._session.do(word, bench, _removed_in_words(word, removed))
 

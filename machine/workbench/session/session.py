@@ -318,12 +318,12 @@ class Session(SessionBase):
             bench = with_scaled_model(bench, model, new.scale / old.scale)
         effect = effect_of_change(before.profile, bench.profile)
         if effect == Effect.REACH and bench.rows:
-            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).refused]
+            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
             bench = with_rows(bench, rows)
         if bench.cuts is not None and effect >= Effect.REACH:
             trial = await self.trials.attempt(bench, bench.cuts)
-            if trial.refused:
-                why = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
+            if trial.rejected:
+                why = f"{word}: the planes were taken away, for part {trial.rejected_part} cannot be cut off: {trial.rejected}"
                 return replace(with_cuts(bench, ()), cuts=None), why
         return bench, ""
 

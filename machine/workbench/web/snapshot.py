@@ -285,7 +285,9 @@ def _trial(session: Session) -> dict[str, Any] | None:
     if session.trials.trial is None or session.trials.trial[0].sought != session.bench.sought:
         return None
     _, cuts, trial = session.trials.trial
-    return {"cuts": _cuts(cuts), **asdict(trial)}
+    figures = asdict(trial)
+    rejected = {"refused": figures.pop("rejected"), "refused_part": figures.pop("rejected_part")}
+    return {"cuts": _cuts(cuts), **figures, **rejected}
 
 
 def _refused(session: Session) -> dict[str, Any] | None:
