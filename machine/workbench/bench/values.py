@@ -44,13 +44,13 @@ class Arguments(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, allow_inf_nan=False)
 
 
-def arguments_of(command: Callable[..., Any]) -> type[Arguments]:
-    """The type of what a page sends with a command: the keyword-only parameters of the function that does it."""
+def arguments_of(command: Callable[..., Any], base: type[Arguments] = Arguments) -> type[Arguments]:
+    """The type of what a page sends with a command: the keyword-only parameters of the function that does it, beside the base."""
     parameters = [given for given in signature(command).parameters.values() if given.kind is Parameter.KEYWORD_ONLY]
     fields: dict[str, Any] = {
         given.name: (given.annotation, ... if given.default is Parameter.empty else given.default) for given in parameters
     }
-    return create_model(command.__name__, __base__=Arguments, **fields)
+    return create_model(command.__name__, __base__=base, **fields)
 
 
 def read_command(asked: Asked, commands: Mapping[str, type[Arguments]]) -> tuple[str, Arguments]:
@@ -72,11 +72,6 @@ def check_number(key: str, value: int, least: int, most: int) -> int:
         allowed = f"{least} to {most} is allowed" if least <= most else "there is none yet"
         raise PlanError(f"{key} is {value}: {allowed}")
     return value
-
-
-def is_small_number(text: str) -> bool:
-    """Whether the text of an address is a number of so few digits that it may be one of ours."""
-    return text.isascii() and text.isdigit() and len(text) < 6
 
 
 def vector_of(values: Iterable[float]) -> Vector:

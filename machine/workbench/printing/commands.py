@@ -7,20 +7,15 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import Field
+from typing import Any
 
 from machine.cli.terminal.options import machine_profile
-from machine.link.pending_commands import Command
-from machine.link.print_state import PrintState
 from machine.pipeline.programs import refuse_errors
 from machine.pipeline.requests import BAUD
 from machine.printing.checks import check_destination
 from machine.printing.destination import Destination, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
-from machine.workbench.bench.values import Asked, arguments_of, read_command
-from machine.workbench.printing.at_page import HandCommand, HandDoes
+from machine.workbench.bench.values import Arguments, Asked, arguments_of, read_command
 from machine.workbench.printing.job_state import Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.running_print import RunningPrint
@@ -30,10 +25,13 @@ from machine.workbench.session.session import Session
 from profiles.errors import JournalError, PlanError, PrinterError
 
 LONGEST_PORT = 300  # letters
-NO_COMMAND = "what the page has sent is no command of a print"
-Percent = Annotated[int, Field(ge=0, le=10_000)]
-HandWord = Annotated[HandDoes, Field(strict=False)]  # a text in JSON
 Work = Coroutine[Any, Any, None]
+
+
+class OfPrint(Arguments):
+    """print: the number of the print that is meant."""
+
+    print: int
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,6 @@ async def check(
     if send_only:
         destination = parse_server_address(destination.name)
     page.prints.begin(page.name, await in_loop(page.benches, job_of(page.session, destination, force, not send_only)))
-    page.prints.notify()
 
 
 async def job_of(session: Session, destination: Destination, force: bool, starts: bool = True) -> PrintJob:
@@ -132,17 +129,6 @@ async def hand(page: PageOfPrints, *, port: str = "", baud: int = BAUD, sim_spee
         return PrintJob(_destination(port, baud, sim_speed), Does.HAND, profile=page.session.bench.profile.of_all_parts)
 
     page.prints.begin(page.name, await in_loop(page.benches, job()))
-    page.prints.notify()
-
-
-def by_hand(
-    page: PageOfPrints, *, print: int, does: HandWord, axis: str = "", by_mm: float = 0.0, keep_heat: bool = False
-) -> None:
-    """Have a printer in hand do something."""
-    running = page.commanded(print)
-    if running.state.state is not PrintState.IN_HAND:
-        raise PrinterError("this cannot be done by hand now")
-    running.say((HandCommand(does, axis[:1], by_mm, keep_heat),))
 
 
 def emergency(page: PageOfPrints, *, print: Any = None) -> None:
@@ -155,68 +141,50 @@ def take(page: PageOfPrints, *, print: int) -> None:
     page.prints.numbered(print).holder = page.name
 
 
-def begin(page: PageOfPrints, *, print: int) -> None:
-    """Agree to what was found."""
-    page.commanded(print).begin()
-
-
-def cancel(page: PageOfPrints, *, print: int) -> None:
-    """End a print, heaters off."""
-    page.commanded(print).cancel()
-
-
-def leave(page: PageOfPrints, *, print: int) -> None:
-    """Leave a print to its print server."""
-    running = page.commanded(print)
-    if not running.state.server:
-        raise PrinterError(NO_COMMAND)
-    running.leave()
-
-
-def pause(page: PageOfPrints, *, print: int) -> None:
-    """Pause a print."""
-    page.commanded(print).say((Command.PAUSE,))
-
-
-def resume(page: PageOfPrints, *, print: int) -> None:
-    """Go on after a pause."""
-    page.commanded(print).say((Command.RESUME,))
-
-
-def feed(page: PageOfPrints, *, print: int, percent: Percent) -> None:
-    """Set the speed, in per cent of the programmed one."""
-    page.commanded(print).say((Command.FEED, float(percent)))
-
-
-def flow(page: PageOfPrints, *, print: int, percent: Percent) -> None:
-    """Set the flow, in per cent of the programmed one."""
-    page.commanded(print).say((Command.FLOW, float(percent)))
-
-
 def forget(page: PageOfPrints, *, print: int) -> None:
     """Take a print that is over off the list."""
     running = page.commanded(print)
     if not running.over:
-        raise PrinterError(NO_COMMAND)
+        raise PrinterError("what the page has sent is no command of a print")
     page.prints.prints.remove(running)
 
 
-# All of them, by their own names.
 FUNCTIONS: dict[str, Callable[..., Work | None]] = {
-    function.__name__: function
-    for function in (
-        *(ports, journals, check, go_on, follow, hand, by_hand),
-        *(emergency, take, begin, cancel, leave, pause, resume, feed, flow, forget),
-    )
+    "ports": ports,
+    "journals": journals,
+    "check": check,
+    "go_on": go_on,
+    "follow": follow,
+    "hand": hand,
+    "emergency": emergency,
+    "take": take,
+    "forget": forget,
 }
-COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()}
+# Those of a print, which only the page that commands it may ask for.
+OF_PRINT: dict[str, Callable[..., None]] = {
+    "begin": RunningPrint.begin,
+    "cancel": RunningPrint.cancel,
+    "leave": RunningPrint.leave,
+    "pause": RunningPrint.pause,
+    "resume": RunningPrint.resume,
+    "feed": RunningPrint.feed,
+    "flow": RunningPrint.flow,
+    "by_hand": RunningPrint.by_hand,
+}
+COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()} | {
+    name: arguments_of(function, OfPrint) for name, function in OF_PRINT.items()
+}
 
 
 def obey(page: PageOfPrints, asked: Asked) -> Work | None:
     """Do what a page asks for, `{"do": NAME, ...}`. Returns the work that is left where its bench must be asked first. Raises
     UserError for what cannot be done, as that work does."""
     name, arguments = read_command(asked, COMMANDS)
-    work = FUNCTIONS[name](page, **dict(arguments))
+    given, work = dict(arguments), None
+    if name in OF_PRINT:
+        OF_PRINT[name](page.commanded(given.pop("print")), **given)
+    else:
+        work = FUNCTIONS[name](page, **given)
     page.prints.notify()
     return work
 

@@ -122,6 +122,7 @@ class Prints(Observable):
         begun = RunningPrint(self._last, job, page, self.notify)
         self.prints.append(begun)
         self._start(self._print(begun))
+        self.notify()
 
     def _forget_old(self, at: Destination) -> None:
         """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:

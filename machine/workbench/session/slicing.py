@@ -2,7 +2,7 @@
 same model in one piece."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 from machine.program import Alternative
 from machine.workbench.bench.bench import Bench
@@ -11,17 +11,6 @@ from machine.workbench.work.slices import Sliced, SlicesSoFar
 from profiles.errors import PlanError
 
 ENDED = "slicing has ended, for what lies on the workbench is another now: slice it again"
-
-
-@dataclass(frozen=True, eq=False)
-class SlicingUnderWay:
-    """The bench that is sliced, the number of the slices, how far they are, and what is seen of the parts that are ready."""
-
-    bench: Bench
-    number: int
-    text: str
-    shares: tuple[float, ...] = ()
-    walls: Mapping[int, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +24,7 @@ class Slices:
 
 
 class Slicing(Derived[Slices]):
-    """progress: a SlicingUnderWay; done: the last slices."""
+    """progress: SlicesSoFar, with all parts that are ready, of the slices of this number; done: the last slices."""
 
     def __init__(self, session: SessionBase) -> None:
         super().__init__(session, lambda bench: bench.printed, self._slice, by_itself=False, interrupts=True)
@@ -64,16 +53,14 @@ class Slicing(Derived[Slices]):
 
     def walls_of(self, number: int, part: int) -> bytes | None:
         """What is seen of a part of the slices of a number; None where it is not there, or not there yet."""
-        for slices in (self.progress, self.done):
-            if slices is not None and slices.number == number:
-                drawn: bytes | None = slices.walls.get(part)
-                return drawn
-        return None
+        if self.progress is not None and self.number == number:
+            drawn: bytes | None = self.progress.walls.get(part)
+            return drawn
+        return self.done.walls.get(part) if self.done is not None and self.done.number == number else None
 
     def slice(self) -> None:
         """Slice the model on the bench, if nothing is being sliced."""
-        begins = WAITING if self._session.long.pool.full else "cutting the parts"
-        self.begin(SlicingUnderWay(self._session.bench, self.number + 1, begins))
+        self.begin(SlicesSoFar(WAITING if self._session.long.pool.full else "cutting the parts"))
 
     def interrupted(self) -> None:
         """Tell the pages."""
@@ -85,7 +72,7 @@ class Slicing(Derived[Slices]):
 
         def follow(so_far: SlicesSoFar) -> None:
             walls.update(so_far.walls)
-            tell(SlicingUnderWay(bench, number, so_far.text, so_far.shares, walls))
+            tell(replace(so_far, walls=walls))
 
         files = self._session.new_file(), self._session.new_file()
         sliced: Sliced = await self._session.long.run("slice_bench", bench, *files, tell=follow)

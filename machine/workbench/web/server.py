@@ -25,7 +25,6 @@ from machine.workbench.access.network import Lan
 from machine.workbench.access.pairing import Door
 from machine.workbench.bench.page_words import page_words
 from machine.workbench.bench.settings import export_command, file_stem, settings_list, settings_of
-from machine.workbench.bench.values import is_small_number
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.base import hear_from, in_loop
 from machine.workbench.session.commands import Need, check_need
@@ -35,14 +34,14 @@ from machine.workbench.session.slicing import Slices
 from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
 from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
 from machine.workbench.web.snapshot import marks_key
-from machine.workbench.web.uploads import ProfileFiles, Uploads
+from machine.workbench.web.uploads import Uploads
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
 Act = Callable[[Session, Request], Awaitable[Response]]
 OWN = Path(__file__).parent / "page"
 MARKER = re.compile(r"/\*(?:STYLE|SCRIPT|NETWORK)\*/")
-ZIP = "application/zip"
+ZIP, BYTES = "application/zip", "application/octet-stream"
 BELOW = "/{token}/{session:int}/"
 
 
@@ -89,7 +88,7 @@ async def print_text(session: Session, request: Request) -> Response:
 async def print_walls(session: Session, request: Request) -> Response:
     """What is seen of a part that is sliced, as `work.walls` gives it."""
     drawn = session.slicing.walls_of(request.path_params["number"], request.path_params["part"])
-    return _gone() if drawn is None else Response(drawn, media_type="application/octet-stream")
+    return _gone() if drawn is None else Response(drawn, media_type=BYTES)
 
 
 async def shared_page(session: Session, request: Request) -> Response:
@@ -130,6 +129,11 @@ def _once(file: Path, kind: str, name: str) -> Response:
     return FileResponse(file, headers=_saved_as(name), media_type=kind, background=remove)
 
 
+def _number(text: str) -> int:
+    """The number in an address, 0 for what is none of ours."""
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 6 else 0
+
+
 def _saved_as(name: str) -> dict[str, str]:
     """The header that gives a browser a file's name, in any script (RFC 6266)."""
     plain = name.encode("ascii", "replace").decode().replace("?", "_")
@@ -162,9 +166,9 @@ def bench_routes(workbench: Workbench) -> list[Route]:
         return RedirectResponse(f"{number}/")
 
     async def opened(request: Request) -> Response:
-        like = request.query_params.get("like", "")
+        like = workbench.sessions.get(_number(request.query_params.get("like", "")))
         try:
-            number = workbench.open(workbench.sessions.get(int(like)) if is_small_number(like) else None)
+            number = workbench.open(like)
         except PlanError as error:
             return JSONResponse({"problem": page_words(str(error))}, status_code=422)
         return JSONResponse({"number": number})
@@ -243,10 +247,10 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
 
     routes = [
         route("", _page(*page)),
-        route("model/{key}", _model),
-        route("marks/{key}", _marks),
-        route("pedestal/{key}", _pedestal),
-        route("facets/{key}", _facets),
+        route("model/{key}", _of_key(_model_key, _model)),
+        route("marks/{key}", _of_key(lambda session: marks_key(session.bench), _marks)),
+        route("pedestal/{key}", _of_key(lambda session: pedestal_key(session.bench, session.standing.result), _pedestal)),
+        route("facets/{key}", _of_key(_model_key, _facets)),
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
         route("left/{number:int}", uploads.open_left, "POST"),
@@ -263,7 +267,7 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("walls/{number:int}/{part:int}", print_walls),
         route("print.html", shared_page),
         route("print.gcode", gcode),
-        route("settings.json", _settings(uploads.profiles)),
+        route("settings.json", _settings(uploads)),
         WebSocketRoute(BELOW + "line", _line(workbench)),
     ]
     return Starlette(routes=[*bench_routes(workbench), *routes])
@@ -307,45 +311,48 @@ def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
     return connect
 
 
+def _of_key(current: Callable[[Session], str], act: Act) -> Act:
+    """What a page asks for by a key as long as that is the current one; else there is another by now, which it asks for next."""
+
+    async def answer(session: Session, request: Request) -> Response:
+        key = current(session)
+        return await act(session, request) if key and key == request.path_params["key"] else Response(status_code=204)
+
+    return answer
+
+
+def _model_key(session: Session) -> str:
+    return "" if session.bench.model is None else session.bench.model.key
+
+
 async def _model(session: Session, request: Request) -> Response:
-    model = session.bench.model
-    if model is None or model.key != request.path_params["key"]:
-        return Response(status_code=204)  # there is another one by now, which the page asks for next
-    return FileResponse(model.mesh_file, media_type="application/octet-stream")
+    assert session.bench.model is not None
+    return FileResponse(session.bench.model.mesh_file, media_type=BYTES)
 
 
 async def _pedestal(session: Session, request: Request) -> Response:
-    standing = session.standing.result
-    if standing is None or pedestal_key(session.bench, standing) != request.path_params["key"]:
-        return Response(status_code=204)
-    return Response(standing.pedestal, media_type="application/octet-stream")
+    assert session.standing.result is not None
+    return Response(session.standing.result.pedestal, media_type=BYTES)
 
 
 async def _facets(session: Session, request: Request) -> Response:
-    model = session.bench.model
-    if model is None or model.key != request.path_params["key"]:
-        return Response(status_code=204)
-    return Response(await session.quick.run("rest_facets", model), media_type="application/json")
+    return Response(await session.quick.run("rest_facets", session.bench.model), media_type="application/json")
 
 
 async def _pieces(session: Session, request: Request) -> Response:
-    return FileResponse(await session.pieces.get(), media_type="application/octet-stream")
+    return FileResponse(await session.pieces.get(), media_type=BYTES)
 
 
 async def _marks(session: Session, request: Request) -> Response:
-    bench = session.bench
-    if not request.path_params["key"] or marks_key(bench) != request.path_params["key"]:
-        return Response(status_code=204)  # there are others by now, which the page asks for next
-    return Response(await session.quick.run("mark_faces", bench), media_type="application/octet-stream")
+    return Response(await session.quick.run("mark_faces", session.bench), media_type=BYTES)
 
 
-def _settings(files: ProfileFiles) -> Act:
+def _settings(uploads: Uploads) -> Act:
     async def answer(session: Session, request: Request) -> Response:
-        given = files.as_shown(session.bench.given)
+        given = uploads.as_shown(session.bench.given)
         bench = replace(session.bench, given=given)
         names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
-        part = request.query_params.get("part", "")
-        rows = settings_list(bench.profile, session.bench.given, int(part) if is_small_number(part) else 0)
+        rows = settings_list(bench.profile, session.bench.given, _number(request.query_params.get("part", "")))
         return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
 
     return answer

@@ -139,7 +139,7 @@ def _under_way(session: Session) -> dict[str, Any] | None:
     slicing = session.slicing.progress
     if slicing is None:
         return None
-    return {"text": slicing.text, "number": slicing.number, "shares": slicing.shares, "ready": sorted(slicing.walls)}
+    return {"text": slicing.text, "number": session.slicing.number, "shares": slicing.shares, "ready": sorted(slicing.walls)}
 
 
 def _sliced(session: Session) -> dict[str, Any] | None:

@@ -239,7 +239,7 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
         assert session.slicing.progress is not None
-        assert session.slicing.progress.bench is session.bench
+        assert session.slicing.bench is session.bench
 
     session = when_done(work)
     assert session.slicing.done is not None
