@@ -16,7 +16,7 @@ from machine.printing.checks import check_destination
 from machine.printing.destination import Destination, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
 from machine.workbench.bench.values import Arguments, Asked, arguments_of, read_command
-from machine.workbench.printing.job_state import Slices
+from machine.workbench.printing.at_page import Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.running_print import RunningPrint
 from machine.workbench.session.base import in_loop

@@ -16,8 +16,7 @@ from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.rescue import cancel_on_server, rescue
 from machine.printing.servers.gcode_upload import server_name
-from machine.workbench.printing.at_page import BEGIN, LEAVE, HandCommand, HandDoes
-from machine.workbench.printing.job_state import JobState, first_state
+from machine.workbench.printing.at_page import BEGIN, LEAVE, HandCommand, HandDoes, JobState, first_state
 from machine.workbench.work.worker_pool import heard
 from mdp.kernels.workers import Interpreter
 from profiles.errors import PrinterError, UserError

@@ -9,9 +9,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Literal
 
-from machine.workbench.bench.changes import CHANGES
-from machine.workbench.bench.marks import MARKINGS, WORDS
-from machine.workbench.bench.planes import EDITS, move
+from machine.workbench.bench.changes import CHANGES, EDITS, MARKINGS, WORDS, move
 from machine.workbench.bench.settings import with_name, with_typed, without_settings
 from machine.workbench.bench.values import Arguments, Asked, Direction, Mm, arguments_of, read_command
 from machine.workbench.session.session import Session

@@ -29,11 +29,9 @@ from machine.workbench.bench.bench import (
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.settings import check_block, key_of, profile_as_given, with_given, with_typed
 from machine.workbench.session.base import LONGEST_SENTENCE, Derived, SessionBase, asking
-from machine.workbench.session.finding import Finding, prices_of
 from machine.workbench.session.keeping import Keeping
-from machine.workbench.session.placement import Readiness, resting_of, standing_of
-from machine.workbench.session.planes import PlaneTrials
-from machine.workbench.session.slicing import Comparing, Slicing
+from machine.workbench.session.long_work import Comparing, Finding, Slicing, prices_of
+from machine.workbench.session.planes import PlaneTrials, Readiness, resting_of, standing_of
 from machine.workbench.work.folders import NAMES_KEPT, files_in, new_folder
 from machine.workbench.work.models import Unscaled
 from machine.workbench.work.worker_pool import WorkerPools

@@ -28,9 +28,9 @@ from machine.workbench.bench.settings import export_command, file_stem, settings
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.base import hear_from, in_loop
 from machine.workbench.session.commands import Need, check_need
-from machine.workbench.session.placement import pedestal_key
+from machine.workbench.session.long_work import Slices
+from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session, Workbench
-from machine.workbench.session.slicing import Slices
 from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
 from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
 from machine.workbench.web.snapshot import marks_key

@@ -11,11 +11,11 @@ from machine.quantities import about, duration, filament_g, newtons, percent, pr
 from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench
+from machine.workbench.bench.changes import Cuts
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.page_words import in_page_words, page_words, with_page_words
-from machine.workbench.bench.planes import Cuts
 from machine.workbench.session.commands import Need, lacking
-from machine.workbench.session.placement import pedestal_key
+from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session
 from mdp.joint import Joint
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold

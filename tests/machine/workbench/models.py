@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from machine.workbench.bench.bench import Bench, History
-from machine.workbench.bench.changes import CHANGES
+from machine.workbench.bench.changes import CHANGES, EDITS, Cuts
 from machine.workbench.bench.model import Model
-from machine.workbench.bench.planes import EDITS, Cuts
 from machine.workbench.bench.values import read_command
 from machine.workbench.session.commands import COMMANDS
 from mdp.mesh import Mesh

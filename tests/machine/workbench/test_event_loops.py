@@ -14,13 +14,13 @@ from machine.dryrun.findings import known_findings
 from machine.pipeline.requests import Given
 from machine.printing.destination import Simulated
 from machine.printing.job import PrintJob
+from machine.workbench.printing.at_page import Slices
 from machine.workbench.printing.commands import PageOfPrints, obey
-from machine.workbench.printing.job_state import Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.running_print import RunningPrint
 from machine.workbench.session.base import in_loop
+from machine.workbench.session.long_work import Slicing
 from machine.workbench.session.session import Session, Workbench
-from machine.workbench.session.slicing import Slicing
 from machine.workbench.web.serve import event_loop
 from machine.workbench.web.server import Served, answered_in, application
 from machine.workbench.web.uploads import Uploads

@@ -19,7 +19,8 @@ from machine.workbench.bench.bench import (
     with_rotation,
     with_scaled_model,
 )
-from machine.workbench.bench.marks import named_faces, workpiece_mesh
+from machine.workbench.bench.changes import workpiece_mesh
+from machine.workbench.work.models import named_faces
 from mdp.directions.orientation import standing_still
 from mdp.pose import about, turned_by, unit
 from mdp.search.plan_file import PlannedPart

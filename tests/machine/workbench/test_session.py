@@ -37,7 +37,7 @@ EDIT = st.fixed_dictionaries({
 
 @pytest.fixture(autouse=True)
 def _nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.workbench.session.placement.CHANGING_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.planes.CHANGING_S", 0.0)
     monkeypatch.setattr("machine.workbench.session.planes.REST_S", 0.0)
 
 

@@ -13,9 +13,8 @@ from machine.dryrun.findings import Finding, KnownFindings, known_findings
 from machine.printing.destination import Destination, SerialPort, Simulated, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
 from machine.program import Alternative
-from machine.workbench.printing.at_page import AtPage
+from machine.workbench.printing.at_page import AtPage, Slices
 from machine.workbench.printing.commands import job_of
-from machine.workbench.printing.job_state import Slices
 from machine.workbench.printing.prints import FILE, Prints, keep_printer, last_printer
 from machine.workbench.printing.process import carry_out
 from machine.workbench.work.slices import Sliced

@@ -31,9 +31,8 @@ from machine.printing.servers import follow
 from machine.printing.servers.credentials import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from machine.workbench.printing import running_print
-from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage
+from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage, JobState, Slices
 from machine.workbench.printing.commands import COMMANDS, PageOfPrints, obey
-from machine.workbench.printing.job_state import JobState, Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.process import carry_out
 from machine.workbench.printing.running_print import RunningPrint
@@ -215,7 +214,7 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
 LEAVES = """
 import sys, time
 from machine.link.print_state import PrintState, PrintStatus
-from machine.workbench.printing.job_state import JobState
+from machine.workbench.printing.at_page import JobState
 from mdp.kernels.workers import frame, read_frames
 for state in (PrintState.PRINTING, PrintState.LEFT):
     told = JobState(state, "hour", server=True, progress=PrintStatus(), told_s=time.time(), sentence="it goes on")
