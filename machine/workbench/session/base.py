@@ -190,8 +190,7 @@ class Derived(Generic[Value]):
 
     key: what of a bench decides it, None: there is nothing to work out. task: works it out for a bench, and may tell() how far it
     is. by_itself: as soon as the key changes, else when it is begun. interrupts: a change of the key cancels the task at once,
-    else it may end and is begun anew then; in both cases its answer is dropped. accept: changes the bench by the answer. start:
-    starts the task, which is one of the session's otherwise.
+    else it may end and is begun anew then; in both cases its answer is dropped. accept: changes the bench by the answer.
 
     progress: what the task has told last, None: none is under way; bench: of the task under way; done: the last answer, of
     one that is begun whatever the bench is now.
@@ -206,14 +205,13 @@ class Derived(Generic[Value]):
         by_itself: bool = True,
         interrupts: bool = False,
         accept: Callable[[Value], None] | None = None,
-        start: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None,
     ) -> None:
         self.progress: Any = None
         self.bench = session.bench
         self.done: Value | None = None
         self.number = 0  # of the task under way, or the last one
         self._session, self._key_of, self._work, self._accept = session, key, task, accept
-        self._by_itself, self._interrupts, self._start = by_itself, interrupts, start or session.start
+        self._by_itself, self._interrupts = by_itself, interrupts
         self._begun: object = None  # key of the task under way, or the last one
         self._of: object = None  # key of the last answer
         self._error: Exception | None = None
@@ -238,7 +236,7 @@ class Derived(Generic[Value]):
             self.progress, self._error = progress, None
             self.bench = self._session.bench
             self._begun = self._key_of(self.bench)
-            self._task = self._start(self._run())
+            self._task = self._session.start(self._run())
 
     def tell(self, progress: Any) -> None:
         """Have the pages know how far the task under way is."""
