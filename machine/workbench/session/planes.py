@@ -22,7 +22,6 @@ from mdp.zone import Zones
 from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
 from profiles.frozen import Effect
-from profiles.profile import Profile
 
 REST_S = 0.1  # how long a hand must rest before what it holds is tried more closely
 CHANGING_S = 0.2  # of a bench, until it is made ready as it is
@@ -34,11 +33,14 @@ class Readiness(Derived[None]):
     already; very large models wait for the first plane."""
 
     def __init__(self, session: SessionBase) -> None:
-        self._made_of: tuple[object, ...] = (None, None, None)  # the bench of the last number
-        self._profile: Profile | None = None
+        self._numbered: Bench | None = None  # the last one
         self._number = 0
         self._model = ""  # key of that of the bench that was made ready last
-        super().__init__(session, self._number_to_prepare, self._prepare)
+        super().__init__(
+            session,
+            lambda bench: None if bench.model is None or bench.model.faces > MANY_FACES else self._number_of(bench),
+            self._prepare,
+        )
 
     def load(self) -> None:
         """Load what all planes need, while the first model is read."""
@@ -49,23 +51,15 @@ class Readiness(Derived[None]):
         """What a task of work.trials says of a bench."""
         return await self._session.hand.run(task, self._number_of(bench), bench, *given)
 
-    def _number_to_prepare(self, bench: Bench) -> int | None:
-        return None if bench.model is None or bench.model.faces > MANY_FACES else self._number_of(bench)
-
     def _number_of(self, bench: Bench) -> int:
-        made_of = (bench.model and bench.model.key, bench.rotation, bench.zones)
-        if any(new is not old for new, old in zip(made_of, self._made_of, strict=True)) or not self._serves(bench.profile):
-            self._made_of, self._profile, self._number = made_of, bench.profile, next(_numbers)
+        """The number of a bench, that of the last one where what was made ready for that serves this one, too: planes read of a
+        profile what a search does."""
+        before, self._numbered = self._numbered or Bench(bench.profile), bench
+        keys = [of.model and (of.model.key, of.rotation) for of in (before, bench)]
+        alike = keys[0] == keys[1] and before.zones is bench.zones
+        if not alike or effect_of_change(before.profile, bench.profile) >= Effect.REACH:
+            self._number = next(_numbers)
         return self._number
-
-    def _serves(self, profile: Profile) -> bool:
-        """Whether what was made ready serves another profile: planes read of it what a search does."""
-        if profile is self._profile:
-            return True
-        serves = self._profile is not None and effect_of_change(self._profile, profile) < Effect.REACH
-        if serves:
-            self._profile = profile
-        return serves
 
     async def _prepare(self, bench: Bench) -> None:
         """Make a bench ready, unless it changes at once again."""
