@@ -219,8 +219,9 @@ def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
     body = FORM.sub("", PAGE) if door.pairing.closed else PAGE
     body = OPEN_NETWORK.sub("", body) if door.encrypted else body
     body = body.replace("{told}", escape(told)) if told else TOLD.sub("", body).replace(AFTER_ERROR, 'hint"')
+    rest = "img-src data:; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
     headers = {
-        "content-security-policy": _policy(),
+        "content-security-policy": f"default-src 'none'; style-src {hash_source(STYLE)}; {rest}",
         "referrer-policy": "same-origin",  # else the form would be sent without its origin
         **({"retry-after": f"{wait_s:.0f}"} if wait_s else {}),
     }
@@ -234,8 +235,3 @@ def _told(door: Door, verdict: Verdict | None) -> str:
     if door.wait_s:
         return f"Too many wrong codes were typed. Wait {door.wait_s:.0f} seconds; the terminal shows a new code."
     return "This is not the code that the terminal shows now." if verdict == Verdict.WRONG else ""
-
-
-def _policy() -> str:
-    rest = "img-src data:; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
-    return f"default-src 'none'; style-src {hash_source(STYLE)}; {rest}"

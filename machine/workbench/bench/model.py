@@ -193,15 +193,10 @@ def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
 
 def _sides(low: Floats, high: Floats, label: str) -> tuple[Vector, Vector]:
     """The corners as a plan may have them, which end a box that reaches farther. Raises PlanError where nothing is left of it."""
-    least, most = (_side(corner) for corner in (low, high))
+    least, most = (vector_of(np.round(np.clip(corner, -MOST_MM, MOST_MM), BOX_DIGITS) + 0.0) for corner in (low, high))
     if not all(x < y for x, y in zip(least, most, strict=True)):
         corners = " and ".join(f"{key} [{', '.join(f'{x:g}' for x in at)}]" for key, at in (("min_mm", low), ("max_mm", high)))
         raise PlanError(
             f"{label}: its box would have {corners}: {-MOST_MM:g} to {MOST_MM:g} is allowed, and it must have a volume"
         )
     return least, most
-
-
-def _side(values: Floats) -> Vector:
-    values = np.clip(values, -MOST_MM, MOST_MM)
-    return vector_of(np.round(values, BOX_DIGITS) + 0.0)

@@ -103,11 +103,6 @@ def check_block(profile: Profile, key: str) -> None:
         raise ProfileError("; ".join(problems))
 
 
-def allowed_keys(part: int) -> set[str]:
-    """The keys of the process that a part may have of its own."""
-    return set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
-
-
 def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[str, Any]]:
     """Every key in its group (a matter, or a table of a machine): its label, level, unit, meaning, kind, range or choices, value,
     whether a person has changed it, and then what the profile has. part: of this part alone, what it may have of its own; 0: of
@@ -115,20 +110,18 @@ def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[st
     if part == 0:
         changed = set(map(key_of, given.settings))
         unchanged = {row["key"]: row["value"] for row in _all_rows(_unchanged(given))} if changed else {}
-        return [
-            {
-                **row,
-                "changed": row["key"] in changed,
-                "unchanged": unchanged.get(row["key"]) if row["key"] in changed else None,
-                "placeholders": _placeholders(row["key"], profile),
-            }
-            for row in _all_rows(profile)
-        ]
-    own, allowed = own_values(profile, part), allowed_keys(part)
-    rows, of_all = (_process_rows(sliced) for sliced in (profile.of_part(part), profile))
+        rows = list(_all_rows(profile))
+        for row in rows:
+            key = row["key"]
+            row |= {"changed": key in changed, "unchanged": unchanged.get(key) if key in changed else None}
+            # what a G-code block may name in braces
+            row["placeholders"] = list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
+        return rows
+    own, allowed = own_values(profile, part), set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
+    own_rows, of_all = (_process_rows(sliced) for sliced in (profile.of_part(part), profile))
     return [
         {**row, "changed": name in own, "unchanged": of_all[name]["value"] if name in own else None}
-        for name, row in rows.items()
+        for name, row in own_rows.items()
         if name in allowed
     ]
 
@@ -198,11 +191,6 @@ def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
         kind, value = "rows", rows_text(value)
     least, most = (next((way[word] for word in words if word in way), None) for words in BOUNDS)
     return {"kind": kind, "least": least, "most": most, "choices": way.get("enum", []), "value": value}
-
-
-def _placeholders(key: str, profile: Profile) -> list[str]:
-    """What a G-code block may name in braces; of any other key nothing."""
-    return list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
 
 
 def _sentence(model: type[Frozen]) -> str:

@@ -22,7 +22,6 @@ from machine.pipeline import compilers
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import Server
 from machine.printing.job import Does, PrintJob, Scene, Show
-from machine.printing.serial_log import SerialLog
 from machine.program import Program
 from mdp.kernels.workers import frame
 from profiles.errors import JournalError, PlanError
@@ -238,7 +237,7 @@ class AtPage:
     def show(self, scene: Scene) -> Iterator[Show]:
         """The print as its state. A print of which nothing changes, as a paused one on a server, is heard of all the same."""
         journal = "" if scene.journal is None else str(scene.journal.path)
-        self.tell(log=log_path(scene.log), journal=journal)
+        self.tell(log="" if scene.log.trouble else str(scene.log.file), journal=journal)
         if scene.uploads:
             self.tell(state=PrintState.UPLOADING)
         with nullcontext() if scene.server else stopping(self.stop):
@@ -274,8 +273,3 @@ class AtPage:
         """Whether the print has been stopped at once, at its end: the order was heard and is not waiting any more."""
         waiting = iter(self.commands.take, None)
         return self._halts.is_set() and all(request.command != Command.EMERGENCY_STOP for request in waiting)
-
-
-def log_path(log: SerialLog) -> str:
-    """The file of a log for the pages; "" for one that is not written."""
-    return "" if log.trouble else str(log.file)

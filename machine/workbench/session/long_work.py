@@ -76,7 +76,8 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
         return prices
 
     def accept(prices: dict[int, FrontRow]) -> None:
-        session.become(session.history.amended(with_prices(session.bench, prices)))
+        now = replace(session.history.now, bench=with_prices(session.bench, prices))
+        session.become(replace(session.history, now=now))
 
     prices_now = Derived(
         session, lambda bench: None if bench.priced else (bench.sought, bench.rows, bench.locked), price, accept=accept

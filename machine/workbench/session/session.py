@@ -97,6 +97,12 @@ class Session(SessionBase):
         if name not in self._named and len(name) <= LONGEST_SENTENCE:
             self._named = (*self._named, name)[-NAMES_KEPT:]
 
+    def described(self) -> dict[str, Any]:
+        """The bench as the pages of all are told of it."""
+        model = self.bench.model
+        work = self.busy or ("finding parts" if self.finding.progress else "slicing" if self.slicing.progress else "")
+        return {"name": "" if model is None else model.name, "parts": self.bench.parts, "work": work}
+
     async def close(self) -> str:
         """End all work, tell the pages, and keep the last change. Then the files that pages have sent go; where the change could
         not be kept they stay, and a sentence says why and where, else ""."""
@@ -398,14 +404,8 @@ class Workbench:
             self._list_again()
 
     def _list_again(self) -> None:
-        benches = [_described(number, session) for number, session in self.sessions.items()]
+        benches = [{"number": number, **session.described()} for number, session in self.sessions.items()]
         for session in self.sessions.values():
             if session.benches != benches:
                 session.benches = benches
                 session.notify()
-
-
-def _described(number: int, session: Session) -> dict[str, Any]:
-    model = session.bench.model
-    work = session.busy or ("finding parts" if session.finding.progress else "slicing" if session.slicing.progress else "")
-    return {"number": number, "name": "" if model is None else model.name, "parts": session.bench.parts, "work": work}
