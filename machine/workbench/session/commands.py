@@ -13,7 +13,6 @@ from machine.workbench.bench.changes import CHANGES, EDITS, MARKINGS, WORDS, mov
 from machine.workbench.bench.settings import with_name, with_typed, without_settings
 from machine.workbench.bench.values import Arguments, Asked, Direction, Mm, arguments_of, read_command
 from machine.workbench.session.session import Session
-from machine.workbench.work.cutting import SearchWay
 from mdp.ranking.ranker import CLASSIC
 from profiles.errors import PlanError, ProfileError
 from profiles.profile import SECTIONS
@@ -61,8 +60,8 @@ def dismiss(session: Session) -> None:
 
 
 def search(session: Session, *, orient: bool = True, ranker: str = CLASSIC) -> None:
-    """Find the parts; see SearchWay."""
-    session.finding.search(SearchWay(orient, ranker.strip() or CLASSIC))
+    """Find the parts, as `find_parts` does."""
+    session.finding.search(orient, ranker.strip() or CLASSIC)
 
 
 def slice_bench(session: Session) -> None:

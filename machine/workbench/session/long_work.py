@@ -9,9 +9,10 @@ import numpy as np
 from machine.program import Alternative
 from machine.workbench.bench.bench import Bench, locked_plan, rows_to_price, with_front, with_prices, with_rotation
 from machine.workbench.session.base import WAITING, Derived, SessionBase
-from machine.workbench.work.cutting import Found, Searched, SearchWay
+from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.slices import Sliced, SlicesSoFar
 from mdp.decomposition import FrontRow
+from mdp.ranking.ranker import CLASSIC
 from profiles.errors import PlanError, UserError
 from profiles.frozen import Vector
 
@@ -26,20 +27,20 @@ class Finding(Derived[Found]):
     def __init__(self, session: SessionBase) -> None:
         self.notes: tuple[str, ...] = ()
         self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
-        self._way = SearchWay()
+        self._how = True, CLASSIC
         super().__init__(
             session,
             lambda bench: None if bench.model is None else (bench.sought, locked_plan(bench).parts),
-            lambda bench: session.long.run("find_parts", bench, self._way, tell=self.teller()),
+            lambda bench: session.long.run("find_parts", bench, *self._how, tell=self.teller()),
             by_itself=False,
             interrupts=True,
             accept=self._accept_found,
         )
 
-    def search(self, way: SearchWay) -> None:
+    def search(self, orient: bool = True, ranker: str = CLASSIC) -> None:
         """Search for the parts of the model on the bench, if no search is under way."""
         if self.progress is None:
-            self._way = way
+            self._how = orient, ranker
             self.begin(Searched(WAITING if self._session.long.pool.full else "beginning"))
 
     def interrupted(self) -> None:

@@ -60,15 +60,6 @@ class Searched:
     best: FrontRow | None = None
 
 
-@dataclass(frozen=True)
-class SearchWay:
-    """How parts are sought, beside what the profile says. orient: lay the model down in the cheapest orientation, chosen with
-    them, unless a person has turned the model or locked or marked something on it; ranker: a name for `ranker_named`."""
-
-    orient: bool = True
-    ranker: str = CLASSIC
-
-
 @dataclass(frozen=True, eq=False)
 class Found:
     """The front of a search and what it says; turn: (3, 3) how the model on the bench is turned further for it."""
@@ -78,9 +69,13 @@ class Found:
     turn: Floats | None = None
 
 
-def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
-    """What a search as `decompose` makes it has found. Raises UserError."""
-    ranker_named(way.ranker)
+def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLASSIC) -> Found:
+    """What a search as `decompose` makes it has found. Raises UserError.
+
+    orient: lay the model down in the cheapest orientation, chosen with the parts, unless a person has turned the model or locked
+    or marked something on it; ranker: a name for `ranker_named`.
+    """
+    ranker_named(ranker)
     assert bench.model is not None
     tell(Searched(f"reading {bench.model.faces:,} faces"))
     mesh, name, profile, locked = turned_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
@@ -106,11 +101,11 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
 
         by_hand = with_shapes(bench, locked, candidate)
         return decompose(
-            candidate, name, profile, SearchRequest(ranker=way.ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
+            candidate, name, profile, SearchRequest(ranker=ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
         )
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
-    if way.orient and untouched and lies_freely(profile):
+    if orient and untouched and lies_freely(profile):
         tell(Searched(f"weighing the ways in which {len(mesh.faces):,} faces may lie"))
         oriented = orient_and_decompose(mesh, profile, pricing, search)
         turn = None if oriented.orientation is None else oriented.orientation.rotation

@@ -17,7 +17,7 @@ from machine.workbench.bench.bench import Bench, with_front, with_profile
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
-from machine.workbench.work.cutting import Found, Searched, SearchWay
+from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
 from machine.workbench.work.tasks import TASKS
 from machine.workbench.work.worker_pool import WorkerPools
@@ -201,7 +201,7 @@ def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_tol
             return replace(best, time_s=60.0) if task == "price_row" else await asyncio.sleep(9.0)
 
         session.long.run = price  # type: ignore[method-assign]
-        session.finding.search(SearchWay())
+        session.finding.search()
         await asyncio.sleep(0)
         session.finding.progress = Searched("", best)
         session.stop()()
