@@ -63,13 +63,13 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Trial:
-    """parts: those that could be cut off, from the second in print order on, None for the others. refused: why the part of this
+    """parts: those that could be cut off, from the second in print order on, None for the others. rejected: why the part of this
     number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can. unchecked:
     how many parts, from the second on, have not been looked at yet: they may still be rejected, the figures stand."""
 
     parts: tuple[PartForecast | None, ...]
-    refused_part: int = 0
-    refused: str = ""
+    rejected_part: int = 0
+    rejected: str = ""
     support_area_mm2: float | None = None
     seam_mm: float | None = None
     obstacle: Obstacle | None = None
@@ -124,7 +124,7 @@ class Trials:
     def nearest(self, planes: Sequence[Plane], number: int) -> Plane | None:
         """The plane of the part of a number at the nearest place along its normal where all planes can be cut, else leaning by a
         few degrees; None: there is none among MOST_TRIED places. planes as in attempt."""
-        if not self.attempt(planes).refused:
+        if not self.attempt(planes).rejected:
             return planes[number - 2]
         if not self._cut_later(planes, number):
             return None
@@ -145,7 +145,7 @@ class Trials:
 
     def _can_take(self, planes: Sequence[Plane], number: int, plane: Plane) -> bool:
         """Whether all planes can be cut with another one for the part of a number."""
-        return not self.attempt((*planes[: number - 2], plane, *planes[number - 1 :])).refused
+        return not self.attempt((*planes[: number - 2], plane, *planes[number - 1 :])).rejected
 
     def _cut_later(self, planes: Sequence[Plane], number: int) -> bool:
         """Cut off the parts printed after that of a number; whether that can be done."""

@@ -18,7 +18,7 @@ from typing import Any
 from starlette.responses import HTMLResponse
 
 from machine.view.page import hash_source
-from machine.workbench.work.observable import Observable
+from machine.workbench.session.base import Observable
 from profiles.errors import PlanError
 from profiles.messages import option
 
@@ -174,14 +174,14 @@ class Door(Observable):
         same = [device for device in self.devices if secrets.compare_digest(device.digest, digest)]
         return same[0] if same else None
 
-    def unpair(self, number: object) -> None:
+    def unpair(self, *, device: int) -> None:
         """Let a device go: its lines end now. Raises PlanError where it is not there."""
-        device = next((device for device in self.devices if device.number == number), None)
-        if device is None:
+        paired = next((paired for paired in self.devices if paired.number == device), None)
+        if paired is None:
             raise PlanError("this device is not paired any more")
-        self.devices.remove(device)
-        device.gone.set()
-        self._say(f"{device.name} is not paired any more")
+        self.devices.remove(paired)
+        paired.gone.set()
+        self._say(f"{paired.name} is not paired any more")
         self.notify()
 
     def reopen(self) -> None:
@@ -223,8 +223,9 @@ def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
     body = FORM.sub("", PAGE) if door.pairing.closed else PAGE
     body = OPEN_NETWORK.sub("", body) if door.encrypted else body
     body = body.replace("{told}", escape(told)) if told else TOLD.sub("", body).replace(AFTER_ERROR, 'hint"')
+    rest = "img-src data:; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
     headers = {
-        "content-security-policy": _policy(),
+        "content-security-policy": f"default-src 'none'; style-src {hash_source(STYLE)}; {rest}",
         "referrer-policy": "same-origin",  # else the form would be sent without its origin
         **({"retry-after": f"{wait_s:.0f}"} if wait_s else {}),
     }
@@ -238,8 +239,3 @@ def _told(door: Door, verdict: Verdict | None) -> str:
     if door.wait_s:
         return f"Too many wrong codes were typed. Wait {door.wait_s:.0f} seconds; the terminal shows a new code."
     return "This is not the code that the terminal shows now." if verdict == Verdict.WRONG else ""
-
-
-def _policy() -> str:
-    rest = "img-src data:; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
-    return f"default-src 'none'; style-src {hash_source(STYLE)}; {rest}"

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -119,10 +118,6 @@ class History:
             return self
         return History(self.before[-1], self.before[:-1], (*self.undone, self.now))
 
-    def amended(self, bench: Bench) -> "History":
-        """The same step with more known of its bench."""
-        return replace(self, now=replace(self.now, bench=bench))
-
     def redo(self) -> "History":
         """One step forward again; unchanged where there is none."""
         if not self.undone:
@@ -208,7 +203,7 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
         return replace(bench, cuts=before.cuts)
     start = _placing(before)
     if turn is not None:
-        start = start.after(Placing.of(before.model.mesh(), turn, 0.0))
+        start = start.after(Placing.of(before.model, turn, 0.0))
     move = _placing(bench, factor).after(start)
     planes = {part: moved_part(part, move) for part in before.cuts or ()}
     cuts = None if before.cuts is None else tuple(planes[part] for part in before.cuts)
@@ -219,29 +214,26 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
 def _placing(bench: Bench, factor: float = 1.0) -> Placing:
     """How the model on a bench stands on the platform."""
     assert bench.model is not None
-    return Placing.of(bench.model.mesh(), bench.turned, bench.profile.search.pedestal_mm, factor)
+    return Placing.of(bench.model, bench.turned, bench.profile.search.pedestal_mm, factor)
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """The front of a search, cut by the row that it has chosen. A limb may be named by another point there than it was before."""
+    """The front of a search with its prices, cut by the row that it has chosen. A limb may be named by another point there than
+    it was before."""
     chosen = next(row for row in rows if row.chosen)
     parts = planned_parts(chosen)
-    same_cuts = {before: _same_cuts(before, parts) for before in bench.cuts or ()}
-    names = {before: min(same, key=partial(_apart_mm, before)) for before, same in same_cuts.items() if same}
+    names = {before: _same_cut(before, parts) for before in bench.cuts or ()}
     cuts, locked = (tuple(names.get(part, part) for part in several) for several in (bench.cuts or (), bench.locked))
-    named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked))
+    named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked), priced=True)
     return with_cuts(named, parts)
 
 
-def _same_cuts(part: PlannedPart, parts: Sequence[PlannedPart]) -> list[PlannedPart]:
-    """The parts that have the plane of one and as many limbs above it."""
+def _same_cut(part: PlannedPart, parts: Sequence[PlannedPart]) -> PlannedPart:
+    """The part that has the plane of another and as many limbs above it, named by the nearest points; else that other."""
     plane = part.normal, part.offset_mm, len(part.limbs_mm)
-    return [other for other in parts if (other.normal, other.offset_mm, len(other.limbs_mm)) == plane]
-
-
-def _apart_mm(part: PlannedPart, other: PlannedPart) -> float:
-    """How far the points that name the limbs of two parts are from each other."""
-    return float(np.linalg.norm(np.array(part.limbs_mm) - np.array(other.limbs_mm)))
+    same = [other for other in parts if (other.normal, other.offset_mm, len(other.limbs_mm)) == plane]
+    limbs_mm = np.array(part.limbs_mm)
+    return min(same, key=lambda other: float(np.linalg.norm(np.array(other.limbs_mm) - limbs_mm)), default=part)
 
 
 def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:

@@ -113,13 +113,13 @@ class Placing:
     shift_mm: Floats
 
     @classmethod
-    def of(cls, mesh: Mesh, turned: Floats | None, lift_mm: float, factor: float = 1.0) -> "Placing":
-        """A mesh set on the platform, or on a pedestal. turned: None, it stands as it is read; factor: by how much it was scaled
+    def of(cls, model: Model, turned: Floats | None, lift_mm: float, factor: float = 1.0) -> "Placing":
+        """A model set on the platform, or on a pedestal. turned: None, it stands as it is read; factor: by how much it was scaled
         when it was read."""
         lift = np.array([0.0, 0.0, lift_mm])
         if turned is None:
             return cls(np.eye(3), factor, lift)
-        places = mesh.vertices @ turned.T
+        places = model.mesh().vertices @ turned.T
         low, high = places.min(axis=0), places.max(axis=0)
         return cls(turned, factor, lift - (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]))
 
@@ -193,15 +193,10 @@ def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
 
 def _sides(low: Floats, high: Floats, label: str) -> tuple[Vector, Vector]:
     """The corners as a plan may have them, which end a box that reaches farther. Raises PlanError where nothing is left of it."""
-    least, most = (_side(corner) for corner in (low, high))
+    least, most = (vector_of(np.round(np.clip(corner, -MOST_MM, MOST_MM), BOX_DIGITS) + 0.0) for corner in (low, high))
     if not all(x < y for x, y in zip(least, most, strict=True)):
         corners = " and ".join(f"{key} [{', '.join(f'{x:g}' for x in at)}]" for key, at in (("min_mm", low), ("max_mm", high)))
         raise PlanError(
             f"{label}: its box would have {corners}: {-MOST_MM:g} to {MOST_MM:g} is allowed, and it must have a volume"
         )
     return least, most
-
-
-def _side(values: Floats) -> Vector:
-    values = np.clip(values, -MOST_MM, MOST_MM)
-    return vector_of(np.round(values, BOX_DIGITS) + 0.0)

@@ -29,16 +29,21 @@ ORDER = ("process", "material", "search", "machine")  # what is changed most com
 BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
 
 
+def key_of(setting: str) -> str:
+    """The key of a setting KEY=VALUE."""
+    return setting.partition("=")[0].strip()
+
+
 def with_setting(given: Given, key: str, value: str | None) -> Given:
     """The same with another value for a key, spelled in one line; None: as the profile has it."""
-    others = tuple(setting for setting in given.settings if setting.partition("=")[0].strip() != key)
+    others = tuple(setting for setting in given.settings if key_of(setting) != key)
     return replace(given, settings=others if value is None else (*others, f"{key}={_in_one_line(value)}"))
 
 
 def with_given(given: Given, inside: Given) -> Given:
     """The same with another material and further settings, which replace those of the same keys."""
-    keys = {setting.partition("=")[0].strip() for setting in inside.settings}
-    others = (setting for setting in given.settings if setting.partition("=")[0].strip() not in keys)
+    keys = set(map(key_of, inside.settings))
+    others = (setting for setting in given.settings if key_of(setting) not in keys)
     return replace(given, material=inside.material, settings=(*others, *inside.settings))
 
 
@@ -99,32 +104,25 @@ def check_block(profile: Profile, key: str) -> None:
         raise ProfileError("; ".join(problems))
 
 
-def allowed_keys(part: int) -> set[str]:
-    """The keys of the process that a part may have of its own."""
-    return set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
-
-
 def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[str, Any]]:
     """Every key in its group (a matter, or a table of a machine): its label, level, unit, meaning, kind, range or choices, value,
     whether a person has changed it, and then what the profile has. part: of this part alone, what it may have of its own; 0: of
     all."""
     if part == 0:
-        changed = {setting.partition("=")[0].strip() for setting in given.settings}
+        changed = set(map(key_of, given.settings))
         unchanged = {row["key"]: row["value"] for row in _all_rows(_unchanged(given))} if changed else {}
-        return [
-            {
-                **row,
-                "changed": row["key"] in changed,
-                "unchanged": unchanged.get(row["key"]) if row["key"] in changed else None,
-                "placeholders": _placeholders(row["key"], profile),
-            }
-            for row in _all_rows(profile)
-        ]
-    own, allowed = own_values(profile, part), allowed_keys(part)
-    rows, of_all = (_process_rows(sliced) for sliced in (profile.of_part(part), profile))
+        rows = list(_all_rows(profile))
+        for row in rows:
+            key = row["key"]
+            row |= {"changed": key in changed, "unchanged": unchanged.get(key) if key in changed else None}
+            # what a G-code block may name in braces
+            row["placeholders"] = list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
+        return rows
+    own, allowed = own_values(profile, part), set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
+    own_rows, of_all = (_process_rows(sliced) for sliced in (profile.of_part(part), profile))
     return [
         {**row, "changed": name in own, "unchanged": of_all[name]["value"] if name in own else None}
-        for name, row in rows.items()
+        for name, row in own_rows.items()
         if name in allowed
     ]
 
@@ -196,11 +194,6 @@ def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
     return {"kind": kind, "least": least, "most": most, "choices": way.get("enum", []), "value": value}
 
 
-def _placeholders(key: str, profile: Profile) -> list[str]:
-    """What a G-code block may name in braces; of any other key nothing."""
-    return list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
-
-
 def _sentence(model: type[Frozen]) -> str:
     """The first sentence of what a table says of itself."""
     return (model.__doc__ or "").strip().partition("\n\n")[0].replace("\n    ", " ").rstrip(".")
@@ -222,7 +215,7 @@ def export_command(bench: Bench) -> str:
     words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
     settings = list(given.settings)
     if not bench.planned and bench.turned is not None:
-        settings = [setting for setting in settings if setting.partition("=")[0].strip() != "process.rotate_deg"]
+        settings = [setting for setting in settings if key_of(setting) != "process.rotate_deg"]
         settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.12g}' for angle in turns_deg(bench))}]")
     words += [word for setting in settings for word in ("--set", setting)]
     if bench.model.plate is not None:

@@ -1,10 +1,11 @@
 """Values: what typed commands of a page are made of; what they do not allow is refused in a sentence like those of profiles."""
 
-from collections.abc import Iterable
-from typing import Annotated, Any, ClassVar, Self, TypeGuard
+from collections.abc import Callable, Iterable, Mapping
+from inspect import Parameter, signature
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from mdp.plane import unit_direction
 from profiles.errors import PlanError
@@ -13,7 +14,6 @@ from profiles.wording import sentences
 
 Asked = dict[str, Any]  # a command `{"do": NAME, ...}` as it comes from a page
 MOST_MM = 1e5
-MOST_NUMBER = 1e300  # an int of a page may be longer than any float
 ROTATION_ERROR = 1e-6
 
 
@@ -38,21 +38,32 @@ Row = Annotated[tuple[float, float, float], Field(strict=False)]
 Rotation = Annotated[tuple[Row, Row, Row], Field(strict=False), AfterValidator(_rotation)]
 
 
-class Command(BaseModel):
-    """What a page asks for. `do` of each kind is its name; what else a page may say is not read. word: for its step in the
-    history."""
+class Arguments(BaseModel):
+    """What a page sends with a command. What its function does not take, as the name of the page, is not read."""
 
     model_config = ConfigDict(frozen=True, strict=True, allow_inf_nan=False)
-    word: ClassVar[str] = ""
-    do: str
 
-    @classmethod
-    def of(cls, asked: Asked) -> Self:
-        """The command that a page has sent. Raises PlanError."""
-        try:
-            return cls.model_validate(asked)
-        except ValidationError as error:
-            raise PlanError(sentences(error.errors(), cls)[0]) from None
+
+def arguments_of(command: Callable[..., Any], base: type[Arguments] = Arguments) -> type[Arguments]:
+    """The type of what a page sends with a command: the keyword-only parameters of the function that does it, beside the base."""
+    parameters = [given for given in signature(command).parameters.values() if given.kind is Parameter.KEYWORD_ONLY]
+    fields: dict[str, Any] = {
+        given.name: (given.annotation, ... if given.default is Parameter.empty else given.default) for given in parameters
+    }
+    return create_model(command.__name__, __base__=base, **fields)
+
+
+def read_command(asked: Asked, commands: Mapping[str, type[Arguments]]) -> tuple[str, Arguments]:
+    """The name of a command that a page has sent, and its arguments. Raises PlanError."""
+    name = asked.get("do")
+    if not isinstance(name, str):
+        raise PlanError("what the page has sent names no command: docs/workbench.md lists them")
+    if name not in commands:
+        raise PlanError(f"{name!r} is no command: docs/workbench.md lists them")
+    try:
+        return name, commands[name].model_validate(asked)
+    except ValidationError as error:
+        raise PlanError(sentences(error.errors(), commands[name])[0]) from None
 
 
 def check_number(key: str, value: int, least: int, most: int) -> int:
@@ -61,16 +72,6 @@ def check_number(key: str, value: int, least: int, most: int) -> int:
         allowed = f"{least} to {most} is allowed" if least <= most else "there is none yet"
         raise PlanError(f"{key} is {value}: {allowed}")
     return value
-
-
-def is_number(value: Any) -> TypeGuard[int | float]:
-    """Whether a value of a page's is a number to reckon with: no more digits than a float has."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MOST_NUMBER
-
-
-def is_small_number(text: str) -> bool:
-    """Whether the text of an address is a number of so few digits that it may be one of ours."""
-    return text.isascii() and text.isdigit() and len(text) < 6
 
 
 def vector_of(values: Iterable[float]) -> Vector:

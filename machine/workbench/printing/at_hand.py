@@ -87,7 +87,9 @@ class Hand:
             except Empty:
                 if monotonic() - self._asked_s > IDLE_S:
                     return "nothing was asked for half an hour; the heaters are off"
-                self._listen()
+                self._session.listen()
+                if monotonic() - self._looked_s > LOOK_S:
+                    self._look()
                 continue
             self._asked_s = monotonic()
             if command.does == HandDoes.LET_GO and command.keep_heat:
@@ -98,11 +100,6 @@ class Hand:
                 break
             self._do(command)
         return LET_GO
-
-    def _listen(self) -> None:
-        self._session.listen()
-        if monotonic() - self._looked_s > LOOK_S:
-            self._look()
 
     def _look(self) -> None:
         """Ask after temperatures and place, and tell them."""

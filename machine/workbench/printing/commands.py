@@ -1,101 +1,89 @@
-"""Commands: all that a page may ask of the prints, by name: whose each is, and what does it."""
+"""Commands: all that a page may ask of the prints, by name: who may ask it, and what does it.
 
-from collections.abc import Awaitable, Callable, Coroutine
+A page sends `{"do": NAME, ...}`; the keyword-only parameters of the function of that name are what else it sends.
+"""
+
+import asyncio
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from machine.cli.terminal.options import machine_profile
-from machine.link.pending_commands import Command as LinkCommand
-from machine.link.print_state import PrintState
 from machine.pipeline.programs import refuse_errors
 from machine.pipeline.requests import BAUD
 from machine.printing.checks import check_destination
 from machine.printing.destination import Destination, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
-from machine.workbench.bench.values import Asked, is_number
-from machine.workbench.printing.at_page import HandCommand, HandDoes
-from machine.workbench.printing.job_state import Slices
+from machine.workbench.bench.values import Arguments, Asked, arguments_of, read_command
+from machine.workbench.printing.at_page import Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.running_print import RunningPrint
+from machine.workbench.session.base import in_loop
 from machine.workbench.session.commands import Need, check_need
 from machine.workbench.session.session import Session
 from profiles.errors import JournalError, PlanError, PrinterError
 
 LONGEST_PORT = 300  # letters
-
-
 Work = Coroutine[Any, Any, None]
-OnBench = Callable[[Callable[[], Any]], Awaitable[Any]]  # calls a function in the event loop of the benches
+
+
+class OfPrint(Arguments):
+    """print: the number of the print that is meant."""
+
+    print: int
 
 
 @dataclass(frozen=True)
 class PageOfPrints:
-    """A page that asks: its name, its bench, the prints, and the way to ask the bench.
+    """A page that asks: its name, its bench, the prints, and the event loop of the benches.
 
-    The prints have an event loop of their own, so the session is read by on_bench alone: what is read at two moments from here
-    may be of two benches.
+    The prints have an event loop of their own, so the session is read in that of the benches alone: what is read at two moments
+    from here may be of two benches.
     """
 
     name: str
     session: Session
     prints: Prints
-    on_bench: OnBench
+    benches: asyncio.AbstractEventLoop
 
-
-# Returns work that is still to be awaited where the bench must be asked; raises UserError for what cannot be done, as that does.
-Command = Callable[[PageOfPrints, Asked], Work | None]
-
-
-def _begin(job: Callable[[Asked], PrintJob]) -> Command:
-    return lambda page, asked: page.prints.begin(page.name, job(asked))
-
-
-def _begin_from_bench(job: Callable[[Session, Asked], PrintJob]) -> Command:
-    async def command(page: PageOfPrints, asked: Asked) -> None:
-        page.prints.begin(page.name, await page.on_bench(partial(job, page.session, asked)))
-        page.prints.notify()
-
-    return command
-
-
-def _of_print(act: Callable[[RunningPrint, Asked], None], on_server: bool = False, over: bool = False) -> Command:
-    """One of a print that only the page that commands it may ask for. on_server: only there; over: only when nothing goes on."""
-
-    def command(page: PageOfPrints, asked: Asked) -> None:
-        meant = page.prints.numbered(asked.get("print"))
-        if meant.holder != page.name:
+    def commanded(self, number: int) -> RunningPrint:
+        """The print of a number, which this page commands. Raises PrinterError where another page does, or it is not there."""
+        running = self.prints.numbered(number)
+        if running.holder != self.name:
             raise PrinterError("another page commands this print: take the command over first")
-        if (on_server and not meant.state.server) or (over and not meant.over):
-            raise PrinterError("what the page has sent is no command of a print")
-        act(meant, asked)
-
-    return command
+        return running
 
 
-def _passed_on(command: LinkCommand) -> Command:
-    return _of_print(lambda meant, asked: meant.say((command, float(_whole(asked, "percent", 100)))))
+def ports(page: PageOfPrints, *, baud: int = BAUD) -> None:
+    """Look for printers."""
+    page.prints.look_for_ports(baud)
 
 
-def _take(page: PageOfPrints, asked: Asked) -> None:
-    page.prints.numbered(asked.get("print")).holder = page.name
+def journals(page: PageOfPrints) -> None:
+    """Look for prints that were cut off."""
+    page.prints.look_for_journals()
 
 
-def _forget(page: PageOfPrints, asked: Asked) -> None:
-    _of_print(lambda meant, asked: page.prints.prints.remove(meant), over=True)(page, asked)
+async def check(
+    page: PageOfPrints,
+    *,
+    port: str = "",
+    baud: int = BAUD,
+    sim_speed: float = 0.0,
+    force: bool = False,
+    send_only: bool = False,
+) -> None:
+    """Check and prepare a print of the slices on the page's bench. send_only: a print server is only to keep the file."""
+    destination = _destination(port, baud, sim_speed)
+    if send_only:
+        destination = parse_server_address(destination.name)
+    page.prints.begin(page.name, await in_loop(page.benches, job_of(page.session, destination, force, not send_only)))
 
 
-def _slices(session: Session, asked: Asked) -> PrintJob:
-    """A print of the slices on the page's bench."""
-    sends_only = asked.get("send_only") is True
-    destination = _server(asked) if sends_only else _destination(asked)
-    return job_of(session, destination, asked.get("force") is True, not sends_only)
-
-
-def job_of(session: Session, destination: Destination, force: bool, starts: bool = True) -> PrintJob:
-    """Make a job of the slices on a bench. Called in the session's event loop, so that all of it is of one moment. What is known
-    before a printer is asked is refused here.
+async def job_of(session: Session, destination: Destination, force: bool, starts: bool = True) -> PrintJob:
+    """Make a job of the slices on a bench. Runs in the sessions' event loop without a pause, so that all of it is of one moment.
+    What is known before a printer is asked is refused here.
 
     force: go past errors of the dry run. Raises PlanError where there are no slices of what lies there now, PrinterError for a
     machine that cannot print there, MoveError where the dry run found errors.
@@ -114,82 +102,98 @@ def job_of(session: Session, destination: Destination, force: bool, starts: bool
     return PrintJob(destination, Does.PRINT, name, load, known.profile, starts, force, key=sliced.key)
 
 
-def _rest(asked: Asked) -> PrintJob:
-    """The rest of a print that was cut off."""
-    journal, machine = (str(asked.get(key) or "").strip() for key in ("journal", "machine"))
+def go_on(
+    page: PageOfPrints, *, journal: str = "", machine: str = "", port: str = "", baud: int = BAUD, sim_speed: float = 0.0
+) -> None:
+    """Ask the printer where it stands, to print the rest of a print that was cut off."""
+    journal, machine = journal.strip(), machine.strip()
     if not journal:
         raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")
     for name in (journal, machine):
         if "\0" in name:
             raise JournalError(f"{name!r:.100} is no file's name: it has a character that no name has")
     profile = machine_profile(machine) if machine else None
-    return PrintJob(_destination(asked), Does.RESUME, profile=profile, cut_off=Path(journal).absolute())
+    destination = _destination(port, baud, sim_speed)
+    page.prints.begin(page.name, PrintJob(destination, Does.RESUME, profile=profile, cut_off=Path(journal).absolute()))
 
 
-def _hand(session: Session, asked: Asked) -> PrintJob:
-    """The printer by hand, as the machine and the material of the page's bench are."""
-    return PrintJob(_destination(asked), Does.HAND, profile=session.bench.profile.of_all_parts)
+def follow(page: PageOfPrints, *, port: str = "") -> None:
+    """Follow what a print server prints already."""
+    page.prints.begin(page.name, PrintJob(parse_server_address(_destination(port).name), Does.FOLLOW))
 
 
-def _by_hand(meant: RunningPrint, asked: Asked) -> None:
-    does, axis, by_mm = str(asked.get("does")), str(asked.get("axis") or ""), asked.get("by_mm", 0.0)
-    if does not in set(HandDoes) or meant.state.state is not PrintState.IN_HAND or not is_number(by_mm):
-        raise PrinterError("this cannot be done by hand now")
-    meant.say((HandCommand(HandDoes(does), axis[:1], float(by_mm), asked.get("keep_heat") is True),))
+async def hand(page: PageOfPrints, *, port: str = "", baud: int = BAUD, sim_speed: float = 0.0) -> None:
+    """Take a printer in hand, as the machine and the material of the page's bench are."""
+
+    async def job() -> PrintJob:
+        return PrintJob(_destination(port, baud, sim_speed), Does.HAND, profile=page.session.bench.profile.of_all_parts)
+
+    page.prints.begin(page.name, await in_loop(page.benches, job()))
 
 
-def _server(asked: Asked) -> Destination:
-    return parse_server_address(_destination(asked).name)
+def emergency(page: PageOfPrints, *, print: Any = None) -> None:
+    """Stop a print at once, or without a number all; every page may."""
+    page.prints.stop_at_once(print)
 
 
-def _destination(asked: Asked) -> Destination:
-    """Where to print, as the options --port, --baud and --sim-speed say. Raises PrinterError.
-
-    A server's address is read here, for all pages are told of a print's port: a password in it must not come so far."""
-    port = str(asked.get("port") or "").strip()
-    if not port or len(port) > LONGEST_PORT:
-        raise PrinterError("no printer is chosen: choose a port, or sim for the simulated one")
-    baud, speed = asked.get("baud", BAUD), asked.get("sim_speed", 0.0)
-    if not is_number(baud) or not is_number(speed) or baud != int(baud):
-        raise PrinterError(f"baud {str(baud)[:40]}, sim_speed {str(speed)[:40]}: numbers are expected, a whole one for the rate")
-    return parse_destination(port, int(baud), float(speed))
+def take(page: PageOfPrints, *, print: int) -> None:
+    """Take the command of a print over."""
+    page.prints.numbered(print).holder = page.name
 
 
-def _whole(asked: Asked, key: str, otherwise: int) -> int:
-    value = asked.get(key, otherwise)
-    if not is_number(value) or value != int(value):
-        raise PrinterError(f"{key} is {str(value)[:40]!r}: a whole number is expected")
-    return int(value)
+def forget(page: PageOfPrints, *, print: int) -> None:
+    """Take a print that is over off the list."""
+    running = page.commanded(print)
+    if not running.over:
+        raise PrinterError("what the page has sent is no command of a print")
+    page.prints.prints.remove(running)
 
 
-COMMANDS: dict[str, Command] = {
-    "ports": lambda page, asked: page.prints.look_for_ports(_whole(asked, "baud", BAUD)),
-    "journals": lambda page, asked: page.prints.look_for_journals(),
-    "check": _begin_from_bench(_slices),
-    "go_on": _begin(_rest),
-    "follow": _begin(lambda asked: PrintJob(_server(asked), Does.FOLLOW)),
-    "hand": _begin_from_bench(_hand),
-    "by_hand": _of_print(_by_hand),
-    "emergency": lambda page, asked: page.prints.stop_at_once(asked.get("print")),
-    "take": _take,
-    "begin": _of_print(lambda meant, asked: meant.begin()),
-    "cancel": _of_print(lambda meant, asked: meant.cancel()),
-    "leave": _of_print(lambda meant, asked: meant.leave(), on_server=True),
-    "pause": _passed_on(LinkCommand.PAUSE),
-    "resume": _passed_on(LinkCommand.RESUME),
-    "feed": _passed_on(LinkCommand.FEED),
-    "flow": _passed_on(LinkCommand.FLOW),
-    "forget": _forget,
+FUNCTIONS: dict[str, Callable[..., Work | None]] = {
+    "ports": ports,
+    "journals": journals,
+    "check": check,
+    "go_on": go_on,
+    "follow": follow,
+    "hand": hand,
+    "emergency": emergency,
+    "take": take,
+    "forget": forget,
+}
+# Those of a print, which only the page that commands it may ask for.
+OF_PRINT: dict[str, Callable[..., None]] = {
+    "begin": RunningPrint.begin,
+    "cancel": RunningPrint.cancel,
+    "leave": RunningPrint.leave,
+    "pause": RunningPrint.pause,
+    "resume": RunningPrint.resume,
+    "feed": RunningPrint.feed,
+    "flow": RunningPrint.flow,
+    "by_hand": RunningPrint.by_hand,
+}
+COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()} | {
+    name: arguments_of(function, OfPrint) for name, function in OF_PRINT.items()
 }
 
 
 def obey(page: PageOfPrints, asked: Asked) -> Work | None:
     """Do what a page asks for, `{"do": NAME, ...}`. Returns the work that is left where its bench must be asked first. Raises
     UserError for what cannot be done, as that work does."""
-    name = asked.get("do")
-    command = COMMANDS.get(name) if isinstance(name, str) else None
-    if command is None:
-        raise PrinterError("what the page has sent is no command of a print")
-    work = command(page, asked)
+    name, arguments = read_command(asked, COMMANDS)
+    given, work = dict(arguments), None
+    if name in OF_PRINT:
+        OF_PRINT[name](page.commanded(given.pop("print")), **given)
+    else:
+        work = FUNCTIONS[name](page, **given)
     page.prints.notify()
     return work
+
+
+def _destination(port: str, baud: int = BAUD, sim_speed: float = 0.0) -> Destination:
+    """Where to print, as the options --port, --baud and --sim-speed say. Raises PrinterError.
+
+    A server's address is read here, for all pages are told of a print's port: a password in it must not come so far."""
+    port = port.strip()
+    if not port or len(port) > LONGEST_PORT:
+        raise PrinterError("no printer is chosen: choose a port, or sim for the simulated one")
+    return parse_destination(port, baud, sim_speed)

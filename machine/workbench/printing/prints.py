@@ -24,7 +24,7 @@ from machine.printing.job import PrintJob
 from machine.printing.journal_folder import ResumableJournal, resumable_journals
 from machine.printing.ports import answer_words, ask_ports, known_ports, port_json
 from machine.workbench.printing.running_print import RunningPrint
-from machine.workbench.work.observable import Observable
+from machine.workbench.session.base import Observable
 from profiles.errors import OutputError, PrinterError
 from profiles.folders import state_folder
 
@@ -116,6 +116,7 @@ class Prints(Observable):
         begun = RunningPrint(self._last, job, page, self.notify)
         self.prints.append(begun)
         self._start(self._print(begun))
+        self.notify()
 
     def _forget_old(self, at: Destination) -> None:
         """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:

@@ -24,8 +24,7 @@ from machine.printing.resumption import print_rest, read_resumption, rest_of
 from machine.printing.server_print import ServerPrinter, file_name, running_print
 from machine.quantities import filament_g, price_in_words
 from machine.workbench.printing.at_hand import by_hand
-from machine.workbench.printing.at_page import AtPage, StateReporter
-from machine.workbench.printing.job_state import first_state
+from machine.workbench.printing.at_page import AtPage, StateReporter, first_state
 from mdp.kernels.workers import listen, read_frames, take_pipes
 from profiles.errors import ServerError, UserError
 

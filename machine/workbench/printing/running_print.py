@@ -5,6 +5,9 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from time import time
+from typing import Annotated
+
+from pydantic import Field
 
 from machine.crash import bug_in_words
 from machine.link.pending_commands import Command
@@ -13,15 +16,16 @@ from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.rescue import cancel_on_server, rescue
 from machine.printing.servers.gcode_upload import server_name
-from machine.workbench.printing.at_page import BEGIN, LEAVE
-from machine.workbench.printing.job_state import JobState, first_state
-from machine.workbench.work.heard import heard
+from machine.workbench.printing.at_page import BEGIN, LEAVE, HandCommand, HandDoes, JobState, first_state
+from machine.workbench.work.worker_pool import heard
 from mdp.kernels.workers import Interpreter
 from profiles.errors import PrinterError, UserError
 
 MAIN = "from machine.workbench.printing.process import main; main()"
 EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
 LEAVE_S = 5.0  # so long a print that is not to go on has to let go of its port
+Percent = Annotated[int, Field(ge=0, le=10_000)]
+HandWord = Annotated[HandDoes, Field(strict=False)]  # a text in JSON
 DIED = "the process that printed has ended before the print was done"
 
 
@@ -105,8 +109,32 @@ class RunningPrint:
             asyncio.get_running_loop().call_later(LEAVE_S, self._kill)
 
     def leave(self) -> None:
-        """Let a print server go on with it by itself."""
+        """Let a print server go on with it by itself. Raises PrinterError for a print that is on none."""
+        if not self.state.server:
+            raise PrinterError("what the page has sent is no command of a print")
         self.say((LEAVE,))
+
+    def pause(self) -> None:
+        """Pause it."""
+        self.say((Command.PAUSE,))
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        self.say((Command.RESUME,))
+
+    def feed(self, *, percent: Percent) -> None:
+        """Set the speed, in per cent of the programmed one."""
+        self.say((Command.FEED, float(percent)))
+
+    def flow(self, *, percent: Percent) -> None:
+        """Set the flow, in per cent of the programmed one."""
+        self.say((Command.FLOW, float(percent)))
+
+    def by_hand(self, *, does: HandWord, axis: str = "", by_mm: float = 0.0, keep_heat: bool = False) -> None:
+        """Have a printer in hand do something. Raises PrinterError for one that is not in hand."""
+        if self.state.state is not PrintState.IN_HAND:
+            raise PrinterError("this cannot be done by hand now")
+        self.say((HandCommand(does, axis[:1], by_mm, keep_heat),))
 
     def end(self) -> None:
         """End it because the workbench ends: as a cancel does, but what a print server prints goes on there."""

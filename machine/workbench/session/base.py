@@ -13,7 +13,6 @@ from typing import Any, Generic, TypeVar
 from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench, History, Step
 from machine.workbench.work.folders import Received
-from machine.workbench.work.observable import Observable
 from machine.workbench.work.worker_pool import CLOSED, TaskQueue, WorkerPools
 from profiles.errors import UserError
 
@@ -29,6 +28,33 @@ asking: ContextVar[str] = ContextVar("asking", default="")  # the page that is o
 def hear_from(page: object) -> None:
     """All that the running task does from now on, and begins, is for the page of this name, if it is one."""
     asking.set(page if isinstance(page, str) and len(page) <= LONGEST_ASK else "")
+
+
+class Observable:
+    """All from the event loop. listeners: called with every change, before whoever waits for it; closed: no more come."""
+
+    def __init__(self) -> None:
+        self.version, self.closed = 0, False
+        self.listeners: list[Callable[[], None]] = []
+        self._changed = asyncio.Event()
+
+    def notify(self) -> None:
+        """Let the pages know that something has changed."""
+        self.version += 1
+        self._changed.set()
+        self._changed = asyncio.Event()
+        for listen in self.listeners:
+            listen()
+
+    async def changed(self, seen: int) -> None:
+        """Return when there is something newer than the version that was seen."""
+        while self.version == seen:
+            await self._changed.wait()
+
+
+async def in_loop(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, Value]) -> Value:
+    """The result of a coroutine that runs in another event loop; to cancel the waiting cancels it there."""
+    return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, loop))
 
 
 class SessionBase(Observable):
@@ -164,8 +190,7 @@ class Derived(Generic[Value]):
 
     key: what of a bench decides it, None: there is nothing to work out. task: works it out for a bench, and may tell() how far it
     is. by_itself: as soon as the key changes, else when it is begun. interrupts: a change of the key cancels the task at once,
-    else it may end and is begun anew then; in both cases its answer is dropped. accept: changes the bench by the answer. start:
-    starts the task, which is one of the session's otherwise.
+    else it may end and is begun anew then; in both cases its answer is dropped. accept: changes the bench by the answer.
 
     progress: what the task has told last, None: none is under way; bench: of the task under way; done: the last answer, of
     one that is begun whatever the bench is now.
@@ -180,14 +205,13 @@ class Derived(Generic[Value]):
         by_itself: bool = True,
         interrupts: bool = False,
         accept: Callable[[Value], None] | None = None,
-        start: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None,
     ) -> None:
         self.progress: Any = None
         self.bench = session.bench
         self.done: Value | None = None
         self.number = 0  # of the task under way, or the last one
         self._session, self._key_of, self._work, self._accept = session, key, task, accept
-        self._by_itself, self._interrupts, self._start = by_itself, interrupts, start or session.start
+        self._by_itself, self._interrupts = by_itself, interrupts
         self._begun: object = None  # key of the task under way, or the last one
         self._of: object = None  # key of the last answer
         self._error: Exception | None = None
@@ -212,7 +236,7 @@ class Derived(Generic[Value]):
             self.progress, self._error = progress, None
             self.bench = self._session.bench
             self._begun = self._key_of(self.bench)
-            self._task = self._start(self._run())
+            self._task = self._session.start(self._run())
 
     def tell(self, progress: Any) -> None:
         """Have the pages know how far the task under way is."""

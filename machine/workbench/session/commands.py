@@ -1,22 +1,25 @@
-"""Commands: all that a page may ask of its bench: which there are, what each needs to lie there, and what does it."""
+"""Commands: all that a page may ask of its bench: which there are, what each needs to lie there, and what does it.
 
-from collections.abc import Coroutine
+A page sends `{"do": NAME, ...}`. The name leads to a function in CHANGES, EDITS, MARKINGS or ACTS; its keyword-only parameters
+are what else the page sends.
+"""
+
+from collections.abc import Callable, Coroutine
 from enum import StrEnum
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
-from machine.workbench.bench.changes import CHANGES, Change
-from machine.workbench.bench.marks import Mark, Marking, Unmark
-from machine.workbench.bench.planes import EDITS, Edit, Move
+from machine.workbench.bench.changes import CHANGES, EDITS, MARKINGS, WORDS, move
 from machine.workbench.bench.settings import with_name, with_typed, without_settings
-from machine.workbench.bench.values import Asked, Command
+from machine.workbench.bench.values import Arguments, Asked, Direction, Mm, arguments_of, read_command
 from machine.workbench.session.session import Session
-from machine.workbench.work.cutting import SearchWay
 from mdp.ranking.ranker import CLASSIC
-from profiles.errors import PlanError
+from profiles.errors import PlanError, ProfileError
 from profiles.messages import key_name
+from profiles.profile import SECTIONS
 
 ProfileKind = Literal["machine", "material", "process"]
+Work = Coroutine[Any, Any, None] | None  # what a command still has to do
 
 
 class Need(StrEnum):
@@ -43,83 +46,86 @@ def check_need(session: Session, need: Need) -> None:
         raise PlanError(sentence)
 
 
-class Plain(Command):
-    """A command that says no more than its name."""
-
-    do: Literal["dismiss", "undo", "redo", "file_settings", "stop", "slice", "compare"]
-
-
-class Demo(Command):
-    """Put a model that ships with the program on the bench."""
-
-    do: Literal["demo"]
-    name: str
+def undo(session: Session) -> None:
+    """One step back."""
+    session.advance(session.history.undo())
 
 
-class Unit(Command):
-    """The unit of the coordinates of the model that waits for it."""
-
-    do: Literal["unit"]
-    unit: str
+def redo(session: Session) -> None:
+    """One step forward again."""
+    session.advance(session.history.redo())
 
 
-class Plate(Command):
-    """Another plate of the slicer file."""
-
-    do: Literal["plate"]
-    plate: int
+def dismiss(session: Session) -> None:
+    """Take back what the page was last told that could not be done, as every command does."""
 
 
-class Set(Command):
-    """Another value for a key of the profile, as --set has it; null: as the profile has it."""
-
-    do: Literal["set"]
-    key: str
-    value: str | None = None
+def search(session: Session, *, orient: bool = True, ranker: str = CLASSIC) -> None:
+    """Find the parts, as `find_parts` does."""
+    session.finding.search(orient, ranker.strip() or CLASSIC)
 
 
-class Reset(Command):
-    """Take back what is set for a machine, a material or a process; null: for all."""
-
-    do: Literal["reset"]
-    kind: ProfileKind | None = None
+def slice_bench(session: Session) -> None:
+    """Slice what lies on the bench."""
+    session.slicing.slice()
 
 
-class TakeProfile(Command):
-    """Another machine, material or process."""
-
-    do: Literal["profile"]
-    kind: ProfileKind
-    name: str
+def compare(session: Session) -> None:
+    """Compare the slices with the same model in one piece."""
+    session.comparing.compare()
 
 
-class Search(Command):
-    """Find the parts; see SearchWay."""
-
-    do: Literal["search"]
-    orient: bool = True
-    ranker: str = CLASSIC
+def try_plane(session: Session, *, part: int, normal: Direction, offset_mm: Mm) -> None:
+    """Try a plane in a person's hand."""
+    session.trials.hold(move(session.bench, part=part, normal=normal, offset_mm=offset_mm).cuts)
 
 
-class Try(Move):
-    """A plane in a person's hand."""
-
-    do: Literal["try"]  # type: ignore[assignment]
-
-
-class Neck(Command):
+def take_neck(session: Session, *, part: int) -> Work:
     """Move the plane of a part to the neck near it."""
-
-    do: Literal["neck"]
-    part: int
+    return session.trials.take_neck(part)
 
 
-KINDS: tuple[type[Command], ...] = (
-    *(Plain, Demo, Unit, Plate, Set, Reset, TakeProfile, Search, Try, Neck, Mark, Unmark),
-    *CHANGES,
-    *EDITS,
-)
-COMMANDS = {name: kind for kind in KINDS for name in get_args(kind.model_fields["do"].annotation)}
+def set_value(session: Session, *, key: str, value: str | None = None) -> Work:
+    """Another value for a key of the profile, as --set has it; null: as the profile has it."""
+    if "=" in key or key.partition(".")[0] not in SECTIONS:
+        raise ProfileError(f"{key!r} is not a key of a profile")
+    before = session.bench.profile
+    return session.take_given(f"set {key_name(key)}", lambda given: with_typed(given, key, value, before), key)
+
+
+def reset(session: Session, *, kind: ProfileKind | None = None) -> Work:
+    """Take back what is set for a machine, a material or a process; null: for all."""
+    changes = "all changes" if kind is None else f"changes of the {kind}"
+    return session.take_given(f"take {changes} back", lambda given: without_settings(given, kind))
+
+
+def take_profile(session: Session, *, kind: ProfileKind, name: str) -> Work:
+    """Another machine, material or process."""
+    return session.take_given(f"take {name}", lambda given: with_name(given, kind, name))
+
+
+# The commands of a session by their names; `stop` alone does not wait for its turn.
+ACTS: dict[str, Callable[..., Any]] = {
+    "undo": undo,
+    "redo": redo,
+    "dismiss": dismiss,
+    "search": search,
+    "slice": slice_bench,
+    "compare": compare,
+    "stop": Session.stop,
+    "try": try_plane,
+    "neck": take_neck,
+    "set": set_value,
+    "reset": reset,
+    "profile": take_profile,
+    "file_settings": Session.take_settings_inside,
+    "demo": Session.open_demo,
+    "unit": Session.open_in_unit,
+    "plate": Session.open_plate,
+}
+FUNCTIONS: dict[str, Callable[..., Any]] = {name: change for name, (change, _) in CHANGES.items()} | EDITS | MARKINGS | ACTS
+COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()}
+LONG = ("search", "slice", "compare")  # what `stop` ends, also while it waits for its turn
 NEEDS = {"compare": Need.SLICES} | dict.fromkeys(
     ("demo", "unit", "dismiss", "undo", "redo", "set", "reset", "profile"), Need.NOTHING
 )  # what lies on the bench for all others is a model
@@ -130,57 +136,28 @@ def obey(session: Session, asked: Asked) -> None:
     command; why it cannot be done the page is told later, by the name `ask` of its command."""
     session.forget_problem()
     session.stopped = ""
-    name = asked.get("do")
-    kind = COMMANDS.get(name) if isinstance(name, str) else None
-    if kind is None:
-        raise PlanError(f"{name!r} is no command of the workbench: docs/workbench.md lists them")
-    command = kind.of(asked)
-    # What is to be stopped ends at once, whatever its bench is busy with.
-    act = session.stop() if command.do == "stop" else partial(perform, session, command)
+    name, arguments = read_command(asked, COMMANDS)
+    act: Callable[[], Work] = partial(perform, session, name, arguments)
+    if name == "stop":  # what is to be stopped ends at once, whatever its bench is busy with
+        act = session.stop()
+    elif name in LONG:
+        act = session.unless_stopped(name, act)
     session.command(act, asked.get("ask"))
 
 
-def perform(session: Session, command: Command) -> Coroutine[Any, Any, None] | None:
-    """Do what a command says; gives the work that it still is. Raises UserError for what cannot be done, as that does."""
-    check_need(session, NEEDS.get(command.do, Need.MODEL))
-    match command:
-        case Change():
-            session.do(command.word, command.change(session.bench))
-        case Try():
-            session.trials.hold(command.cuts(session.bench))
-        case Edit():
-            return session.trials.take(command)
-        case Neck():
-            return session.trials.take_neck(command.part)
-        case Marking():
-            return session.trials.mark(command)
-        case Plain(do="undo"):
-            session.advance(session.history.undo())
-        case Plain(do="redo"):
-            session.advance(session.history.redo())
-        case Search():
-            session.finding.search(SearchWay(command.orient, command.ranker.strip() or CLASSIC))
-        case Plain(do="slice"):
-            session.slicing.slice()
-        case Plain(do="compare"):
-            session.comparing.compare()
-        case Set():
-            return session.take_given(
-                f"set {key_name(command.key)}",
-                lambda given: with_typed(given, command.key, command.value, session.bench.profile),
-                command.key,
-            )
-        case Reset():
-            whose = "all changes" if command.kind is None else f"changes of the {command.kind}"
-            return session.take_given(f"take {whose} back", lambda given: without_settings(given, command.kind))
-        case TakeProfile():
-            return session.take_given(f"take {command.name}", lambda given: with_name(given, command.kind, command.name))
-        case Plain(do="file_settings"):
-            return session.take_settings_inside()
-        case Demo():
-            return session.open_demo(command.name)
-        case Unit():
-            return session.open_in_unit(command.unit)
-        case Plate():
-            return session.open_plate(command.plate)
-    return None
+def perform(session: Session, name: str, arguments: Arguments) -> Work:
+    """Do a command; returns the work that is left of it. Raises UserError for what cannot be done, as that work does."""
+    check_need(session, NEEDS.get(name, Need.MODEL))
+    given = dict(arguments)
+    if name in CHANGES:
+        change, word = CHANGES[name]
+        session.do(word, change(session.bench, **given))
+        return None
+    if name in EDITS:
+        nearer = {"do": name, **arguments.model_dump(mode="json", exclude_none=True), "near": True} if "near" in given else None
+        return session.trials.take(EDITS[name](session.bench, **given), nearer)
+    if name in MARKINGS:
+        word = WORDS[given["kind"]] if name == "mark" else "take a mark away"
+        return session.trials.mark(word, partial(MARKINGS[name], **given))
+    work: Work = ACTS[name](session, **given)
+    return work

@@ -5,12 +5,12 @@ import os
 import sys
 import weakref
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench
-from machine.workbench.session.base import Derived, SessionBase
+from machine.workbench.session.base import SessionBase
 from machine.workbench.work.folders import new_folder, write_work
 from profiles.errors import PlanError, UserError, reason
 from profiles.files import lock_folder
@@ -20,19 +20,20 @@ OPEN_ELSEWHERE = "this work is not kept any more, or another page has opened it"
 
 
 class Keeping:
-    """Saves one session, from its event loop. Only one write goes on at a time, in a thread, and it always runs to its end."""
+    """Saves one session, from its event loop. Only one write goes on at a time, in a thread, and nothing cancels it."""
 
     def __init__(self, session: SessionBase) -> None:
         self._session = session
         self._folder: Path | None = None
         self._lock: int | None = None
         self._kept: weakref.ref[Bench] | None = None
-        self._write_under_way: asyncio.Task[None] | None = None
+        self._saving: asyncio.Task[None] | None = None
+        self._writing, self._ended = asyncio.Lock(), asyncio.Event()
         self._path: Path | None = None  # of the model that is kept
         self._opening = False
         self._trouble = ""
         self._reported: tuple[str, Path | None] = "", None  # trouble, and the model that it was reported for
-        self._saved = Derived(session, self._unsaved, self._save, start=asyncio.create_task)  # the end of a session waits for it
+        session.followers.append(self._follow)
 
     @property
     def behind(self) -> bool:
@@ -40,8 +41,18 @@ class Keeping:
         kept = None if self._kept is None else self._kept()
         return self._session.bench is not kept and self._session.bench.model is not None
 
-    def _unsaved(self, bench: Bench) -> weakref.ref[Bench] | None:
-        return weakref.ref(bench) if self.behind and not self._opening and not self._session.closed else None
+    def _follow(self) -> None:
+        """Save a moment after a change."""
+        if self._saving is None and self.behind and not self._opening and not self._session.closed:
+            self._saving = asyncio.create_task(self._save())
+
+    async def _save(self) -> None:
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._ended.wait(), AFTER_S)
+        if self.behind and not self._opening:
+            await self._write_newest()
+        self._saving = None
+        self._follow()
 
     @asynccontextmanager
     async def opening(self, folder: Path) -> AsyncIterator[None]:
@@ -53,15 +64,15 @@ class Keeping:
         self._opening = True
         try:
             yield
-            await self._written()
-            self._release()
+            async with self._writing:
+                self._release()
             self._folder, self._lock, lock = folder, lock, None
             self._path = None if self._session.bench.model is None else self._session.bench.model.path
         finally:
             if lock is not None:
                 os.close(lock)
             self._opening = False
-            self._saved.follow()
+            self._follow()
 
     async def finish(self) -> str:
         """Wait for the write under way, and write what is newer; why the last change is not kept, "" where it is.
@@ -69,8 +80,9 @@ class Keeping:
         The session has ended, so that nothing changes any more. Work that was still being opened stays as it was kept.
         """
         was_opening = self._opening
-        self._saved.stop()
-        await self._written()
+        self._ended.set()
+        if self._saving is not None:
+            await self._saving
         if not was_opening and self._session.bench.model is not None and (self.behind or self._trouble):  # tried once more
             await self._write_newest()
         self._release()
@@ -82,28 +94,15 @@ class Keeping:
             os.close(self._lock)
         self._folder, self._lock = None, None
 
-    async def _save(self, bench: Bench) -> None:
-        await asyncio.sleep(AFTER_S)
-        await self._written()
-        if self.behind and not self._opening:
-            await self._write_newest()
-
-    async def _written(self) -> None:
-        """Return when no write is under way."""
-        if self._write_under_way is not None:
-            await asyncio.wait((self._write_under_way,))
-
     async def _write_newest(self) -> None:
-        async def write(bench: Bench) -> None:
+        async with self._writing:
+            bench = self._session.bench
             self._trouble = await asyncio.to_thread(self._write, bench)
             self._kept = weakref.ref(bench)
-            reported, self._reported = self._reported, (self._trouble, self._path)
-            if self._trouble and reported != self._reported:  # once a model, not with every change
-                self._session.add_problem(f"this work cannot be kept for after a crash: {self._trouble}; Save > Project keeps it")
-                self._session.notify()
-
-        self._write_under_way = asyncio.create_task(write(self._session.bench))  # it outlives who waits for it
-        await self._written()
+        reported, self._reported = self._reported, (self._trouble, self._path)
+        if self._trouble and reported != self._reported:  # once a model, not with every change
+            self._session.add_problem(f"this work cannot be kept for after a crash: {self._trouble}; Save > Project keeps it")
+            self._session.notify()
 
     def _write(self, bench: Bench) -> str:
         """Why it could not be written, "" where it is."""

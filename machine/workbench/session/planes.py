@@ -1,21 +1,114 @@
-"""Planes in a person's hand, tried as they move and taken when they can be cut; zones, and the planes that they drive away."""
+"""Planes: how the model on a bench stands and rests, and planes on it: prepared as soon as a model lies there, tried while they
+are in a person's hand, taken when they can be cut."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
+from itertools import count
 from math import hypot, inf
+from typing import Any
 
 from machine.workbench.bench.bench import Bench, with_cuts, with_zones
-from machine.workbench.bench.marks import Marking
-from machine.workbench.bench.planes import Cuts, Edit, Snap, check_unlocked
-from machine.workbench.bench.values import Asked
+from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, snap
+from machine.workbench.bench.values import Asked, vector_of
 from machine.workbench.session.base import Derived, SessionBase, asking
-from machine.workbench.session.placement import Readiness
+from machine.workbench.work.models import Resting, Standing
 from mdp.plane import Plane
+from mdp.read import MANY_FACES
 from mdp.search.neck import REACH_DEG, REACH_SHARE
+from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Obstacle, Trial
-from profiles.errors import PlanError
+from mdp.zone import Zones
+from profiles.effect import effect_of_change
+from profiles.errors import MeshError, PlanError
+from profiles.frozen import Effect
 
 REST_S = 0.1  # how long a hand must rest before what it holds is tried more closely
+CHANGING_S = 0.2  # of a bench, until it is made ready as it is
+_numbers = count(1)  # of the benches of all sessions, whose processes may be the same
+
+
+class Readiness(Derived[None]):
+    """What planes on the bench need, prepared in a process of its own, which knows by the bench's number what it has worked out
+    already; very large models wait for the first plane."""
+
+    def __init__(self, session: SessionBase) -> None:
+        self._numbered: Bench | None = None  # the last one
+        self._number = 0
+        self._model = ""  # key of that of the bench that was made ready last
+        super().__init__(
+            session,
+            lambda bench: None if bench.model is None or bench.model.faces > MANY_FACES else self._number_of(bench),
+            self._prepare,
+        )
+
+    def load(self) -> None:
+        """Load what all planes need, while the first model is read."""
+        if not self._number:
+            self._session.start(self._session.hand.run("load_kernels"))
+
+    async def ask(self, task: str, bench: Bench, *given: Any) -> Any:
+        """What a task of work.trials says of a bench."""
+        return await self._session.hand.run(task, self._number_of(bench), bench, *given)
+
+    def _number_of(self, bench: Bench) -> int:
+        """The number of a bench, that of the last one where what was made ready for that serves this one, too: planes read of a
+        profile what a search does."""
+        before, self._numbered = self._numbered or Bench(bench.profile), bench
+        keys = [of.model and (of.model.key, of.rotation) for of in (before, bench)]
+        alike = keys[0] == keys[1] and before.zones is bench.zones
+        if not alike or effect_of_change(before.profile, bench.profile) >= Effect.REACH:
+            self._number = next(_numbers)
+        return self._number
+
+    async def _prepare(self, bench: Bench) -> None:
+        """Make a bench ready, unless it changes at once again."""
+        assert bench.model is not None
+        if bench.model.key == self._model and not await self.rests(CHANGING_S):
+            return
+        self._model = bench.model.key
+        self.tell(True)
+        await self._session.hand.run("make_ready", self._number_of(bench), bench)
+
+
+def standing_of(session: SessionBase) -> Derived[Standing]:
+    """How the model on the bench stands."""
+
+    async def stand(bench: Bench) -> Standing:
+        standing: Standing = await session.hand.run("stand", bench)
+        if standing.refusal:
+            session.refuse(MeshError(standing.refusal))
+        return standing
+
+    return Derived(session, _stands_by, stand)
+
+
+def _stands_by(bench: Bench) -> tuple[object, ...] | None:
+    """What decides how it stands and what is told of that; None: there is no model."""
+    if bench.model is None:
+        return None
+    process = bench.profile.of_part(1).process
+    decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
+    copies = (bench.copies, bench.cuts, bench.zones, bench.profile) if bench.copies > 1 else ()
+    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, copies
+
+
+def pedestal_key(bench: Bench, standing: Standing | None) -> str:
+    """What tells the pedestal from others: the page asks for its triangles by it; "": there is none."""
+    if standing is None or not standing.pedestal or bench.model is None:
+        return ""
+    return sha256(repr((bench.model.key, bench.rotation, bench.profile.search.pedestal_mm)).encode()).hexdigest()[:16]
+
+
+def resting_of(session: SessionBase, readiness: Readiness) -> Derived[tuple[Resting, ...]]:
+    """The ways in which the model on the bench rests, ranked when its planes are made ready: a person waits for those more."""
+
+    async def rank(bench: Bench) -> tuple[Resting, ...]:
+        await readiness.wait()
+        ranked: tuple[Resting, ...] = await session.quick.run("rank_resting", bench.model, session.bench.profile.of_all_parts)
+        return ranked
+
+    return Derived(session, lambda bench: bench.model, rank)
 
 
 @dataclass(frozen=True)
@@ -49,19 +142,21 @@ class PlaneTrials:
         self._held = None
         self._figures.follow()
 
-    async def take(self, edit: Edit) -> None:
-        """Take planes that can be cut. Raises PlanError for those that cannot."""
-        bench, self.refused = self._session.bench, None
-        cuts = edit.cuts(bench)
+    async def take(self, edit: Edit, nearer: Asked | None = None) -> None:
+        """Take planes that can be cut. nearer: the command that puts the plane at the nearest place. Raises PlanError for those
+        that cannot be cut."""
+        bench, cuts, self.refused = self._session.bench, edit.cuts, None
         trial = await self.attempt(bench, cuts)
-        if trial.refused and edit.near and edit.nearer is not None:
+        if trial.rejected and edit.near:
             with self._session.waiting("looking for the nearest place that can be cut"):
-                nearest: Cuts | None = await self._readiness.ask("nearest", bench, edit.orders(bench))
+                nearest: Cuts | None = await self._readiness.ask("nearest", bench, edit.orders)
             if nearest is not None:
                 cuts, trial = nearest, await self.attempt(bench, nearest)
-        if trial.refused:
+        if trial.rejected:
             self.settle()
-            raise self._refusal(trial, edit)
+            self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
+            nowhere = "; shifted along its normal it cannot be cut either" if edit.near else ""
+            raise PlanError(f"{edit.reason}part {trial.rejected_part} cannot be cut off: {trial.rejected}{nowhere}")
         self.trial = bench, cuts, trial
         self._session.do(edit.word, with_cuts(bench, cuts))
 
@@ -76,15 +171,9 @@ class PlaneTrials:
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
             raise PlanError(f"there is no neck near the plane of part {part}: {where}")
-        await self.take(Snap.of({"part": part, "normal": neck.normal.tolist(), "offset_mm": neck.offset_mm}))
-
-    def _refusal(self, trial: Trial, edit: Edit) -> PlanError:
-        """Why planes cannot be cut; what is known of that is kept."""
-        why, nearer = f"{edit.instead}part {trial.refused_part} cannot be cut off: {trial.refused}", edit.nearer
-        if edit.near and nearer is not None:
-            why += "; shifted along its normal it cannot be cut either"
-        self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
-        return PlanError(why)
+        normal, offset_mm = vector_of(neck.normal), float(neck.offset_mm)
+        nearer = {"do": "move", "part": part, "normal": list(normal), "offset_mm": offset_mm, "near": True}
+        await self.take(snap(bench, part, PlannedPart(normal, offset_mm)), nearer)
 
     async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
         """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
@@ -117,21 +206,21 @@ class PlaneTrials:
                 return
             self.trial = tried = bench, cuts, trial
 
-    async def mark(self, marking: Marking) -> None:
-        """Take other zones; planes that they forbid go, and the reason is told. Raises PlanError for what makes no sense, and
-        where a plane that would go is locked."""
+    async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
+        """Take other zones; planes that they forbid go, and the reason is told. word: for the step in the history. Raises
+        PlanError for what makes no sense, and where a plane that would go is locked."""
         before, removed = self._session.bench, list[str]()
         bench = with_zones(before, await self._session.quick.run("mark", before, marking))
         while bench.cuts:
             trial = await self.attempt(bench, bench.cuts)
-            if not trial.refused:
+            if not trial.rejected:
                 break
-            part = bench.cuts[trial.refused_part - 2]
+            part = bench.cuts[trial.rejected_part - 2]
             if part in bench.locked:
-                raise PlanError(f"the plane of part {trial.refused_part} is locked and would be in the way: {trial.refused}")
-            removed.append(trial.refused)
+                raise PlanError(f"the plane of part {trial.rejected_part} is locked and would be in the way: {trial.rejected}")
+            removed.append(trial.rejected)
             bench = with_cuts(bench, tuple(cut for cut in bench.cuts if cut is not part))
-        self._session.do(marking.step, bench, _removed_in_words(marking.step, removed))
+        self._session.do(word, bench, _removed_in_words(word, removed))
 
 
 def _removed_in_words(word: str, reasons: Sequence[str]) -> str:

@@ -27,13 +27,11 @@ from machine.workbench.bench.bench import (
     with_scaled_model,
 )
 from machine.workbench.bench.model import Model
-from machine.workbench.bench.settings import check_block, profile_as_given, with_given, with_typed
+from machine.workbench.bench.settings import check_block, key_of, profile_as_given, with_given, with_typed
 from machine.workbench.session.base import Derived, SessionBase, asking
-from machine.workbench.session.finding import Finding, prices_of
 from machine.workbench.session.keeping import Keeping
-from machine.workbench.session.placement import Readiness, resting_of, standing_of
-from machine.workbench.session.planes import PlaneTrials
-from machine.workbench.session.slicing import Comparing, Slicing
+from machine.workbench.session.long_work import Comparing, Finding, Slicing, prices_of
+from machine.workbench.session.planes import PlaneTrials, Readiness, resting_of, standing_of
 from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled
 from machine.workbench.work.worker_pool import WorkerPools
@@ -53,17 +51,6 @@ READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a 
 
 
 @dataclass(frozen=True)
-class OpenBench:
-    """What the pages of all benches are told of each: its number, its model's name, how many parts that is cut into (0: not yet),
-    and the work under way in a word."""
-
-    number: int
-    name: str
-    parts: int
-    work: str
-
-
-@dataclass(frozen=True)
 class OfUnknownUnit:
     """A model that waits for the word what its coordinates are in: the page that wanted it, its file and name, and the units that
     may be, each with what it is scaled by then."""
@@ -74,16 +61,9 @@ class OfUnknownUnit:
     units: dict[str, float]
 
 
-class _UnscaledError(MeshError):
-    """The model on the bench, or that comes there, has a size that no printer makes."""
-
-    def __init__(self, unscaled: Unscaled) -> None:
-        super().__init__(unscaled.sentence)
-        self.unscaled = unscaled
-
-
 class Session(SessionBase):
-    """A bench with all work on it. benches: all that are open, this one too; unscaled: the model that waits for its unit;
+    """A bench with all work on it. benches: for the pages, of all that are open, this one too, its number, its model's name, how
+    many parts that is cut into (0: not yet), and the work under way in a word; unscaled: the model that waits for its unit;
     settings_note: key of a model, and the note on those taken from its file."""
 
     def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
@@ -95,9 +75,16 @@ class Session(SessionBase):
         self.comparing = Comparing(self, self.slicing)
         self.pieces = Derived(self, lambda bench: bench.shaped, self._draw_pieces, by_itself=False)
         self.keeping = Keeping(self)
-        self.benches: tuple[OpenBench, ...] = ()
+        self.benches: list[dict[str, Any]] = []
         self.unscaled: OfUnknownUnit | None = None
         self.settings_note = ("", "")
+        self._to_begin: dict[object, str] = {}  # the names of commands that wait for their turn to begin long work
+
+    def described(self) -> dict[str, Any]:
+        """The bench as the pages of all are told of it."""
+        model = self.bench.model
+        work = self.busy or ("finding parts" if self.finding.progress else "slicing" if self.slicing.progress else "")
+        return {"name": "" if model is None else model.name, "parts": self.bench.parts, "work": work}
 
     async def close(self) -> str:
         """End all work, tell the pages, and keep the last change. Then the files that pages have sent go; where the change could
@@ -130,36 +117,27 @@ class Session(SessionBase):
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self.resting.stop()  # it would be waited for
         with self.waiting(f"reading {name}"):
-            bench = self._bench_without(self._set_for_another(name) if anew else frozenset())
-            try:
-                model = await self._read(path, name, bench.profile, plate)
-            except _UnscaledError as error:
-                self.unscaled = OfUnknownUnit(asking.get(), path, name, error.unscaled.units)
-                raise MeshError(error.unscaled.question if asking.get() else error.unscaled.sentence) from None
+            bench = self._bench_for(name) if anew else self.bench
+            model = await self._read(path, name, bench.profile, plate, asks=True)
         self.do(f"open {name}", with_model(bench, model))
 
-    def _set_for_another(self, name: str) -> frozenset[str]:
-        """What is set for the reading of a model on the bench that has another name."""
-        model, settings = self.bench.model, self.bench.given.settings
-        if model is None or model.name == name:
-            return frozenset()
-        return frozenset(setting for setting in settings if setting.partition("=")[0].strip() in READ_BY)
-
-    def _bench_without(self, gone: frozenset[str]) -> Bench:
-        """The bench without some of its settings."""
+    def _bench_for(self, name: str) -> Bench:
+        """The bench for a model of a name, without what is set for the reading of another one."""
         bench = self.bench
-        if not gone & set(bench.given.settings):
+        settings = tuple(setting for setting in bench.given.settings if key_of(setting) not in READ_BY)
+        if bench.model is None or bench.model.name == name or settings == bench.given.settings:
             return bench
-        given = replace(bench.given, settings=tuple(setting for setting in bench.given.settings if setting not in gone))
+        given = replace(bench.given, settings=settings)
         return with_profile(bench, given, profile_as_given(given, bench.profile))
 
-    async def open_in_unit(self, unit: str) -> None:
+    async def open_in_unit(self, *, unit: str) -> None:
         """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
         waits = self.unscaled
         if waits is None or unit not in waits.units:
-            expected = f"one of {', '.join(waits.units)} is expected" if waits else "no model waits for its unit"
-            raise PlanError(f"unit is {unit!r}: {expected}")
-        unscaled = self._bench_without(self._set_for_another(waits.name))
+            raise PlanError(
+                f"unit is {unit!r}: {', '.join(waits.units) if waits else 'nothing, for no model waits for one,'} is allowed"
+            )
+        unscaled = self._bench_for(waits.name)
         given = with_typed(unscaled.given, "process.scale", f"{waits.units[unit]:g}", unscaled.profile)
         scaled = with_profile(unscaled, given, profile_as_given(given, unscaled.profile))
         with self.waiting(f"reading {waits.name}"):
@@ -167,7 +145,7 @@ class Session(SessionBase):
         self.unscaled = None
         self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
 
-    async def open_plate(self, plate: int) -> None:
+    async def open_plate(self, *, plate: int) -> None:
         """Put another plate of the slicer file on the bench there. Raises UserError."""
         model = self.bench.model
         if model is None or plate not in model.plates:
@@ -187,7 +165,7 @@ class Session(SessionBase):
         await self.take_given(f"take the settings of {model.name}", lambda given: with_given(given, inside))
         self.settings_note = model.key, note
 
-    async def open_demo(self, name: str) -> None:
+    async def open_demo(self, *, name: str) -> None:
         """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
@@ -274,14 +252,27 @@ class Session(SessionBase):
         if given != before.given:
             self.do(word, bench, refused)
 
+    def unless_stopped(self, name: str, begin: Callable[[], object]) -> Callable[[], None]:
+        """A command that begins long work; one that still waits for its turn when work is stopped does nothing then."""
+        ticket = object()
+        self._to_begin[ticket] = name
+
+        def act() -> None:
+            if self._to_begin.pop(ticket, None) is not None:
+                begin()
+
+        return act
+
     def stop(self) -> Callable[[], None]:
-        """End all work at once. Gives what is to be done in a turn: take the best of the search, tell what became of all."""
-        search, bench = self.finding.progress, self.finding.bench
+        """End all work at once, also what has not begun yet. Gives what is to be done in a turn: take the best of the search,
+        tell what became of all."""
+        waiting, search, bench = {*self._to_begin.values()}, self.finding.progress, self.finding.bench
+        self._to_begin.clear()
         words = []
-        if self.slicing.progress is not None:
+        if self.slicing.progress is not None or "slice" in waiting:
             left = "the slices from before stay" if self.slicing.latest() else "there are no slices"
             words.append(f"Slicing was stopped: {left}.")
-        if self.comparing.progress is not None:
+        if self.comparing.progress is not None or "compare" in waiting:
             words.append("The comparison was stopped: nothing of it is kept.")
         for work in (self.finding, self.slicing, self.comparing):
             work.stop()
@@ -289,7 +280,7 @@ class Session(SessionBase):
             self.start(self.long.warm())
 
         def tell() -> None:
-            found = [] if search is None else [self.finding.take_best(bench, search)]
+            found = [self.finding.take_best(bench, search)] if search is not None or "search" in waiting else []
             self.stopped = " ".join([*found, *words])
 
         return tell
@@ -299,7 +290,7 @@ class Session(SessionBase):
         another place on the plate, and a model that it scales or turns otherwise is read again."""
         bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
-        if model is not None and _reads(bench.profile) != _reads(before.profile):
+        if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
             with self.waiting(f"reading {model.name}"):
                 model = await self._read(model.path, model.name, bench.profile, model.plate)
             if new.rotate_deg != old.rotate_deg:
@@ -308,20 +299,23 @@ class Session(SessionBase):
             bench = with_scaled_model(bench, model, new.scale / old.scale)
         effect = effect_of_change(before.profile, bench.profile)
         if effect == Effect.REACH and bench.rows:
-            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).refused]
+            rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
             bench = with_rows(bench, rows)
         if bench.cuts is not None and effect >= Effect.REACH:
             trial = await self.trials.attempt(bench, bench.cuts)
-            if trial.refused:
-                why = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
+            if trial.rejected:
+                why = f"{word}: the planes were taken away, for part {trial.rejected_part} cannot be cut off: {trial.rejected}"
                 return replace(with_cuts(bench, ()), cuts=None), why
         return bench, ""
 
-    async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None) -> Model:
-        """The model of a file, whose mesh stays as long as anybody has it."""
+    async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
+        """The model of a file, whose mesh stays as long as anybody has it. asks: where its size is none that a printer makes, the
+        page that wants it is asked for its unit."""
         model: Model | Unscaled = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file(), plate)
         if isinstance(model, Unscaled):
-            raise _UnscaledError(model)
+            if asks:
+                self.unscaled = OfUnknownUnit(asking.get(), path, name, model.units)
+            raise MeshError(model.question if asks and asking.get() else model.sentence)
         finalize(model, _remove_files, model.mesh_file, model.shapes_file)
         return model
 
@@ -338,11 +332,6 @@ def _read_plan(path: Path) -> PlanFile:
         return read_plan(path)
     except PlanError as error:
         raise PlanError(f"{error}".replace(str(path), path.name)) from None
-
-
-def _reads(profile: Profile) -> tuple[object, ...]:
-    """The settings of a profile that decide how a model is read."""
-    return profile.process.scale, profile.process.rotate_deg
 
 
 class Workbench:
@@ -392,14 +381,8 @@ class Workbench:
             self._list_again()
 
     def _list_again(self) -> None:
-        benches = tuple(_described(number, session) for number, session in self.sessions.items())
+        benches = [{"number": number, **session.described()} for number, session in self.sessions.items()]
         for session in self.sessions.values():
             if session.benches != benches:
                 session.benches = benches
                 session.notify()
-
-
-def _described(number: int, session: Session) -> OpenBench:
-    bench = session.bench
-    work = session.busy or ("finding parts" if session.finding.progress else "slicing" if session.slicing.progress else "")
-    return OpenBench(number, "" if bench.model is None else bench.model.name, bench.parts, work)

@@ -11,12 +11,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from machine.workbench.access.limits import DEVICE, check_bench_command
 from machine.workbench.access.pairing import Door
 from machine.workbench.bench.page_words import in_page_words, page_words
-from machine.workbench.bench.values import Asked
-from machine.workbench.session.base import hear_from
+from machine.workbench.bench.values import arguments_of, read_command
+from machine.workbench.session.base import Observable, hear_from
 from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
 from machine.workbench.web.snapshot import snapshot
-from machine.workbench.work.observable import Observable
 from profiles.errors import PlanError, UserError
 
 MOST_COMMAND = 100_000  # characters
@@ -25,10 +24,8 @@ CLOSED = "this bench is not open any more"
 CLOSED_CODE = 4404  # of a websocket that is closed for that
 GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
 MOST_OF_DEVICES = 1_000  # characters
-DEVICE_COMMANDS: dict[str, Callable[[Door, Asked], None]] = {
-    "unpair": lambda door, asked: door.unpair(asked.get("device")),
-    "reopen": lambda door, asked: door.reopen(),
-}
+DEVICE_FUNCTIONS: dict[str, Callable[..., None]] = {"unpair": Door.unpair, "reopen": Door.reopen}
+DEVICE_COMMANDS = {name: arguments_of(function) for name, function in DEVICE_FUNCTIONS.items()}
 
 
 async def talk(session: Session, socket: WebSocket) -> None:
@@ -123,14 +120,7 @@ async def _hear_devices(door: Door, socket: WebSocket) -> None:
     while True:
         text = await receive(socket)
         try:
-            _obey_door(door, parsed(text, MOST_OF_DEVICES))
+            name, arguments = read_command(parsed(text, MOST_OF_DEVICES), DEVICE_COMMANDS)
+            DEVICE_FUNCTIONS[name](door, **dict(arguments))
         except UserError as error:
             await send(socket, json.dumps({"problem": page_words(f"{error}")}))
-
-
-def _obey_door(door: Door, asked: Asked) -> None:
-    name = asked.get("do")
-    command = DEVICE_COMMANDS.get(name) if isinstance(name, str) else None
-    if command is None:
-        raise PlanError("what the page has sent is no command of the paired devices")
-    command(door, asked)

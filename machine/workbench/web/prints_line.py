@@ -20,13 +20,14 @@ from machine.workbench.printing.commands import PageOfPrints, Work, obey
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.session import Workbench
 from machine.workbench.web.line import parsed, receive, refuse_closed, send, tell, until_either_ends
-from machine.workbench.web.sessions_thread import SessionsThread
 from profiles.errors import PrinterError, ServerError, UserError
 
 MOST_COMMAND = 10_000  # characters
 
 
-def prints_line(prints: Prints, workbench: Workbench, sessions: SessionsThread) -> Callable[[WebSocket], Awaitable[None]]:
+def prints_line(
+    prints: Prints, workbench: Workbench, benches: asyncio.AbstractEventLoop
+) -> Callable[[WebSocket], Awaitable[None]]:
     """What answers the websocket of a page of a session: state out, commands in. `?page=` names the page, so that a line that
     comes back is known.
 
@@ -43,7 +44,7 @@ def prints_line(prints: Prints, workbench: Workbench, sessions: SessionsThread) 
         await socket.accept()
         with prints.page(page):
             try:
-                hearing = _hear(socket, PageOfPrints(page, session, prints, sessions.call))
+                hearing = _hear(socket, PageOfPrints(page, session, prints, benches))
                 await until_either_ends(tell(prints, lambda: _told(prints), socket), hearing)
             except ExceptionGroup as bugs:
                 log_bug(bugs.exceptions[0], ())

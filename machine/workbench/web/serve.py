@@ -7,6 +7,7 @@ import socket
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from threading import Thread
 
 import uvicorn
 from starlette.types import ASGIApp
@@ -18,9 +19,9 @@ from machine.view.serving.guard import HOST
 from machine.workbench.access.network import Lan, listen_at_all
 from machine.workbench.access.pairing import Door
 from machine.workbench.printing.prints import Prints
+from machine.workbench.session.base import in_loop
 from machine.workbench.session.session import Session, Workbench
 from machine.workbench.web.server import Served, application, lan_application
-from machine.workbench.web.sessions_thread import SessionsThread
 from machine.workbench.web.uploads import Uploads
 from machine.workbench.work.folders import files_in, tidy_left
 from machine.workbench.work.worker_pool import WorkerPools
@@ -56,19 +57,40 @@ def serve_workbench(
     """Serve until Ctrl-C. make: a session; begin: given the first one when it is there, both in the event loop of the sessions;
     announce: given its address when it answers, and those in the network; upload_mib: the largest file that is taken from a page;
     lan: the network that it is open to, None: to none."""
-    with ExitStack() as sockets:
+    with ExitStack() as stack:
         own, of_lan = listen_at_all(port, lan.addresses if lan else ())
         for each in (own, *of_lan):
-            sockets.enter_context(each)
+            stack.enter_context(each)
         folders = tidy_left()
         if folders:
             names = f"{folders[0]} and {len(folders) - 1} more" if folders[1:] else str(folders[0])
             left = f"workbenches that were killed have left the files of their benches in {names}"
             say(f"{left}: the page offers them, and they go with a start in a day")
-        asyncio.run(_serve(make, begin, announce, own, Uploads(upload_mib, files_in(*folders)), lan, of_lan))
+        benches = stack.enter_context(event_loop("benches"))
+        asyncio.run(_serve(benches, make, begin, announce, own, Uploads(upload_mib, files_in(*folders)), lan, of_lan))
+
+
+@contextmanager
+def event_loop(name: str) -> Iterator[asyncio.AbstractEventLoop]:
+    """An event loop in a thread of its own, in which `in_loop` runs what it is given. What hangs there at the end is not waited
+    for."""
+    loop, ended = asyncio.new_event_loop(), asyncio.Event()
+
+    def run() -> None:
+        with asyncio.Runner(loop_factory=lambda: loop) as runner:  # cancels what is left
+            runner.run(ended.wait())
+
+    thread = Thread(target=run, name=name, daemon=True)
+    thread.start()
+    try:
+        yield loop
+    finally:
+        loop.call_soon_threadsafe(ended.set)
+        thread.join(GRACE_S)
 
 
 async def _serve(
+    benches: asyncio.AbstractEventLoop,
     make: Callable[[WorkerPools], Session],
     begin: Callable[[Session], None],
     announce: Callable[..., None],
@@ -79,8 +101,7 @@ async def _serve(
 ) -> None:
     number, token = own.getsockname()[1], secrets.token_urlsafe(24)
     workbench, prints, loop = Workbench(make), Prints(), asyncio.get_running_loop()
-    sessions = SessionsThread()
-    served = Served(workbench, sessions, prints, uploads)
+    served = Served(workbench, benches, prints, uploads)
     door = Door(say, lan.urls(number), lan.certificate is not None) if lan else None
 
     async def open_first() -> int:
@@ -108,7 +129,7 @@ async def _serve(
         loop.call_soon_threadsafe(end)
 
     try:
-        first = await sessions.run(open_first())
+        first = await in_loop(benches, open_first())
         keep_stops_quick()
         with calling(interrupt):
             answering = asyncio.gather(*(server.serve(sockets=those) for server, those in servers))
@@ -122,9 +143,8 @@ async def _serve(
         prints.close()
         with suppress(TimeoutError):  # what hangs there ends with the program, and no file is deleted that is still read
             async with asyncio.timeout(KEEP_S):
-                for trouble in await sessions.run(workbench.close_all()):
+                for trouble in await in_loop(benches, workbench.close_all()):
                     say(trouble)
-        await sessions.end(GRACE_S)
 
 
 def _server(app: ASGIApp, lan: Lan | None = None) -> Server:

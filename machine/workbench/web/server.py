@@ -1,5 +1,6 @@
 """Server: the page, and all addresses of the workbench: models, files and lines of its sessions, and the benches themselves."""
 
+import asyncio
 import re
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ from starlette.background import BackgroundTask
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from machine.notices import say
@@ -24,25 +25,23 @@ from machine.workbench.access.network import Lan
 from machine.workbench.access.pairing import Door
 from machine.workbench.bench.page_words import page_words
 from machine.workbench.bench.settings import export_command, file_stem, settings_list, settings_of
-from machine.workbench.bench.values import is_small_number
 from machine.workbench.printing.prints import Prints
-from machine.workbench.session.base import hear_from
+from machine.workbench.session.base import hear_from, in_loop
 from machine.workbench.session.commands import Need, check_need
-from machine.workbench.session.placement import pedestal_key
+from machine.workbench.session.long_work import Slices
+from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session, Workbench
-from machine.workbench.session.slicing import Slices
 from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
 from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
-from machine.workbench.web.sessions_thread import SessionsThread
 from machine.workbench.web.snapshot import marks_key
-from machine.workbench.web.uploads import ProfileFiles, Uploads
+from machine.workbench.web.uploads import Uploads
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
 Act = Callable[[Session, Request], Awaitable[Response]]
 OWN = Path(__file__).parent / "page"
 MARKER = re.compile(r"/\*(?:STYLE|SCRIPT|NETWORK)\*/")
-ZIP = "application/zip"
+ZIP, BYTES = "application/zip", "application/octet-stream"
 BELOW = "/{token}/{session:int}/"
 
 
@@ -89,7 +88,7 @@ async def print_text(session: Session, request: Request) -> Response:
 async def print_walls(session: Session, request: Request) -> Response:
     """What is seen of a part that is sliced, as `work.walls` gives it."""
     drawn = session.slicing.walls_of(request.path_params["number"], request.path_params["part"])
-    return _gone() if drawn is None else Response(drawn, media_type="application/octet-stream")
+    return _gone() if drawn is None else Response(drawn, media_type=BYTES)
 
 
 async def shared_page(session: Session, request: Request) -> Response:
@@ -130,6 +129,11 @@ def _once(file: Path, kind: str, name: str) -> Response:
     return FileResponse(file, headers=_saved_as(name), media_type=kind, background=remove)
 
 
+def _number(text: str) -> int:
+    """The number in an address, 0 for what is none of ours."""
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 6 else 0
+
+
 def _saved_as(name: str) -> dict[str, str]:
     """The header that gives a browser a file's name, in any script (RFC 6266)."""
     plain = name.encode("ascii", "replace").decode().replace("?", "_")
@@ -162,9 +166,9 @@ def bench_routes(workbench: Workbench) -> list[Route]:
         return RedirectResponse(f"{number}/")
 
     async def opened(request: Request) -> Response:
-        like = request.query_params.get("like", "")
+        like = workbench.sessions.get(_number(request.query_params.get("like", "")))
         try:
-            number = workbench.open(workbench.sessions.get(int(like)) if is_small_number(like) else None)
+            number = workbench.open(like)
         except PlanError as error:
             return JSONResponse({"problem": page_words(f"{error}")}, status_code=422)
         return JSONResponse({"number": number})
@@ -184,10 +188,10 @@ def bench_routes(workbench: Workbench) -> list[Route]:
 
 @dataclass(frozen=True)
 class Served:
-    """What all pages are served: the benches in their own event loop, the prints, the files that pages send."""
+    """What all pages are served: the benches, the event loop in which they live, the prints, the files that pages send."""
 
     workbench: Workbench
-    sessions: SessionsThread
+    benches: asyncio.AbstractEventLoop
     prints: Prints
     uploads: Uploads
 
@@ -207,15 +211,33 @@ def lan_application(served: Served, door: Door, lan: Lan, port: int) -> ASGIApp:
 
 
 def _router(served: Served, page: tuple[bytes, str], further: Sequence[BaseRoute] = ()) -> ASGIApp:
-    """What is of the prints, and further, is answered in the server's own event loop, all else in that of the sessions."""
+    """What is of the prints, and further, is answered in the server's own event loop, all else in that of the benches, so that an
+    emergency stop waits for nothing that a bench has the processor do."""
     workbench, prints = served.workbench, served.prints
     of_prints = [
         Route(BELOW + "prints/{print:int}/log", print_log(prints)),
         Route(BELOW + "prints/{print:int}/webcam", print_webcam(prints)),
-        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench, served.sessions)),
+        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench, served.benches)),
     ]
-    others = served.sessions.application(_of_sessions(workbench, page, served.uploads))
+    others = answered_in(served.benches, _of_sessions(workbench, page, served.uploads))
     return Router([*of_prints, *further], redirect_slashes=False, default=others)
+
+
+def answered_in(loop: asyncio.AbstractEventLoop, app: ASGIApp) -> ASGIApp:
+    """An application that runs in another event loop than its server."""
+
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+        server = asyncio.get_running_loop()
+
+        async def received() -> Message:
+            return await in_loop(server, receive())  # type: ignore[arg-type]
+
+        async def sent(message: Message) -> None:
+            await in_loop(server, send(message))  # type: ignore[arg-type]
+
+        await in_loop(loop, app(scope, received, sent))  # type: ignore[arg-type]
+
+    return answer
 
 
 def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads) -> ASGIApp:
@@ -225,10 +247,10 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
 
     routes = [
         route("", _page(*page)),
-        route("model/{key}", _model),
-        route("marks/{key}", _marks),
-        route("pedestal/{key}", _pedestal),
-        route("facets/{key}", _facets),
+        route("model/{key}", _of_key(_model_key, _model)),
+        route("marks/{key}", _of_key(lambda session: marks_key(session.bench), _marks)),
+        route("pedestal/{key}", _of_key(lambda session: pedestal_key(session.bench, session.standing.result), _pedestal)),
+        route("facets/{key}", _of_key(_model_key, _facets)),
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
         route("left/{number:int}", uploads.open_left, "POST"),
@@ -245,7 +267,7 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("walls/{number:int}/{part:int}", print_walls),
         route("print.html", shared_page),
         route("print.gcode", gcode),
-        route("settings.json", _settings(uploads.profiles)),
+        route("settings.json", _settings(uploads)),
         WebSocketRoute(BELOW + "line", _line(workbench)),
     ]
     return Starlette(routes=[*bench_routes(workbench), *routes])
@@ -289,45 +311,48 @@ def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
     return connect
 
 
+def _of_key(current: Callable[[Session], str], act: Act) -> Act:
+    """What a page asks for by a key as long as that is the current one; else there is another by now, which it asks for next."""
+
+    async def answer(session: Session, request: Request) -> Response:
+        key = current(session)
+        return await act(session, request) if key and key == request.path_params["key"] else Response(status_code=204)
+
+    return answer
+
+
+def _model_key(session: Session) -> str:
+    return "" if session.bench.model is None else session.bench.model.key
+
+
 async def _model(session: Session, request: Request) -> Response:
-    model = session.bench.model
-    if model is None or model.key != request.path_params["key"]:
-        return Response(status_code=204)  # there is another one by now, which the page asks for next
-    return FileResponse(model.mesh_file, media_type="application/octet-stream")
+    assert session.bench.model is not None
+    return FileResponse(session.bench.model.mesh_file, media_type=BYTES)
 
 
 async def _pedestal(session: Session, request: Request) -> Response:
-    standing = session.standing.result
-    if standing is None or pedestal_key(session.bench, standing) != request.path_params["key"]:
-        return Response(status_code=204)
-    return Response(standing.pedestal, media_type="application/octet-stream")
+    assert session.standing.result is not None
+    return Response(session.standing.result.pedestal, media_type=BYTES)
 
 
 async def _facets(session: Session, request: Request) -> Response:
-    model = session.bench.model
-    if model is None or model.key != request.path_params["key"]:
-        return Response(status_code=204)
-    return Response(await session.quick.run("rest_facets", model), media_type="application/json")
+    return Response(await session.quick.run("rest_facets", session.bench.model), media_type="application/json")
 
 
 async def _pieces(session: Session, request: Request) -> Response:
-    return FileResponse(await session.pieces.get(), media_type="application/octet-stream")
+    return FileResponse(await session.pieces.get(), media_type=BYTES)
 
 
 async def _marks(session: Session, request: Request) -> Response:
-    bench = session.bench
-    if not request.path_params["key"] or marks_key(bench) != request.path_params["key"]:
-        return Response(status_code=204)  # there are others by now, which the page asks for next
-    return Response(await session.quick.run("mark_faces", bench), media_type="application/octet-stream")
+    return Response(await session.quick.run("mark_faces", session.bench), media_type=BYTES)
 
 
-def _settings(files: ProfileFiles) -> Act:
+def _settings(uploads: Uploads) -> Act:
     async def answer(session: Session, request: Request) -> Response:
-        given = files.as_shown(session.bench.given)
+        given = uploads.as_shown(session.bench.given)
         bench = replace(session.bench, given=given)
         names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
-        part = request.query_params.get("part", "")
-        rows = settings_list(bench.profile, session.bench.given, int(part) if is_small_number(part) else 0)
+        rows = settings_list(bench.profile, session.bench.given, _number(request.query_params.get("part", "")))
         return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
 
     return answer

@@ -1,9 +1,9 @@
 """Snapshot: the state of a session as its pages get it, as JSON: the bench, the slices and whether they can be printed."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 from hashlib import sha256
-from typing import Any, Literal
+from typing import Any
 
 from machine.dryrun.findings import Finding
 from machine.program import Alternative
@@ -11,77 +11,49 @@ from machine.quantities import about, duration, filament_g, newtons, percent, pr
 from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench
+from machine.workbench.bench.changes import Cuts
 from machine.workbench.bench.model import Model
-from machine.workbench.bench.planes import Cuts
 from machine.workbench.session.commands import Need, lacking
-from machine.workbench.session.placement import pedestal_key
+from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session
 from mdp.joint import Joint
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
-from mdp.zone import AnyZone, MeshVolume, Modifier, Zone
+from mdp.zone import MeshVolume, Modifier, Zone
 from profiles.material import Material
 from profiles.messages import terminal_words
 from profiles.profile import Profile
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # that a page draws
+# What a button says, and the command of the workbench that it gives.
+SLICE_AGAIN = {"text": "Slice again", "command": {"do": "slice"}}
+SUPPORT_ON = {"text": "Switch support on", "command": {"do": "set", "key": "process.support", "value": "auto"}}
+NO_PURGE = {"text": "Print no purge line", "command": {"do": "set", "key": "machine.purge_mm", "value": "0"}}
 
 
-@dataclass(frozen=True)
-class Remedy:
-    """What a button says, and the command of the workbench that it gives."""
-
-    text: str
-    command: Mapping[str, object]
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """finding: place in the list of the one that the text is about, -1: none; remedy: what a button does about it."""
-
-    kind: Literal["ready", "problem", "stale"]
-    text: str
-    finding: int = -1
-    remedy: Remedy | None = None
-
-
-SLICE_AGAIN = Remedy("Slice again", {"do": "slice"})
-
-
-def _without_purge(profile: Profile) -> Remedy | None:
-    return Remedy("Print no purge line", _set("machine.purge_mm", "0")) if profile.machine.purge_mm > 0.0 else None
-
-
-def _set(key: str, value: str) -> dict[str, object]:
-    return {"do": "set", "key": key, "value": value}
-
-
-SUPPORT_ON = Remedy("Switch support on", _set("process.support", "auto"))
-# By the code of a finding: what a setting can do about it.
-REMEDIES: dict[str, Callable[[Profile], Remedy | None]] = {"purge": _without_purge}
-
-
-def verdict_of(findings: Sequence[Finding], profile: Profile, hanging_mm2: float, *, out_of_date: bool) -> Verdict:
+def verdict_of(findings: Sequence[Finding], profile: Profile, hanging_mm2: float, *, out_of_date: bool) -> dict[str, Any]:
     """Whether slices with these findings, made with this profile, can be printed. hanging_mm2: of faces that need support;
-    out_of_date: the bench was changed since."""
+    out_of_date: the bench was changed since.
+
+    `kind`: ready, problem or stale; `finding`: place in the list of the one that the text is about, -1: none; `remedy`: the
+    button that does something about it."""
+    verdict: dict[str, Any] = {"kind": "ready", "finding": -1, "remedy": None}
     if out_of_date:
-        return Verdict("stale", "Out of date: the workbench was changed since it was sliced", remedy=SLICE_AGAIN)
+        text = "Out of date: the workbench was changed since it was sliced"
+        return verdict | {"kind": "stale", "text": text, "remedy": SLICE_AGAIN}
     errors = [k for k, finding in enumerate(findings) if finding.severity == "error"]
     if errors:
         count = "1 problem" if len(errors) == 1 else f"{len(errors)} problems, the first"
-        return Verdict("problem", f"{count}: {findings[errors[0]].message}", errors[0], _remedy(findings[errors[0]], profile))
+        first = findings[errors[0]]
+        remedy = NO_PURGE if first.code == "purge" and profile.machine.purge_mm > 0.0 else None
+        return verdict | {"kind": "problem", "text": f"{count}: {first.message}", "finding": errors[0], "remedy": remedy}
     process = profile.process
     if process.support == "none" and not process.spiral_vase and hanging_mm2 > process.support_least_mm2:
-        return Verdict("ready", f"Ready to print, but {hanging_mm2:.0f} mm² hang over without support", remedy=SUPPORT_ON)
+        return verdict | {"text": f"Ready to print, but {hanging_mm2:.0f} mm² hang over without support", "remedy": SUPPORT_ON}
     warnings = f"; {len(findings)} warning{'s' * (len(findings) > 1)} below" if findings else ""
-    return Verdict("ready", f"Ready to print{warnings}")
-
-
-def _remedy(finding: Finding, profile: Profile) -> Remedy | None:
-    find = REMEDIES.get(finding.code)
-    return None if find is None else find(profile)
+    return verdict | {"text": f"Ready to print{warnings}"}
 
 
 def slices_state(session: Session) -> dict[str, Any]:
@@ -134,7 +106,7 @@ def _under_way(session: Session) -> dict[str, Any] | None:
     slicing = session.slicing.progress
     if slicing is None:
         return None
-    return {"text": slicing.text, "number": slicing.number, "shares": slicing.shares, "ready": sorted(slicing.walls)}
+    return {"text": slicing.text, "number": session.slicing.number, "shares": slicing.shares, "ready": sorted(slicing.walls)}
 
 
 def _sliced(session: Session) -> dict[str, Any] | None:
@@ -153,7 +125,7 @@ def _sliced(session: Session) -> dict[str, Any] | None:
             ("filament", f"{sliced.filament_mm / 1000.0:.2f} m, {filament_g(sliced.filament_mm, profile.material):.1f} g"),
             *([("costs", costs)] if costs else []),
         ],
-        "verdict": asdict(verdict_of(sliced.findings, profile, sliced.cost.risky_mm2, out_of_date=session.slicing.out_of_date)),
+        "verdict": verdict_of(sliced.findings, profile, sliced.cost.risky_mm2, out_of_date=session.slicing.out_of_date),
         "joints": [_joint(joint) for joint in sliced.cost.joints],
         "findings": [asdict(finding) for finding in sliced.findings[:MOST_FINDINGS]],
         "more_findings": max(len(sliced.findings) - MOST_FINDINGS, 0),
@@ -213,7 +185,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "copies_told": _copies_told(session),
         "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
-        "benches": [asdict(bench) for bench in session.benches],
+        "benches": session.benches,
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }
@@ -236,13 +208,12 @@ def marks_key(bench: Bench) -> str:
 
 
 def _zones(bench: Bench) -> list[dict[str, Any]]:
-    kinds = ((kind, enumerate(getattr(bench.zones, kind), start=1)) for kind in ZONE_KINDS)
-    return [{"kind": kind, "number": number, **asdict(_shown(zone))} for kind, zones in kinds for number, zone in zones]
-
-
-def _shown(zone: AnyZone) -> AnyZone:
-    """A zone as the page shows it: a mesh by the box around it."""
-    return zone.box if isinstance(zone, MeshVolume) else zone
+    """The zones as the page shows them: a mesh by the box around it."""
+    return [
+        {"kind": kind, "number": number, **asdict(zone.box if isinstance(zone, MeshVolume) else zone)}
+        for kind in ZONE_KINDS
+        for number, zone in enumerate(getattr(bench.zones, kind), start=1)
+    ]
 
 
 def _modifier(modifier: Modifier) -> dict[str, Any]:
@@ -276,7 +247,9 @@ def _trial(session: Session) -> dict[str, Any] | None:
     if session.trials.trial is None or session.trials.trial[0].sought != session.bench.sought:
         return None
     _, cuts, trial = session.trials.trial
-    return {"cuts": _cuts(cuts), **asdict(trial)}
+    figures = asdict(trial)
+    rejected = {"refused": figures.pop("rejected"), "refused_part": figures.pop("rejected_part")}
+    return {"cuts": _cuts(cuts), **figures, **rejected}
 
 
 def _refused(session: Session) -> dict[str, Any] | None:

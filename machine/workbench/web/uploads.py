@@ -28,49 +28,21 @@ TEXT_SUFFIX = ".toml"  # of plans and profiles
 MIB = 2**20
 
 
-class ProfileFiles:
-    """A folder of them."""
+class Uploads:
+    """most_mib: the largest file that is taken; left: files of a workbench that was killed, each known to the pages by its
+    place."""
 
-    def __init__(self) -> None:
-        self._received = Received()
-
-    async def take(self, path: Path, session: Session) -> bool:
-        """Whether a file that a page has sent is a profile, which is then taken in place of the bench's machine, material or
-        process. Raises ProfileError for one that is not valid."""
-        try:
-            kind = kind_in(path)
-        except ProfileError:
-            return False
-        copy = str(shutil.copy(path, self._received.new_file(path.name)))
-        try:
-            await session.take_given(f"take {path.name}", lambda given: named(given, kind, copy))
-        except ProfileError as error:
-            remove_file(Path(copy))
-            raise ProfileError(f"{error}".replace(f"{Path(copy).parent}{os.sep}", "")) from None
-        return True
-
-    def copied(self, given: Given, own_names: dict[str, str]) -> Given:
-        """The same with copies of the profiles that are files, which have these names. Raises OSError."""
-        for kind, name in own_names.items():
-            given = named(given, kind, str(shutil.copy(getattr(given, kind), self._received.new_file(name))))
-        return given
+    def __init__(self, most_mib: int, left: Sequence[Path] = ()) -> None:
+        self._most_mib, self._left = most_mib, left
+        self._profiles = Received()
 
     def as_shown(self, given: Given) -> Given:
         """Names and settings for a person, who knows of a file that was sent by its own name alone."""
         for kind in KINDS:
             file = Path(getattr(given, kind))
-            if file.parent.parent == self._received.path:
+            if file.parent.parent == self._profiles.path:
                 given = named(given, kind, file.name)
         return given
-
-
-class Uploads:
-    """profiles: the profile files among them; most_mib: the largest file that is taken; left: files of a workbench that was
-    killed, each known to the pages by its place."""
-
-    def __init__(self, most_mib: int, left: Sequence[Path] = ()) -> None:
-        self.profiles = ProfileFiles()
-        self._most_mib, self._left = most_mib, left
 
     async def take(self, session: Session, request: Request) -> Response:
         """A file that the person has chosen or dropped; what is refused is not kept."""
@@ -138,8 +110,26 @@ class Uploads:
         return JSONResponse({})
 
     def _with_copies(self, project: Project) -> Project:
-        """The project with copies of its profiles, which benches may share. Raises OSError."""
-        return replace(project, given=self.profiles.copied(project.given, project.own_names))
+        """The project with copies of its profiles that are files, which benches may share. Raises OSError."""
+        given = project.given
+        for kind, name in project.own_names.items():
+            given = named(given, kind, str(shutil.copy(getattr(given, kind), self._profiles.new_file(name))))
+        return replace(project, given=given)
+
+    async def _take_profile(self, path: Path, session: Session) -> bool:
+        """Whether a file that a page has sent is a profile, which is then taken in place of the bench's machine, material or
+        process. Raises ProfileError for one that is not valid."""
+        try:
+            kind = kind_in(path)
+        except ProfileError:
+            return False
+        copy = str(shutil.copy(path, self._profiles.new_file(path.name)))
+        try:
+            await session.take_given(f"take {path.name}", lambda given: named(given, kind, copy))
+        except ProfileError as error:
+            remove_file(Path(copy))
+            raise ProfileError(f"{error}".replace(f"{Path(copy).parent}{os.sep}", "")) from None
+        return True
 
     async def _open(
         self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]], of_device: bool = False
@@ -159,7 +149,7 @@ class Uploads:
                 elif path.suffix.lower() != TEXT_SUFFIX:
                     await session.open_model(path, name)
                     taken = True
-                elif not await self.profiles.take(path, session):
+                elif not await self._take_profile(path, session):
                     await session.open_plan(path)
         finally:
             waits = session.unscaled is not None and session.unscaled.path == path

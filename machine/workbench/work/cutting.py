@@ -1,10 +1,14 @@
-"""Cutting: finding parts, cutting by planes, and making the files and pictures of the parts, as tasks of the workbench."""
+"""Cutting: finding parts, cutting by planes, trying planes, and making the files and pictures of the parts, as tasks.
+
+Planes are tried by a process that keeps what it has worked out for the last bench. A bench has a number for that, which no other
+one of this run of the program has; it goes along with every task, for the process may have worked for another bench meanwhile.
+"""
 
 import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import takewhile
+from itertools import product, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -20,25 +24,31 @@ from machine.view.encoding import pack
 from machine.view.parts import page_colours
 from machine.view.scene import solids, surfaces
 from machine.workbench.bench.bench import Bench, locked_plan, plan_of_bench
+from machine.workbench.bench.changes import Cuts
 from machine.workbench.work.folders import work_of
+from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import standing_still
 from mdp.joint import is_sound, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
+from mdp.plane import Plane
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
 from mdp.search.orient import orient_and_decompose
-from mdp.search.plan_file import PlanFile, plan_of, planned_parts
+from mdp.search.plan_file import PlanFile, PlannedPart, plan_of, planned_parts
 from mdp.search.plan_writing import plan_text
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
+from mdp.search.trial import Trial, Trials
 from mdp.zone import NO_ZONES
 from profiles.errors import MoveError, PlanError
-from profiles.profile import Profile
+from profiles.profile import Profile, load
 
 PLAN_NAME = "plan.toml"
 AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # the page's own words
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
+UNTILTED = 1.0 - 1e-9  # cosine between two normals that are the same but for rounding
+_ready: tuple[int, Trials] | None = None  # of the bench that this process has heard of last
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +57,6 @@ class Searched:
 
     text: str
     best: FrontRow | None = None
-
-
-@dataclass(frozen=True)
-class SearchWay:
-    """How parts are sought, beside what the profile says. orient: lay the model down in the cheapest orientation, chosen with
-    them, unless a person has turned the model or locked or marked something on it; ranker: a name for `ranker_named`."""
-
-    orient: bool = True
-    ranker: str = CLASSIC
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +68,13 @@ class Found:
     turn: Floats | None = None
 
 
-def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
-    """What a search as `decompose` makes it has found. Raises UserError."""
-    ranker_named(way.ranker)
+def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLASSIC) -> Found:
+    """What a search as `decompose` makes it has found. Raises UserError.
+
+    orient: lay the model down in the cheapest orientation, chosen with the parts, unless a person has turned the model or locked
+    or marked something on it; ranker: a name for `ranker_named`.
+    """
+    ranker_named(ranker)
     assert bench.model is not None
     tell(Searched(f"reading {bench.model.faces:,} faces"))
     mesh, name, profile, locked = turned_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
@@ -95,11 +100,11 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
 
         by_hand = with_shapes(bench, locked, candidate)
         return decompose(
-            candidate, name, profile, SearchRequest(ranker=way.ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
+            candidate, name, profile, SearchRequest(ranker=ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
         )
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
-    if way.orient and untouched and lies_freely(profile):
+    if orient and untouched and lies_freely(profile):
         tell(Searched(f"weighing the ways in which {len(mesh.faces):,} faces may lie"))
         oriented = orient_and_decompose(mesh, profile, pricing, search)
         turn = None if oriented.orientation is None else oriented.orientation.rotation
@@ -229,3 +234,60 @@ def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
         "front.png": front_picture(decomposition, bench.profile),
     }
     write_zip(out, [(name, png_bytes(image)) for name, image in images.items()])
+
+
+def make_ready(tell: Tell, number: int, bench: Bench) -> None:
+    """Work out once what planes on a bench of this number need."""
+    _trials(number, bench)
+
+
+def load_kernels(tell: Tell) -> None:
+    """Have what planes need loaded, or compiled, before there is a model: a box shows what that is. From now on the process is
+    another bench's."""
+    global _ready
+    _ready = None
+    compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
+    corners = np.array(list(product((0.0, 10.0), repeat=3)))
+    Trials(convex_hull(corners), load()).warm()
+
+
+def try_cuts(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], most_cuts: float) -> Trial:
+    """Planes tried; most_cuts: see mdp.search.trial."""
+    return _trials(number, bench).attempt(_planes(cuts), most_cuts)
+
+
+def near_neck(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> Plane | None:
+    """The neck near the plane of a part, as `Trials.neck` finds it."""
+    return _trials(number, bench).neck(_planes(cuts), part, reach_mm)
+
+
+def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]]) -> Cuts | None:
+    """Planes in the order in which that of one part, whose number goes with them, is least shifted until all can be cut, as
+    `Trials.nearest` finds it; None: that is not so in any."""
+    trials, best = _trials(number, bench), None
+    for cuts, part in orders:
+        wanted, plane = cuts[part - 2].plane, trials.nearest(_planes(cuts), part)
+        if plane is None or wanted is None:
+            continue
+        leans, far_mm = float(plane.normal @ wanted.normal) < UNTILTED, abs(plane.offset_mm - wanted.offset_mm)
+        if best is None or (leans, far_mm) < best[0]:
+            put = PlannedPart.of(plane)
+            best = (leans, far_mm), (*cuts[: part - 2], put, *cuts[part - 1 :])
+    return None if best is None else best[1]
+
+
+def _trials(number: int, bench: Bench) -> Trials:
+    global _ready
+    if _ready is None or _ready[0] != number:
+        _ready = None  # two at once would be too much for the memory
+        compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
+        mesh = turned_mesh(bench)
+        zones = with_shapes(bench, plan_of_bench(bench, PLAN_NAME), mesh).zones
+        trials = Trials(mesh, bench.profile, zones)
+        trials.warm()
+        _ready = number, trials
+    return _ready[1]
+
+
+def _planes(cuts: tuple[PlannedPart, ...]) -> list[Plane]:
+    return [plane for part in cuts if (plane := part.plane) is not None]

@@ -11,7 +11,7 @@ from machine.pipeline.embedded_profile import has_settings
 from machine.pipeline.plate import places_of
 from machine.planning.fit import Place
 from machine.workbench.bench.bench import Bench, plan_of_bench
-from machine.workbench.bench.marks import named_faces
+from machine.workbench.bench.changes import workpiece_mesh
 from machine.workbench.bench.model import Model, mesh_blocks
 from machine.workbench.bench.values import vector_of
 from machine.workbench.work.cutting import PLAN_NAME, cut_bench, out_of_reach, turned_mesh
@@ -19,13 +19,15 @@ from mdp.decomposition import Decomposition
 from mdp.directions.orientation import in_words, resting_facets, side_in_words
 from mdp.kernels.workers import Tell
 from mdp.mesh import Mesh
-from mdp.overhang import risky_upright
+from mdp.overhang import Mask, risky_upright
 from mdp.pedestal import on_pedestal, pedestal_under
 from mdp.ranking.ranker import CLASSIC
 from mdp.read import SizeError
 from mdp.read import read_model as read_model_file
 from mdp.search.orient import distinct_orientations
 from mdp.search.parts import one_piece
+from mdp.search.plan_file import ZONE_KINDS
+from mdp.zone import Zone
 from profiles.errors import MeshError, PlanError
 from profiles.frozen import Vector
 from profiles.profile import Profile
@@ -93,6 +95,17 @@ def rest_facets(tell: Tell, model: Model) -> bytes:
 def mark_faces(tell: Tell, bench: Bench) -> bytes:
     """(m,) of each face of the model in which kinds of zones that are no boxes it is: a bit each, in their order."""
     return bytes(np.packbits(named_faces(bench), axis=0, bitorder="little")[0])
+
+
+def named_faces(bench: Bench) -> Mask:
+    """(kinds, m) which faces of the model the zones that are no boxes mean."""
+    mesh = workpiece_mesh(bench)
+    rows = np.zeros((len(ZONE_KINDS), len(mesh.faces)), dtype=np.bool_)
+    for row, kind in zip(rows, ZONE_KINDS, strict=True):
+        for zone in getattr(bench.zones, kind):
+            if not isinstance(zone, Zone):
+                row |= zone.faces(mesh)
+    return rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,16 +9,20 @@ from machine.crash import bug_in_words
 from machine.workbench.work.cutting import (
     draw_pieces,
     find_parts,
+    load_kernels,
     make_folder,
     make_pictures,
     make_plan,
     make_project,
+    make_ready,
     measure_plan,
+    near_neck,
+    nearest,
     price_row,
+    try_cuts,
 )
 from machine.workbench.work.models import mark_faces, rank_resting, read_model, rest_facets, stand
 from machine.workbench.work.slices import compare_bench, share_page, slice_bench
-from machine.workbench.work.trials import load_kernels, make_ready, near_neck, nearest, try_cuts
 from mdp.kernels.workers import tell
 from profiles.errors import UserError
 
@@ -47,7 +51,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         near_neck,
         nearest,
     )
-} | {"mark": lambda tell, bench, marking: marking.zones(bench)}
+} | {"mark": lambda tell, bench, marking: marking(bench)}
 
 
 def load() -> None:

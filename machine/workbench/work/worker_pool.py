@@ -5,18 +5,41 @@ that is cancelled is stopped at once by ending its process.
 """
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator, Iterator
 from contextlib import aclosing, asynccontextmanager, suppress
-from typing import Any
+from threading import Thread
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
-from machine.workbench.work.heard import heard
 from mdp.kernels.workers import CallError, KilledError, Tell, Worker
 from profiles.errors import UserError
 
 CLOSED = "this bench is closed: nothing is worked out for it any more"
 REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
+Value = TypeVar("Value")
 DO, LOAD = "machine.workbench.work.tasks:do", "machine.workbench.work.tasks:load"
+
+
+async def heard(values: Iterator[Value]) -> AsyncGenerator[Value, None]:
+    """What a process says, in an event loop, and the error that ends it. A thread waits for it, which holds up the end of neither
+    loop nor program; who leaves before makes sure that the process ends."""
+    loop, coming = asyncio.get_running_loop(), asyncio.Queue[tuple[Value] | Exception | None]()
+
+    def hear() -> None:
+        with suppress(RuntimeError):  # the loop is closed
+            try:
+                for value in values:
+                    loop.call_soon_threadsafe(coming.put_nowait, (value,))
+            except Exception as error:  # noqa: BLE001 - it is raised in the loop
+                loop.call_soon_threadsafe(coming.put_nowait, error)
+            else:
+                loop.call_soon_threadsafe(coming.put_nowait, None)
+
+    Thread(target=hear, name="heard", daemon=True).start()
+    while (came := await coming.get()) is not None:
+        if isinstance(came, Exception):
+            raise came
+        yield came[0]
 
 
 class WorkerPool:

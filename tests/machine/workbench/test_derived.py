@@ -10,7 +10,7 @@ import pytest
 
 from machine.workbench.bench.bench import Bench, Step
 from machine.workbench.session.base import Derived, SessionBase
-from machine.workbench.session.placement import standing_of
+from machine.workbench.session.planes import standing_of
 from machine.workbench.work.worker_pool import WorkerPools
 from profiles.errors import PlanError, UserError
 from profiles.profile import load

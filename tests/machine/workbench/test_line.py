@@ -8,8 +8,8 @@ from contextlib import asynccontextmanager
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
+from machine.workbench.session.base import Observable
 from machine.workbench.web.line import tell, until_either_ends
-from machine.workbench.work.observable import Observable
 from tests.machine.prints import prints_line
 from tests.machine.running_workbench import workbench
 

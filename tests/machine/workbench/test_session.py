@@ -17,7 +17,7 @@ from machine.workbench.bench.bench import Bench, with_front, with_profile
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
-from machine.workbench.work.cutting import Found, Searched, SearchWay
+from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
 from machine.workbench.work.tasks import TASKS
 from machine.workbench.work.worker_pool import WorkerPools
@@ -38,7 +38,7 @@ EDIT = st.fixed_dictionaries({
 
 @pytest.fixture(autouse=True)
 def _nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.workbench.session.placement.CHANGING_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.planes.CHANGING_S", 0.0)
     monkeypatch.setattr("machine.workbench.session.planes.REST_S", 0.0)
 
 
@@ -202,7 +202,7 @@ def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_tol
             return replace(best, time_s=60.0) if task == "price_row" else await asyncio.sleep(9.0)
 
         session.long.run = price  # type: ignore[method-assign]
-        session.finding.search(SearchWay())
+        session.finding.search()
         await asyncio.sleep(0)
         session.finding.progress = Searched("", best)
         session.stop()()
@@ -240,7 +240,7 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
         assert session.slicing.progress is not None
-        assert session.slicing.progress.bench is session.bench
+        assert session.slicing.bench is session.bench
 
     session = when_done(work)
     assert session.slicing.done is not None
@@ -400,3 +400,51 @@ def test_a_stop_ends_the_search_at_once_though_a_command_before_it_is_still_exec
             assert (is_seeking(session), session.stopped) == (False, "")
 
     assert when_done(work).stopped == "The search was stopped before it had cut anything: all is as it was."
+
+
+def test_a_stop_reaches_work_that_still_waits_for_its_turn() -> None:
+    async def work(session: Session) -> None:
+        async with session.turn:
+            for name in ("search", "slice", "stop"):
+                obey(session, {"do": name})
+        await settled(session)
+        assert (is_seeking(session), session.slicing.progress, session.slicing.number) == (False, None, 0)
+        stopped.append(session.stopped)
+        obey(session, {"do": "slice"})
+
+    stopped: list[str] = []
+    session = when_done(work)
+    assert session.slicing.number == 1
+    assert stopped == [
+        "The search was stopped before it had cut anything: all is as it was. Slicing was stopped: there are no slices."
+    ]
+
+
+def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a_front_that_was_found_has_its_own() -> None:
+    rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0, chosen=True))
+    priced: list[int] = []
+
+    async def work(session: Session) -> None:
+        async def price(task: str, bench: Bench, row: int, **more: Any) -> Any:
+            priced.append(row)
+            for _ in range(5):
+                await asyncio.sleep(0)
+            return replace(bench.rows[row], time_s=60.0)
+
+        session.long.run = price  # type: ignore[assignment, method-assign]
+        session.do("find", replace(with_front(session.bench, rows), priced=False))
+        for count in (2, 3):
+            await asyncio.sleep(0)
+            obey(session, {"do": "copies", "count": count})
+
+    bench = when_done(work).bench
+    assert (priced, bench.priced, bench.copies) == ([0, 1], True, 3)
+    assert with_front(replace(bench, priced=False), rows).priced
+
+
+@pytest.mark.parametrize("key", ["", "=:", "walls"])
+def test_what_is_no_key_is_not_set(key: str) -> None:
+    async def work(session: Session) -> None:
+        obey(session, {"do": "set", "key": key, "value": ":"})
+
+    assert when_done(work).problem == f"{key!r} is not a key of a profile"

@@ -12,7 +12,6 @@ import pytest
 from machine.pipeline.requests import Given
 from machine.planning.stops import parse_stops
 from machine.workbench.bench.bench import USUAL, Bench, History, Step, with_cuts, with_model_turned_as_read
-from machine.workbench.bench.changes import ResetPart, SetPart, Stand, Turn
 from machine.workbench.bench.settings import (
     check_block,
     export_command,
@@ -30,7 +29,7 @@ from profiles.messages import terminal_words
 from profiles.part_settings import OF_PARTS_ON_PLASTIC
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys
-from tests.machine.workbench.models import changed, model
+from tests.machine.workbench.models import changed, changed_bench, model
 
 LOW, MIDDLE, HIGH = (PlannedPart((0.0, 0.0, 1.0), offset) for offset in (10.0, 20.0, 30.0))
 BENCH = Bench(load(), model(), cuts=(LOW, MIDDLE))
@@ -120,7 +119,7 @@ def test_a_value_out_of_range_is_the_command_line_s_sentence() -> None:
 
 
 def with_own(bench: Bench, part: int, key: str, value: str | None) -> Bench:
-    return SetPart(part=part, key=key, value=value).change(bench)
+    return changed_bench(bench, "set_part", part=part, key=key, value=value)
 
 
 def own(bench: Bench) -> dict[int, dict[str, object]]:
@@ -133,7 +132,7 @@ def test_a_part_has_values_of_its_own_that_are_marked_and_go_back() -> None:
     row = next(row for row in settings_list(bench.profile, Given(), 2) if row["key"] == "process.walls")
     assert (row["value"], row["changed"]) == (5, True)
     assert own(with_own(bench, 2, "process.walls", None)) == {2: {"seam": "rear"}}
-    assert own(ResetPart(part=2).change(bench)) == {}
+    assert own(changed_bench(bench, "reset_part", part=2)) == {}
 
 
 def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
@@ -176,12 +175,12 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
     lost = "cut: taken away with part 3: --pause 3:15, its own ironing=true (Undo brings them back)"
     assert terminal_words(after.now.lost) == lost
     assert own(after.undo().now.bench) == {1: {"walls": 5}, 3: {"ironing": True}}
-    turned = changed(steps, Turn, axis="x", deg=90).now
+    turned = changed(steps, "turn", axis="x", deg=90).now
     assert own(turned.bench) == {1: {"walls": 5}}
     assert "--part 3:ironing=true" in turned.lost
     assert bench.model is not None
     assert own(with_model_turned_as_read(bench, bench.model, about(UP, 1.0))) == {1: {"walls": 5}}
-    assert changed(steps, ResetPart, part=3).now.lost == ""
+    assert changed(steps, "reset_part", part=3).now.lost == ""
 
 
 @pytest.mark.parametrize(
@@ -194,7 +193,7 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
 )
 def test_what_a_part_cannot_have_is_told(asked: dict[str, object], sentence: str) -> None:
     with pytest.raises((PlanError, ProfileError), match=sentence):
-        SetPart.of(asked).change(BENCH)
+        changed_bench(BENCH, "set_part", **asked)
 
 
 def test_the_command_line_names_what_differs_from_the_usual() -> None:
@@ -225,6 +224,6 @@ def test_the_command_line_sets_blocks_lists_and_names_as_they_are() -> None:
 @pytest.mark.parametrize("angles_deg", [(20.0, -50.0, 130.0), (0.0, 90.0, 30.0), (0.0, 0.0, 0.0)])
 def test_the_turns_of_the_command_line_stand_the_model_as_it_is(angles_deg: tuple[float, float, float]) -> None:
     profile = load(settings=["process.rotate_deg=[10, 0, 0]"])
-    turned = Stand.of({"rotation": turned_by(angles_deg).tolist()}).change(Bench(profile, BENCH.model))
+    turned = changed_bench(Bench(profile, BENCH.model), "stand", rotation=turned_by(angles_deg).tolist())
     assert turned_by(turns_deg(turned)) == pytest.approx(turned_by(angles_deg) @ turned_by((10.0, 0.0, 0.0)), abs=1e-9)
     assert np.linalg.det(turned_by(turns_deg(turned))) == pytest.approx(1.0)

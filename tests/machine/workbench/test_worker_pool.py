@@ -11,7 +11,6 @@ from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, History, Step, with_model
 from machine.workbench.session.session import Session
 from machine.workbench.work import worker_pool
-from machine.workbench.work.cutting import SearchWay
 from machine.workbench.work.worker_pool import TaskQueue, WorkerPool, WorkerPools
 from mdp.kernels.workers import Worker
 from mdp.model_file import locate
@@ -100,7 +99,7 @@ def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_
 
     async def work() -> float:
         begun = asyncio.Event()
-        search = TaskQueue(pool).run("find_parts", tree, SearchWay(), tell=lambda report: begun.set())
+        search = TaskQueue(pool).run("find_parts", tree, tell=lambda report: begun.set())
         searching = asyncio.create_task(search)
         await begun.wait()
         ranking = asyncio.create_task(rank(TaskQueue(pool)))
@@ -182,7 +181,7 @@ def test_a_search_that_waits_for_the_processes_of_other_benches_says_so() -> Non
             async with AsyncExitStack() as stack:
                 if others:
                     await stack.enter_async_context(pools.long.worker(TaskQueue(pools.long)))
-                session.finding.search(SearchWay())
+                session.finding.search()
                 texts.append(session.finding.progress.text)
                 await asyncio.sleep(0)
                 session.finding.stop()

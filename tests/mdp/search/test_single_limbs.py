@@ -102,7 +102,7 @@ def test_a_trial_refuses_a_limb_that_would_leave_something_in_the_air() -> None:
     plane = PlannedPart((0.0, 0.0, 1.0), 30.0, limbs_mm=((0.0, 0.0, 42.0),)).plane
     assert plane is not None
     trial = Trials(hook, _profile(nozzle_load_n=0.0, fragile_mm=0.0)).attempt([plane])
-    assert "would not stand on the platform" in trial.refused
+    assert "would not stand on the platform" in trial.rejected
 
 
 def test_a_limb_too_near_to_a_tower_is_refused_and_the_place_of_the_tower_is_shown() -> None:
@@ -128,7 +128,7 @@ def test_a_limb_that_begins_too_near_to_the_table_is_refused_with_the_head_that_
     bar = PlannedPart(ALONG, 0.0, limbs_mm=((27.0, 0.0, 10.0),)).plane
     assert bar is not None
     trial = Trials(shapes.from_manifold(low), _profile()).attempt([bar])
-    assert "would meet the table" in trial.refused
+    assert "would meet the table" in trial.rejected
     assert trial.obstacle is not None
     assert trial.obstacle.touch is not None
 
@@ -165,7 +165,7 @@ def test_a_limb_whose_end_is_a_part_of_its_own_is_told_with_its_own_figures() ->
     assert rest is not None
     assert end is not None
     trial = trials.attempt([rest, end])
-    assert trial.refused == ""
+    assert trial.rejected == ""
     assert [part is not None and part.volume_mm3 > 500.0 and part.rim_mm > 20.0 for part in trial.parts] == [True, True]
 
 
@@ -195,7 +195,7 @@ def test_a_limb_moved_by_a_trial_keeps_its_point_and_its_figures_are_those_of_th
     plane = BAR.plane
     assert plane is not None
     trial = trials.attempt([plane])
-    assert trial.refused == ""
+    assert trial.rejected == ""
     forecast = trial.parts[0]
     assert forecast is not None
     assert forecast.volume_mm3 == pytest.approx(_by_hand(shapes.bar_beside_a_tower(), BAR).parts[1].volume_mm3)

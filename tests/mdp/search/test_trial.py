@@ -56,7 +56,7 @@ def test_figures_come_at_once_and_what_a_later_cut_may_forbid_when_there_is_time
     floating = Plane(np.array([0.0, 0.0, 1.0]), 12.0)
     moved = trials(tee())
     at_once = moved.attempt((floating, ARMS[1]), most_cuts=0)
-    assert (at_once.unchecked, at_once.refused, moved.attempt((floating, ARMS[1])).unchecked) == (1, "", 0)
+    assert (at_once.unchecked, at_once.rejected, moved.attempt((floating, ARMS[1])).unchecked) == (1, "", 0)
     assert at_once.parts == moved.attempt((floating, ARMS[1])).parts
 
 
@@ -69,8 +69,8 @@ def test_what_was_tried_before_changes_nothing() -> None:
 def test_the_plane_that_cannot_be_cut_is_named_with_the_reason() -> None:
     outside = Plane(np.array([1.0, 0.0, 0.0]), 25.0)
     tried = trials(tee()).attempt((outside, ARMS[1]))
-    assert (tried.refused_part, tried.support_area_mm2) == (2, None)
-    assert "misses the model" in tried.refused
+    assert (tried.rejected_part, tried.support_area_mm2) == (2, None)
+    assert "misses the model" in tried.rejected
     assert tried.parts[0] is None
     assert tried.parts[1] is not None
 
@@ -78,12 +78,12 @@ def test_the_plane_that_cannot_be_cut_is_named_with_the_reason() -> None:
 def test_a_plane_that_misses_a_model_too_tall_for_the_machine_marks_nothing() -> None:
     below = Plane(np.array([0.0, 0.0, 1.0]), -5.0)
     tried = trials(box(10.0, 10.0, 900.0)).attempt((below,))
-    assert ("misses the model" in tried.refused, tried.obstacle) == (True, None)
+    assert ("misses the model" in tried.rejected, tried.obstacle) == (True, None)
 
 
 def test_no_plane_at_all_is_the_model_in_one_piece() -> None:
     tried = trials(tee()).attempt(())
-    assert (tried.parts, tried.refused, tried.seam_mm) == ((), "", 0.0)
+    assert (tried.parts, tried.rejected, tried.seam_mm) == ((), "", 0.0)
     assert tried.support_area_mm2 == pytest.approx(300.0)  # the undersides of both arms, 15 by 10 mm
 
 
@@ -102,7 +102,7 @@ def test_where_the_head_would_meet_the_table_it_is_shown_at_the_lowest_place_of_
     assert tried.obstacle is not None
     touch = tried.obstacle.touch
     assert touch is not None
-    assert f"the head's {touch.body} would meet the table" in tried.refused
+    assert f"the head's {touch.body} would meet the table" in tried.rejected
     assert np.array(touch.rotation) @ leaning.normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
     assert touch.tip_mm[::2] == pytest.approx((10.0, 4.0 / 0.6))  # where the plane leaves the wall
     silhouette = [touch.tip_mm[2] + height * 0.6 - radius * 0.8 for radius, height in machine.head.silhouette_mm]
@@ -112,7 +112,7 @@ def test_where_the_head_would_meet_the_table_it_is_shown_at_the_lowest_place_of_
 
 def test_what_would_float_is_marked_at_its_lowest_place() -> None:
     tried = trials(tee()).attempt((Plane(np.array([0.8, 0.0, 0.6]), 12.0),))
-    assert "would not stand on the platform" in tried.refused
+    assert "would not stand on the platform" in tried.rejected
     assert tried.obstacle is not None
     ((x, _, z),) = tried.obstacle.places_mm
     assert (x, z) == (-20.0, 30.0)
@@ -120,7 +120,7 @@ def test_what_would_float_is_marked_at_its_lowest_place() -> None:
 
 def test_a_void_is_not_marked_as_floating() -> None:
     tried = trials(hollow_tee()).attempt((Plane(np.array([0.8, 0.0, 0.6]), 13.0),))  # the void at -x reaches up to 12.6 mm
-    assert "would not stand on the platform" in tried.refused
+    assert "would not stand on the platform" in tried.rejected
     assert tried.obstacle is not None
     assert [place[2] for place in tried.obstacle.places_mm] == [30.0]
 
@@ -133,7 +133,7 @@ def test_the_neck_is_that_of_what_the_parts_printed_later_leave() -> None:
 
 def test_a_sliver_is_marked_on_the_surface_that_it_would_be_cut_off() -> None:
     tried = trials(tee()).attempt((Plane(np.array([0.0, 0.0, 1.0]), 39.8),))
-    assert "a sliver 0.2 mm thin" in tried.refused
+    assert "a sliver 0.2 mm thin" in tried.rejected
     assert tried.obstacle is not None
     assert tried.obstacle.places_mm[0][2] == 40.0
 
@@ -162,7 +162,7 @@ def test_where_no_level_plane_can_be_cut_the_nearest_one_leans() -> None:
     nearest = tried.nearest([level], 2)
     assert nearest is not None
     assert nearest.normal[2] < 1.0
-    assert tried.attempt([nearest]).refused == ""
+    assert tried.attempt([nearest]).rejected == ""
 
 
 def test_where_other_planes_are_refused_no_place_helps() -> None:

@@ -219,7 +219,7 @@ def test_a_device_that_is_let_go_loses_its_line_and_what_it_was_sending_at_once(
         scope = {"type": kind, "method": "POST", "path": "/paired/1/line", "headers": headers}
         line = asyncio.create_task(gate(scope, asyncio.Event().wait, send))  # type: ignore[arg-type]
         await asyncio.sleep(0)
-        network.door.unpair(1)
+        network.door.unpair(device=1)
         await asyncio.wait_for(line, 10.0)
         assert network.door.device_of(cookie.partition("=")[2]) is None
         return sent

@@ -1,5 +1,6 @@
 """What is known of slices is not asked for again: a print of them is refused before a printer is asked, or begins sooner."""
 
+import asyncio
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,9 +13,8 @@ from machine.dryrun.findings import Finding, KnownFindings, known_findings
 from machine.printing.destination import Destination, SerialPort, Simulated, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
 from machine.program import Alternative
-from machine.workbench.printing.at_page import AtPage
+from machine.workbench.printing.at_page import AtPage, Slices
 from machine.workbench.printing.commands import job_of
-from machine.workbench.printing.job_state import Slices
 from machine.workbench.printing.prints import FILE, Prints, keep_printer, last_printer
 from machine.workbench.printing.process import carry_out
 from machine.workbench.work.slices import Sliced
@@ -62,7 +62,7 @@ class Silent:
 
 def refusal(given: Any, port: str, **further: Any) -> UserError:
     with pytest.raises(UserError) as refused:
-        job_of(given, parse_destination(port, **further), False)
+        asyncio.run(job_of(given, parse_destination(port, **further), False))
     return refused.value
 
 
@@ -74,7 +74,7 @@ def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_i
     assert (sentence, by_print.state) == (by_print.sentence, "refused")
     assert sentence.startswith("the dry run found ")
     assert "X goes to 500 mm" in sentence
-    assert job_of(session(BAD), parse_destination("/dev/no-such-port"), True).force
+    assert asyncio.run(job_of(session(BAD), parse_destination("/dev/no-such-port"), True)).force
 
 
 @pytest.mark.parametrize(("machine", "port", "further", "sentence"), [

@@ -31,14 +31,13 @@ from machine.printing.servers import follow
 from machine.printing.servers.credentials import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from machine.workbench.printing import running_print
-from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage
+from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage, JobState, Slices
 from machine.workbench.printing.commands import COMMANDS, PageOfPrints, obey
-from machine.workbench.printing.job_state import JobState, Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.process import carry_out
 from machine.workbench.printing.running_print import RunningPrint
 from mdp.kernels.workers import frame, listen
-from profiles.errors import PrinterError
+from profiles.errors import PlanError, PrinterError, UserError
 from profiles.profile import Profile, load
 from tests.machine.link.failing_disk import keep_notes_in
 from tests.machine.printing.servers.stand_ins import KEY, OctoPrintStandIn, stand_in
@@ -215,7 +214,7 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
 LEAVES = """
 import sys, time
 from machine.link.print_state import PrintState, PrintStatus
-from machine.workbench.printing.job_state import JobState
+from machine.workbench.printing.at_page import JobState
 from mdp.kernels.workers import frame, read_frames
 for state in (PrintState.PRINTING, PrintState.LEFT):
     told = JobState(state, "hour", server=True, progress=PrintStatus(), told_s=time.time(), sentence="it goes on")
@@ -423,10 +422,7 @@ def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> No
 
 
 def page_of(prints: Prints, name: str = "me") -> PageOfPrints:
-    async def on_bench(job: Callable[[], PrintJob]) -> PrintJob:
-        return job()
-
-    return PageOfPrints(name, SimpleNamespace(), prints, on_bench)  # type: ignore[arg-type]
+    return PageOfPrints(name, SimpleNamespace(), prints, SimpleNamespace())  # type: ignore[arg-type]
 
 
 def enter(current: RunningPrint, state: str) -> None:
@@ -441,8 +437,11 @@ def prints_with_one(port: str = "sim") -> Prints:
 
 @pytest.mark.parametrize("percent", [float("inf"), float("nan"), "fast", True, 99.5, [1]])
 def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
-    with pytest.raises(PrinterError, match=r"percent is .*: a whole number is expected"):
+    with pytest.raises(PlanError, match=r"percent is .*: it must be a whole number"):
         obey(page_of(prints_with_one()), {"do": "feed", "print": 1, "percent": percent})
+
+
+GIVEN = {"percent": 100, "does": "heat"}
 
 
 @pytest.mark.parametrize(
@@ -451,9 +450,9 @@ def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
 def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_at_once(name: str) -> None:
     prints = prints_with_one()
     with pytest.raises(PrinterError, match="another page commands this print"):
-        obey(page_of(prints, "other"), {"do": name, "print": 1})
+        obey(page_of(prints, "other"), {**GIVEN, "do": name, "print": 1})
     with pytest.raises(PrinterError, match="this print is not there any more"):
-        obey(page_of(prints), {"do": name, "print": 2})
+        obey(page_of(prints), {**GIVEN, "do": name, "print": 2})
     obey(page_of(prints, "other"), {"do": "take", "print": 1})
     assert prints.prints[0].holder == "other"
 
@@ -466,7 +465,7 @@ def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_
 def test_what_cannot_be_asked_of_a_print_is_refused(name: Any, port: str, state: str, allowed: bool) -> None:
     prints = prints_with_one(port)
     enter(prints.prints[0], state)
-    with nullcontext() if allowed else pytest.raises(PrinterError, match="is no command of a print"):
+    with nullcontext() if allowed else pytest.raises(UserError, match=r"no command"):
         obey(page_of(prints), {"do": name, "print": 1})
     assert bool(prints.prints) == (name != "forget" or not allowed)
 

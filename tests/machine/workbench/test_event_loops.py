@@ -1,4 +1,4 @@
-"""The event loop of the sessions and that of the prints: what hangs in the one holds up nothing in the other."""
+"""The event loop of the benches and that of the prints: what hangs in the one holds up nothing in the other."""
 
 import asyncio
 from collections.abc import Iterator
@@ -14,29 +14,30 @@ from machine.dryrun.findings import known_findings
 from machine.pipeline.requests import Given
 from machine.printing.destination import Simulated
 from machine.printing.job import PrintJob
+from machine.workbench.printing.at_page import Slices
 from machine.workbench.printing.commands import PageOfPrints, obey
-from machine.workbench.printing.job_state import Slices
 from machine.workbench.printing.prints import Prints
 from machine.workbench.printing.running_print import RunningPrint
+from machine.workbench.session.base import in_loop
+from machine.workbench.session.long_work import Slicing
 from machine.workbench.session.session import Session, Workbench
-from machine.workbench.session.slicing import Slicing
-from machine.workbench.web.server import Served, application
-from machine.workbench.web.sessions_thread import SessionsThread
+from machine.workbench.web.serve import event_loop
+from machine.workbench.web.server import Served, answered_in, application
 from machine.workbench.web.uploads import Uploads
 from profiles.profile import load
 
+Loop = asyncio.AbstractEventLoop
 PORT, TOKEN = 8000, "token"
 PROFILE = load()
 
 
 @pytest.fixture
-def sessions() -> Iterator[SessionsThread]:
-    thread = SessionsThread()
-    yield thread
-    asyncio.run(thread.end(30.0))
+def benches() -> Iterator[Loop]:
+    with event_loop("benches") as loop:
+        yield loop
 
 
-def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsThread, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_emergency_stop_is_given_while_the_sessions_hang(benches: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
     given, hangs = Event(), Event()
     monkeypatch.setattr(RunningPrint, "stop_at_once", lambda job: given.set())
     workbench, prints = Workbench(lambda pools: Session(PROFILE, Given(), pools)), Prints()
@@ -52,13 +53,13 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
     async def run() -> bool:
         said: asyncio.Queue[Any] = asyncio.Queue()
         messages: asyncio.Queue[Any] = asyncio.Queue()
-        await sessions.run(begin())
-        app = application(Served(workbench, sessions, prints, Uploads(1)), TOKEN, PORT)
+        await in_loop(benches, begin())
+        app = application(Served(workbench, benches, prints, Uploads(1)), TOKEN, PORT)
         line = asyncio.create_task(app(scope(f"/{TOKEN}/1/prints"), said.get, messages.put))  # type: ignore[arg-type]
         said.put_nowait({"type": "websocket.connect"})
         while (await messages.get())["type"] != "websocket.send":
             pass
-        hanging = asyncio.create_task(sessions.run(hang()))
+        hanging = asyncio.create_task(in_loop(benches, hang()))
         while not hangs.is_set():
             await asyncio.sleep(0.01)
         for command in ('{"do": "check", "port": "sim"}', '{"do": "emergency"}'):  # the first waits for the bench, which hangs
@@ -66,7 +67,7 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
         stopped = await hanging
         said.put_nowait({"type": "websocket.disconnect", "code": 1001})
         await line
-        await sessions.run(_close(workbench))
+        await in_loop(benches, _close(workbench))
         return stopped
 
     assert asyncio.run(run())
@@ -89,16 +90,16 @@ class TakenAway(Slicing):
         self._gone.set()
 
 
-def test_an_order_is_of_one_moment_of_its_bench(sessions: SessionsThread, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_order_is_of_one_moment_of_its_bench(benches: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[PrintJob] = []
     monkeypatch.setattr(Prints, "begin", lambda prints, page, job: begun.append(job))
     bench = SimpleNamespace(model=SimpleNamespace(name="box.stl"))
     sliced = SimpleNamespace(known=known_findings([], PROFILE, []), errors=(), gcode=Path("a.gcode"), key="key")
-    slicing = TakenAway(sessions._loop, SimpleNamespace(bench=bench, sliced=sliced))
+    slicing = TakenAway(benches, SimpleNamespace(bench=bench, sliced=sliced))
     session: Any = SimpleNamespace(closed=False, bench=bench, slicing=slicing)
 
     async def run() -> None:
-        work = obey(PageOfPrints("mine", session, Prints(), sessions.call), {"do": "check", "port": "sim"})
+        work = obey(PageOfPrints("mine", session, Prints(), benches), {"do": "check", "port": "sim"})
         assert work is not None
         await work
 
@@ -117,7 +118,9 @@ async def _close(workbench: Workbench) -> None:
     await workbench.close_all()
 
 
-def test_an_application_hears_and_answers_from_the_other_loop_and_is_cancelled_with_its_request(sessions: SessionsThread) -> None:
+def test_an_application_hears_and_answers_from_the_other_loop_and_is_cancelled_with_its_request(
+    benches: Loop,
+) -> None:
     loops: list[Any] = []
     ended = Event()
 
@@ -136,7 +139,7 @@ def test_an_application_hears_and_answers_from_the_other_loop_and_is_cancelled_w
             loops.append(asyncio.get_running_loop())
             return {"body": "asked"}
 
-        answering = asyncio.create_task(sessions.application(app)({"type": "http"}, receive, said.put))
+        answering = asyncio.create_task(answered_in(benches, app)({"type": "http"}, receive, said.put))
         answer = await said.get()
         answering.cancel()
         await asyncio.wait([answering])
@@ -144,4 +147,4 @@ def test_an_application_hears_and_answers_from_the_other_loop_and_is_cancelled_w
 
     body, here = asyncio.run(run())
     assert ended.wait(60.0)
-    assert (body, loops) == ("asked", [sessions._loop, here])
+    assert (body, loops) == ("asked", [benches, here])

@@ -1,0 +1,181 @@
+"""Long work: the search for parts, the prices of a front, slices, and what these cost beside the same model in one piece."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from machine.program import Alternative
+from machine.workbench.bench.bench import Bench, locked_plan, rows_to_price, with_front, with_prices, with_rotation
+from machine.workbench.session.base import WAITING, Derived, SessionBase
+from machine.workbench.work.cutting import Found, Searched
+from machine.workbench.work.slices import Sliced, SlicesSoFar
+from mdp.decomposition import FrontRow
+from mdp.ranking.ranker import CLASSIC
+from profiles.errors import PlanError, UserError
+from profiles.frozen import Vector
+
+ENDED = "slicing has ended, for what lies on the workbench is another now: slice it again"
+
+
+class Finding(Derived[Found]):
+    """A search ends whose model is gone or lies otherwise, or whose settings, marks or locked planes are others now.
+
+    notes: of the last one; laid: how it found the model turned, and how it has turned it."""
+
+    def __init__(self, session: SessionBase) -> None:
+        self.notes: tuple[str, ...] = ()
+        self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
+        self._how = True, CLASSIC
+        super().__init__(
+            session,
+            lambda bench: None if bench.model is None else (bench.sought, locked_plan(bench).parts),
+            lambda bench: session.long.run("find_parts", bench, *self._how, tell=self.teller()),
+            by_itself=False,
+            interrupts=True,
+            accept=self._accept_found,
+        )
+
+    def search(self, orient: bool = True, ranker: str = CLASSIC) -> None:
+        """Search for the parts of the model on the bench, if no search is under way."""
+        if self.progress is None:
+            self._how = orient, ranker
+            self.begin(Searched(WAITING if self._session.long.pool.full else "beginning"))
+
+    def interrupted(self) -> None:
+        """Have another process ready for the next one."""
+        self._session.start(self._session.long.warm())
+
+    def take_best(self, bench: Bench, searched: Searched | None) -> str:
+        """Take the best that a search of a bench had met when it was stopped; its prices are told when they are known. What
+        became of it, as a sentence. searched: None, it had not begun."""
+        best, now = None if searched is None else searched.best, self._session.bench
+        if best is None or not best.planes or self._key_of(now) != self._key_of(bench):
+            return "The search was stopped before it had cut anything: all is as it was."
+        taken = with_front(now, [replace(best, chosen=True)])
+        self._session.do("stop the search", replace(taken, priced=best.time_s is not None))
+        return f"The search was stopped, and the best so far is taken: {best.parts} parts."
+
+    def _accept_found(self, found: Found) -> None:
+        self.notes, now = found.notes, self._session.bench
+        laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
+        self.laid = None if laid is now else (now.rotation, laid.rotation)
+        self._session.do("find parts", with_front(laid, found.front))
+
+
+def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
+    """Times and plastic of the front worked out a row at a time, where a setting has changed that no search reads; slices and
+    searches go between two rows."""
+
+    async def price(bench: Bench) -> dict[int, FrontRow]:
+        prices: dict[int, FrontRow] = {}
+        for row in rows_to_price(bench):
+            if not prices_now.stale:
+                with suppress(UserError):  # then it has none
+                    prices[row] = await session.long.run("price_row", bench, row)
+        return prices
+
+    def accept(prices: dict[int, FrontRow]) -> None:
+        now = replace(session.history.now, bench=with_prices(session.bench, prices))
+        session.become(replace(session.history, now=now))
+
+    prices_now = Derived(
+        session, lambda bench: None if bench.priced else (bench.sought, bench.rows, bench.locked), price, accept=accept
+    )
+    return prices_now
+
+
+@dataclass(frozen=True, eq=False)
+class Slices:
+    """Finished slices: what they are of, their number, and what is seen of each part."""
+
+    bench: Bench
+    number: int
+    sliced: Sliced
+    walls: Mapping[int, bytes]
+
+
+class Slicing(Derived[Slices]):
+    """progress: SlicesSoFar, with all parts that are ready, of the slices of this number; done: the last slices."""
+
+    def __init__(self, session: SessionBase) -> None:
+        super().__init__(session, lambda bench: bench.printed, self._slice, by_itself=False, interrupts=True)
+
+    def latest(self) -> Slices | None:
+        """The last slices of the model on the bench, though it may have been turned, cut or set otherwise since."""
+        return self.done if self.done is not None and self.done.bench.model is self._session.bench.model else None
+
+    @property
+    def out_of_date(self) -> bool:
+        """Whether the last slices are of something else than what lies on the bench now."""
+        return self.done is not None and self.done.bench.printed != self._session.bench.printed
+
+    def lacking(self) -> str:
+        """Why there are no slices of what lies on the bench now; "" where there are."""
+        if self.latest() is None:
+            return "what is on the workbench is not sliced yet: slice it first"
+        return "what is on the workbench has changed since it was sliced: slice it again" if self.out_of_date else ""
+
+    def needed(self) -> Slices:
+        """The slices of what lies on the bench now. Raises PlanError where there are none."""
+        if sentence := self.lacking():
+            raise PlanError(sentence)
+        assert self.done is not None
+        return self.done
+
+    def walls_of(self, number: int, part: int) -> bytes | None:
+        """What is seen of a part of the slices of a number; None where it is not there, or not there yet."""
+        if self.progress is not None and self.number == number:
+            drawn: bytes | None = self.progress.walls.get(part)
+            return drawn
+        return self.done.walls.get(part) if self.done is not None and self.done.number == number else None
+
+    def slice(self) -> None:
+        """Slice the model on the bench, if nothing is being sliced."""
+        self.begin(SlicesSoFar(WAITING if self._session.long.pool.full else "cutting the parts"))
+
+    def interrupted(self) -> None:
+        """Tell the pages."""
+        self._session.add_problem(ENDED)
+
+    async def _slice(self, bench: Bench) -> Slices:
+        walls: dict[int, bytes] = {}
+        number, tell = self.number, self.teller()
+
+        def follow(so_far: SlicesSoFar) -> None:
+            walls.update(so_far.walls)
+            tell(replace(so_far, walls=walls))
+
+        files = self._session.new_file(), self._session.new_file()
+        sliced: Sliced = await self._session.long.run("slice_bench", bench, *files, tell=follow)
+        if self.done is not None:
+            self.done.sliced.page.unlink(missing_ok=True)
+            self.done.sliced.gcode.unlink(missing_ok=True)
+        return Slices(bench, number, sliced, walls)
+
+
+class Comparing(Derived[tuple[Alternative, ...]]):
+    """The slices of the bench beside their model in one piece; progress: how far that is, in words."""
+
+    def __init__(self, session: SessionBase, slicing: Slicing) -> None:
+        self._slicing = slicing
+        super().__init__(
+            session,
+            lambda bench: None if (slices := slicing.latest()) is None else slices.bench.printed,
+            lambda bench: session.long.run("compare_bench", bench, tell=self.teller()),
+            by_itself=False,
+            interrupts=True,
+        )
+
+    def rows(self) -> tuple[Alternative, ...]:
+        """The last slices, then their model in one piece; none where these slices have not been compared."""
+        slices, others = self._slicing.latest(), self.result
+        return () if slices is None or others is None else (slices.sliced.cost, *others)
+
+    def compare(self) -> None:
+        """Compare what is sliced, if that is not done yet; a comparison of earlier slices ends."""
+        if self.stale:
+            self.stop()
+        if not self.rows():
+            self.begin(WAITING if self._session.long.pool.full else "comparing")
