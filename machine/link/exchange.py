@@ -7,7 +7,7 @@ from typing import NamedTuple
 from machine.gcode.commands import command_in
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.connection import GREETING_STATES, Connection
-from machine.link.protocol.events import Event, Position, position_in
+from machine.link.protocol.events import Event
 from machine.link.protocol.framing import LINE_LIMIT
 from machine.link.protocol.states import State
 from machine.link.protocol.timeout import Timing
@@ -45,7 +45,7 @@ class Exchange:
         self.connection = Connection(timing, medium.now_s(), limit=limit, rx_bytes=rx_bytes, baud=baud)
         self.greeted = False
         self._on_event, self._on_turn, self._on_lost = on_event, on_turn, on_lost
-        self._position: Position | None = None
+        self._position: dict[str, float] | None = None
 
     @property
     def waits(self) -> bool:
@@ -78,8 +78,8 @@ class Exchange:
         self.send("M105")
         self.settle()
 
-    def ask_position(self) -> Position | None:
-        """Where the printer says it stands, all moves over; None when it does not report it."""
+    def ask_position(self) -> dict[str, float] | None:
+        """Where the printer says it stands, letter -> mm or deg, all moves over; None when it does not report it."""
         self.send("M400")
         self.settle()
         self._position = None
@@ -107,8 +107,8 @@ class Exchange:
         now_s = self.medium.now_s()
         if data:
             for event in connection.receive(data, now_s):
-                if position := position_in(event):
-                    self._position = position
+                if event.position is not None:
+                    self._position = event.position
                 self._on_event(event)
         connection.tick(now_s)
         if connection.fault is not None:

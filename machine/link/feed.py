@@ -1,6 +1,6 @@
 """Feed: one print under way; the program's commands in order, and between them what person, printer and journal want."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from math import inf
@@ -17,7 +17,7 @@ from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
 from machine.link.print_state import PrintState, PrintStatus
 from machine.link.progress import ProgramPosition, StreamPlan
-from machine.link.protocol.events import Event, Ok, Position
+from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.framing import command_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
@@ -201,7 +201,7 @@ class Feed:
         self._follow_moves()
         position = self.exchange.ask_position()
         self._note_end()
-        return position_differences(self.modal, position.axes, NEAR) if position is not None else []
+        return position_differences(self.modal, position, NEAR) if position is not None else []
 
     def _check_position(self) -> None:
         wrong = self._position_errors()
@@ -244,7 +244,7 @@ class Feed:
     def handle_event(self, event: Event) -> None:
         """An event of the printer."""
         now_s = self.exchange.medium.now_s()
-        if isinstance(event, Ok) and event.line is not None:
+        if event.kind is Kind.OK and event.line is not None:
             window = self.exchange.connection.window
             if window.line_number(event.line) == window.acknowledged:
                 self.history.acknowledge(window.acknowledged, event.planner_free)
@@ -307,11 +307,10 @@ class Feed:
             return None
         return lift_move(self.modal, self._job.profile.machine)
 
-    def record_lift(self, position: Position | None) -> None:
+    def record_lift(self, position: Mapping[str, float] | None) -> None:
         """The tip was lifted off the print for good; position: where the printer says it stands now."""
-        coordinates = dict(position.axes) if position is not None else {}
         if self._journal is not None:
-            pose = tuple(coordinates.get(letter) for letter in self.modal.axes.letters)
+            pose = tuple((position or {}).get(letter) for letter in self.modal.axes.letters)
             self._journal.write(replace(self._checkpoint(), state=LEFT, pose=pose))
 
     def _checkpoint(self) -> Checkpoint:

@@ -96,7 +96,7 @@ class _Inquiry:
         self._port, self._stop = port, stop
         self._decoder = LineDecoder()
         self._words = self._fault = self._letters = ""
-        self._area: events.Area | None = None
+        self._area: tuple[tuple[float, float], ...] = ()
         self._ok = self.named = self.placed = self.starting = self._refused = False
         self._busy = ""  # what it says of that
         self._next_number = 0  # that a firmware which insists on numbers and checksums wants
@@ -147,27 +147,23 @@ class _Inquiry:
         return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
 
     def _read(self, event: events.Event) -> None:
-        if events.is_starting(event):
+        if event.is_starting:
             self.starting = True
-        elif isinstance(event, events.FirmwareFault):
+        elif event.kind is events.Kind.FAULT:
             self._fault = event.text
-        elif isinstance(event, events.Busy):
+        elif event.kind is events.Kind.BUSY:
             self._busy = event.text.rpartition("busy:")[2].strip() or "busy"
-        elif events.lacks_checksum(event):
+        elif event.lacks_checksum:
             self._refused = True
-        elif isinstance(event, events.Resend) and self._refused:
-            self._next_number = event.line
-        elif isinstance(event, events.Area):
-            self._area = event
-        if identity := events.identity_in(event):
-            self._words = identity.text
-        if position := events.position_in(event):
-            self._letters, self.placed = "".join(letter for letter, _ in position.axes if letter != "E"), True
-        if isinstance(event, events.Ok):
+        elif event.kind is events.Kind.RESEND and self._refused:
+            self._next_number = event.line or 0
+        self._area = event.area or self._area
+        self._words = event.identity or self._words
+        if event.position is not None:
+            self._letters, self.placed = "".join(letter for letter in event.position if letter != "E"), True
+        if event.kind is events.Kind.OK:
             self._ok, self.named = True, bool(self._words)
 
     def _limits(self) -> dict[str, tuple[float, float]]:
         """The area with the letters of M114: Marlin names the axes from the fourth on I, J, K, whatever their words are."""
-        if self._area is None or len(self._letters) < len(self._area.axes):
-            return {}
-        return {letter: (low, high) for letter, (_, low, high) in zip(self._letters, self._area.axes, strict=False)}
+        return {} if len(self._letters) < len(self._area) else dict(zip(self._letters, self._area, strict=False))

@@ -185,7 +185,7 @@ def _match_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[int
     """The first line whose position the printer reports, with the state after it: of the one before the first, or ahead."""
     if status.position is None:
         return None
-    reported = dict(status.position.axes)
+    reported = status.position
     for line, modal in ((point.line - 1, point.modal), *point.ahead.items()):
         pairs = [(reported[letter], value) for letter, value in zip(modal.axes.letters, modal.at, strict=True)
                  if value is not None and letter in reported]  # fmt: skip
@@ -204,7 +204,7 @@ def stands_as_begun(status: PrinterStatus, machine: Machine) -> bool:
         return True
     if status.last_number is None:
         return False
-    reported, letters = dict(status.position.axes), axes_of(machine).letters
+    reported, letters = status.position, axes_of(machine).letters
     axes: list[tuple[float, ...]] = [(axis.home_mm,) if axis.home_mm is not None else (0.0, *axis.limits_mm)
                                      for axis in (machine.x, machine.y, machine.z)]  # fmt: skip
     for axis in (machine.tilt, machine.turn):
@@ -216,18 +216,18 @@ def stands_as_begun(status: PrinterStatus, machine: Machine) -> bool:
 
 def _nonzero(status: PrinterStatus) -> bool:
     """Whether the printer says that it stands somewhere else than at 0 0 0."""
-    return status.position is not None and sum(abs(value) > SAME for _, value in status.position.axes) >= SEVERAL
+    return status.position is not None and sum(abs(value) > SAME for value in status.position.values()) >= SEVERAL
 
 
 def _in_words(status: PrinterStatus) -> str:
-    return " ".join(f"{letter}{value:g}" for letter, value in status.position.axes) if status.position is not None else ""
+    return " ".join(f"{letter}{value:g}" for letter, value in (status.position or {}).items())
 
 
 def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[Floats, Pose] | None:
     """Where the printer says it stands; None where an axis is missing."""
     if status.position is None:
         return None
-    reported, letters = dict(status.position.axes), point.modal.axes.letters
+    reported, letters = status.position, point.modal.axes.letters
     if any(letter not in reported for letter in letters[:3]):
         return None
     tilt, turn = (reported.get(letter, value) for letter, value in zip(letters[3:E_AXIS], point.modal.at[3:E_AXIS], strict=True))

@@ -10,17 +10,7 @@ from typing import Self
 from machine.firmware.dialect import HOMING_S
 from machine.link.exchange import Exchange
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import (
-    Ok,
-    Position,
-    Resend,
-    Temperature,
-    is_halt,
-    lacks_checksum,
-    position_in,
-    read_event,
-    temperature_in,
-)
+from machine.link.protocol.events import Kind, Temperature, read_event
 from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
 from profiles.errors import PortError, PrinterError, add_words
 
@@ -79,10 +69,10 @@ class Orders:
     def _heed(self, line: bytes, commands: Sequence[str]) -> bool:
         """Answer a refusal and the number that follows; what was written is not wanted by that."""
         event = read_event(line)
-        if lacks_checksum(event) and not self.insists:
+        if event.lacks_checksum and not self.insists:
             self.insists = True
             self._ask_number(commands)
-        elif isinstance(event, Resend) and self._waiting:
+        elif event.kind is Kind.RESEND and event.line is not None and self._waiting:
             self.wire.write(number_lines(event.line, self._waiting))
             self._waiting = ()
         return False
@@ -143,8 +133,8 @@ class _Shown:
     def ends(self, line: bytes) -> bool:
         """Whether nothing more needs to be asked."""
         event = read_event(line)
-        report = temperature_in(event)
-        self.answered = self.answered or isinstance(event, Ok)
+        report = event.temperature
+        self.answered = self.answered or event.kind is Kind.OK
         self.halted = self.halted or _shows_kill(line)
         self.off = self.off or (report is not None and shows_off(report))
         return self.off or self.halted
@@ -216,21 +206,22 @@ class HeaterGuard:
         return f"{self._exchange.connection.greeting.firmware.line.revival} before the next print"
 
 
-def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn: Callable[[], None]) -> Position | None:
+def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn: Callable[[], None]) -> dict[str, float] | None:
     """A step away from the print; words: of G1, relative. Where the printer says it stands then.
 
     on_turn: called meanwhile, may raise. Raises PortError.
     """
-    positions: list[Position] = []
+    position: dict[str, float] | None = None
 
     def reports_done(line: bytes) -> bool:
+        nonlocal position
         event = read_event(line)
-        positions.extend(filter(None, [position_in(event)]))
-        return isinstance(event, Ok) and event.temperature is not None
+        position = event.position or position
+        return event.kind is Kind.OK and event.temperature is not None
 
     step = ("M83", "G91", f"G1 {words} F{feed_mm_min:.0f}", "G90", "M400", "M114", "M105")
     arrived = Orders(wire, medium, on_turn).give(step, reports_done, medium.now_s() + LIFT_S)
-    return positions[-1] if arrived and positions else None
+    return position if arrived else None
 
 
 def emergency_stop(wire: Wire, medium: Medium) -> bool:
@@ -251,4 +242,4 @@ def emergency_stop(wire: Wire, medium: Medium) -> bool:
 
 
 def _shows_kill(line: bytes) -> bool:
-    return is_halt(read_event(line))
+    return read_event(line).is_halt

@@ -13,18 +13,7 @@ from dataclasses import dataclass, field
 from machine.gcode.commands import command_in
 from machine.gcode.modes import E_AXIS, ModalState
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import (
-    Banner,
-    Event,
-    FirmwareFault,
-    Ok,
-    Position,
-    Resend,
-    Start,
-    Temperature,
-    position_in,
-    read_event,
-)
+from machine.link.protocol.events import Event, Kind, Temperature, read_event
 from machine.link.protocol.framing import FAR_NUMBER, frame
 from machine.link.shutdown import Orders
 
@@ -45,7 +34,7 @@ class PrinterStatus:
     """
 
     last_number: int | None = None
-    position: Position | None = None
+    position: dict[str, float] | None = None
     temperature: Temperature = field(default_factory=Temperature)
     greeted: bool = False
     fault: str = ""
@@ -53,9 +42,9 @@ class PrinterStatus:
     def _read(self, line: bytes) -> Event:
         """Any line; a board that restarts begins its line numbers anew."""
         event = read_event(line)
-        if isinstance(event, FirmwareFault):
+        if event.kind is Kind.FAULT:
             self.fault = event.text.removeprefix("!!").strip()
-        if isinstance(event, Start | Banner):
+        if event.kind in (Kind.START, Kind.BANNER):
             self.greeted, self.last_number = True, None if self.last_number is None else 0
         return event
 
@@ -64,15 +53,15 @@ class PrinterStatus:
         event = self._read(line)
         if last_line := LAST_LINE.search(line):
             self.last_number = int(last_line[1])
-        elif isinstance(event, Resend):  # Repetier and OctoPrint's virtual printer do not name the last line
+        elif event.kind is Kind.RESEND and event.line is not None:  # Repetier and OctoPrint's virtual printer name no last line
             self.last_number = event.line - 1
-        return self.last_number is not None or (isinstance(event, Ok) and event.temperature is not None)
+        return self.last_number is not None or (event.kind is Kind.OK and event.temperature is not None)
 
     def read_position(self, line: bytes) -> bool:
         """Take a position; whether the temperature that is asked for after it has come."""
         event = self._read(line)
-        self.position = position_in(event) or self.position
-        if isinstance(event, Ok) and event.temperature is not None:
+        self.position = event.position or self.position
+        if event.kind is Kind.OK and event.temperature is not None:
             self.temperature = event.temperature
             return True
         return False
@@ -108,7 +97,7 @@ def line_was_done(command: str, before: Sequence[float | None], after: ModalStat
     """
     if status.position is None or len(before) <= E_AXIS:
         return None
-    reported = dict(status.position.axes)
+    reported = status.position
     letters = [
         letter
         for letter, old, new in zip(after.axes.letters, before, after.at, strict=True)
@@ -158,12 +147,11 @@ def _greatest_difference(a: Mapping[str, float | None], b: Mapping[str, float | 
     return max((abs((a[letter] or 0.0) - (b[letter] or 0.0)) for letter in letters), default=0.0)
 
 
-def position_differences(modal: ModalState, reported: tuple[tuple[str, float], ...], near: float) -> list[str]:
+def position_differences(modal: ModalState, reported: Mapping[str, float], near: float) -> list[str]:
     """Axes on which the printer's own position differs by more than `near` from what the program has led to, in words."""
-    coordinates = dict(reported)
     pairs = zip(modal.axes.letters[:E_AXIS], modal.at[:E_AXIS], strict=True)
     return [
-        f"{letter} {coordinates[letter]:g} instead of {value:.3f}"
+        f"{letter} {reported[letter]:g} instead of {value:.3f}"
         for letter, value in pairs
-        if value is not None and letter in coordinates and abs(coordinates[letter] - value) > near
+        if value is not None and letter in reported and abs(reported[letter] - value) > near
     ]

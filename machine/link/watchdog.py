@@ -11,7 +11,7 @@ from math import inf
 from machine.gcode.commands import command_named
 from machine.gcode.words import split_command
 from machine.link.pending_commands import Command, PendingCommand
-from machine.link.protocol import events
+from machine.link.protocol.events import Event, Kind, Temperature
 from profiles.errors import PrinterError
 
 SILENCE_S = 120.0  # a report is asked for every few seconds: that many questions do not stay unanswered by chance
@@ -64,7 +64,7 @@ class Watchdog:
         default_factory=lambda: (HeaterWatch("nozzle", 20.0, 60.0), HeaterWatch("bed", 15.0, 180.0, 1.0))
     )
 
-    def check(self, report: events.Temperature, now_s: float) -> None:
+    def check(self, report: Temperature, now_s: float) -> None:
         """Judge a report. Raises PrinterError."""
         self.reported_s = now_s
         pairs = ((report.nozzle_c, report.nozzle_target_c), (report.bed_c, report.bed_target_c))
@@ -92,36 +92,34 @@ class PrinterReports:
     """
 
     def __init__(self, watchdog: Watchdog, now_s: float) -> None:
-        self.temperature, self.firmware, self.temperature_s = events.Temperature(), "unknown", now_s
+        self.temperature, self.firmware, self.temperature_s = Temperature(), "unknown", now_s
         self.unknown: set[str] = set()
         self.waiting = ""
         self._warned: dict[str, int] = {}
         self.watchdog = watchdog
 
-    def read(self, event: events.Event, now_s: float) -> PendingCommand | None:
+    def read(self, event: Event, now_s: float) -> PendingCommand | None:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
-        if isinstance(event, events.PlainOk):  # nearly every answer
+        if event.kind is Kind.OK:
             self.waiting = ""
-            return None
-        if isinstance(event, events.Ok | events.Busy):
+        elif event.kind is Kind.BUSY:
             # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
-            paused = isinstance(event, events.Busy) and "paused for" in event.text
-            self.waiting = "the printer waits for a person: look at its display" if paused else ""
-        if report := events.temperature_in(event):
-            self.temperature, self.temperature_s = report, now_s
-            self.watchdog.check(report, now_s)
-        if identity := events.identity_in(event):
-            self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
-        elif unknown := events.unknown_command(event):
+            self.waiting = "the printer waits for a person: look at its display" if "paused for" in event.text else ""
+        if event.temperature is not None:
+            self.temperature, self.temperature_s = event.temperature, now_s
+            self.watchdog.check(event.temperature, now_s)
+        if event.identity:
+            self.firmware = event.identity.removeprefix("FIRMWARE_NAME:").strip()
+        elif unknown := event.unknown_command:
             self.unknown.add(unknown)
             # Marlin has M73 and M486 only where it was built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS
             # (Configuration_adv.h), which it is not unless somebody asks for them.
             if not command_named(unknown).shows:
                 self._warn(f"Unknown command: {unknown}")
-        elif isinstance(event, events.Echo):
+        elif event.kind is Kind.ECHO:
             self._read_echo(event.text)
-        elif isinstance(event, events.Action):
-            return self._read_action(event)
+        elif event.kind is Kind.ACTION:
+            return self._read_action(event.text)
         return None
 
     def leaves_out(self, command: str) -> bool:
@@ -144,12 +142,13 @@ class PrinterReports:
         if any(word in text for word in WARNS):
             self._warn(text)
 
-    def _read_action(self, action: events.Action) -> PendingCommand | None:
-        if action.name == "disconnect":
+    def _read_action(self, action: str) -> PendingCommand | None:
+        name = action.partition(" ")[0]
+        if name == "disconnect":
             raise PrinterError("the printer asked to be disconnected (//action:disconnect)")
-        if action.name not in ASKS and action.name not in SILENT:
-            self._warn(f"action {action.name} {action.words}".strip())
-        return PendingCommand(ASKS[action.name]) if action.name in ASKS else None
+        if name not in ASKS and name not in SILENT:
+            self._warn(f"action {action}")
+        return PendingCommand(ASKS[name]) if name in ASKS else None
 
     def _warn(self, text: str) -> None:
         if text in self._warned or len(self._warned) < WARNINGS:

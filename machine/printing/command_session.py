@@ -6,7 +6,7 @@ from typing import Self
 from machine.gcode.words import split_command
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.medium import SERIAL, Medium, Wire
-from machine.link.protocol.events import Event, Ok, Position, Temperature, position_in, unknown_command
+from machine.link.protocol.events import Event, Temperature
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.shutdown import HeaterGuard, Heaters, shows_off
@@ -38,7 +38,7 @@ class CommandSession:
         self._limit = limit
         self._ordered: type[LeftError | StopError] | None = None
         self.heat = Temperature()
-        self.position: Position | None = None
+        self.position: dict[str, float] | None = None
         self._command = ""
         self.exchange = Exchange(
             wire, medium, timing=Timing(), on_event=self._heard, on_turn=self._turned, on_lost=self._lost, limit=limit
@@ -114,12 +114,9 @@ class CommandSession:
         return self.exchange.greeted and self.exchange.connection.fault is None and window.acknowledged == window.sent
 
     def _heard(self, event: Event) -> None:
-        self.position = position_in(event) or self.position
-        if isinstance(event, Ok):
-            self.heat = event.temperature or self.heat
-        elif isinstance(event, Temperature):
-            self.heat = event
-        elif unknown_command(event) and self.exchange.greeted:
+        self.position = event.position or self.position
+        self.heat = event.temperature or self.heat
+        if event.unknown_command and self.exchange.greeted:
             self.unknown.append(self._command)
 
     def _turned(self, now_s: float) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Self
 
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
-from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event, unknown_command
+from machine.link.protocol.events import Kind, read_event
 from profiles.errors import reason
 from profiles.folders import state_folder
 
@@ -238,10 +238,10 @@ class PrinterMessages:
 def printer_message(line: bytes) -> str:
     """What a line tells a person, "" for reports and answers."""
     event = read_event(line)
-    if isinstance(event, Start):
+    if event.kind is Kind.START:
         return "the printer has started"
-    if isinstance(event, Action):
-        return f"the printer asks: {event.name} {event.words}".rstrip()
-    if unknown := unknown_command(event):
+    if event.kind is Kind.ACTION:
+        return f"the printer asks: {event.text}"
+    if unknown := event.unknown_command:
         return f"Unknown command: {unknown}"
-    return event.text if isinstance(event, Echo | FirmwareFault | LineError | Unknown) else ""
+    return event.text if event.kind in (Kind.ECHO, Kind.FAULT, Kind.LINE_ERROR, Kind.UNKNOWN) else ""

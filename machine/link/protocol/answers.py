@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import inf
 
 from machine.firmware.firmware import LineRules
-from machine.link.protocol.events import Ok
+from machine.link.protocol.events import Event
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, Window
 
 UNKNOWN_COMMAND = "nknown command"  # echoed with the text of a line that was not understood, ahead of its ok
@@ -55,13 +55,13 @@ class Acknowledgement:
         until_s, self._resend_ok_until_s = self._resend_ok_until_s, -inf
         return now_s < until_s
 
-    def answers_m110(self, ok: Ok, numbered: bool, unknown: bool, now_s: float) -> bool:
+    def answers_m110(self, ok: Event, numbered: bool, unknown: bool, now_s: float) -> bool:
         """Whether the numbers begin anew as M110 has asked; unknown: the `ok` belongs to a line that was not understood."""
         if numbered:
             return ok.line == FIRST_NUMBER_AGAIN
         return not (unknown or ok.temperature or self.belongs_to_resend(now_s))
 
-    def line(self, ok: Ok, window: Window, numbered: bool, now_s: float) -> int | None:
+    def line(self, ok: Event, window: Window, numbered: bool, now_s: float) -> int | None:
         """The number of the line that is answered, None for none; numbered: this printer's answers name their lines."""
         if ok.temperature is not None:
             self._reports_temperature = True

@@ -19,7 +19,6 @@ from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHe
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
-from machine.link.protocol.events import Position, Temperature
 from machine.link.protocol.framing import frame
 from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, heights_mm, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
@@ -327,7 +326,7 @@ def point(executed: int, acknowledged: int | None = None, number: int = 100) -> 
 
 
 def asked(position: dict[str, float] | None = None, last: int | None = 0) -> PrinterStatus:
-    return PrinterStatus(last, Position(tuple(position.items())) if position is not None else None, Temperature())
+    return PrinterStatus(last, position)
 
 
 LINE = PROGRAM.index(";PART:2 of 3") + 40
@@ -445,7 +444,7 @@ def test_a_board_that_restarts_while_it_is_asked_has_begun_its_numbers_anew() ->
     seen = status.query_status(line, printer.medium, lambda: None)
     assert (seen.greeted, seen.last_number) == (True, 0)
     assert seen.position is not None
-    assert dict(seen.position.axes) == AT_HOME
+    assert seen.position == AT_HOME
 
 
 def test_the_command_resumes_after_a_power_cut(
@@ -663,7 +662,7 @@ def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
 
     with pytest.raises(SilenceError, match=r"did not answer when it was asked where it stands"):
         print_lines(text, PATH, medium=deaf, profile=PROFILE, begin=begin)
-    assert seen == [PrinterStatus(None, None, Temperature())]
+    assert seen == [PrinterStatus()]
 
 
 class _Deaf:

@@ -128,7 +128,7 @@ def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_ask
     seen = query_status(wire, printer.medium, lambda: None)
     assert seen.last_number == last
     assert seen.position is not None
-    assert dict(seen.position.axes)["X"] == 10.0
+    assert seen.position["X"] == 10.0
     assert heaters_off(wire, printer.medium) is Heaters.OFF
 
 

@@ -5,7 +5,7 @@ from contextlib import nullcontext
 
 import pytest
 
-from machine.link.protocol.events import Echo, Temperature, read_event
+from machine.link.protocol.events import Event, Kind, Temperature, read_event
 from machine.link.stream import print_lines
 from machine.link.watchdog import PrinterReports, Watchdog
 from machine.printing.serial_log import tap
@@ -123,7 +123,7 @@ def test_what_the_firmware_does_not_know_is_asked_once_and_left_out_then() -> No
 def test_what_matters_is_sent_although_the_firmware_does_not_know_it() -> None:
     reports = PrinterReports(Watchdog(), 0.0)
     for said in ('Unknown command: "M104 S200"', 'Unknown command: "M900 K0.1"'):
-        reports.read(Echo(said), 0.0)
+        reports.read(Event(Kind.ECHO, said), 0.0)
     assert not reports.leaves_out("M104 S210")
     assert reports.leaves_out("M900 K0.2")
 
