@@ -33,7 +33,7 @@ import numpy as np
 
 from machine.gcode.lines import GcodeFile
 from machine.link.journal import SYNC_S, Checkpoint, Journal, JournalHeading, read_journal
-from machine.link.medium import Medium, Wire
+from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint, heights_mm, is_in_doubt, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
@@ -47,7 +47,7 @@ from tests.machine.virtual_printer import PATH, VirtualPrinter
 PROFILE = load()
 LIMIT = 95
 GREETING_S = 0.15  # before that nothing has been sent
-QUICK = Timing(drain_s=0.05, quiet_s=0.03)
+QUICK = replace(SERIAL, timing=Timing(drain_s=0.05, quiet_s=0.03))
 START = [
     "G21", "M84 S0", "G90", "M83", "M140 S25", "M104 S175", "G28 X Y Z", "G92 A0 C0", "M190 S25",
     "M109 S175", "G92 E0", "M106 S128",
@@ -141,7 +141,7 @@ def apart(work: Callable[[], object]) -> int:
 def begin_print(text: GcodeFile, port: Path, journal: Path) -> None:
     """A print with a journal."""
     with Journal(journal, JournalHeading(str(text.path), text.sha256(), "campaign", {})) as record:
-        print_lines(text, str(port), 250000, timing=QUICK, journal=record, profile=PROFILE)
+        print_lines(text, str(port), 250000, medium=QUICK, journal=record, profile=PROFILE)
 
 
 def go_on(text: GcodeFile, port: Path, journal: Path, plan_file: Path) -> None:
@@ -155,7 +155,7 @@ def go_on(text: GcodeFile, port: Path, journal: Path, plan_file: Path) -> None:
         return way.start
 
     with Journal(journal.with_suffix(".rest"), story.heading) as record:
-        print_lines(text, str(port), 250000, timing=QUICK, journal=record, profile=PROFILE, begin=begin)
+        print_lines(text, str(port), 250000, medium=QUICK, journal=record, profile=PROFILE, begin=begin)
 
 
 def moment(delay_s: float, speed: float, folder: Path, whole: list[list[float]]) -> Result:

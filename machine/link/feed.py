@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from math import inf
-from threading import Event as Flag
 
 from machine.gcode.modes import ModalState, axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
@@ -16,7 +15,7 @@ from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
 from machine.link.print_state import PrintState, PrintStatus
-from machine.link.progress import ProgramPosition, StreamPlan
+from machine.link.progress import ProgramPosition
 from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.framing import command_of
 from machine.link.protocol.states import State
@@ -24,6 +23,7 @@ from machine.link.resume import ResumePoint
 from machine.link.status import position_differences
 from machine.link.watchdog import PrinterReports, Watchdog
 from profiles.errors import PrinterError
+from profiles.profile import Profile
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
@@ -35,25 +35,30 @@ NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
 
 class Feed:
-    """run() a program over a greeted exchange; handle_event() and handle_turn() are the exchange's callbacks."""
+    """run() a program over a greeted exchange; handle_event() and handle_turn() are the exchange's callbacks.
+
+    limit: characters of a line that the firmware keeps; total: commands of the program, None: not known.
+    """
 
     def __init__(
         self,
-        job: StreamPlan,
+        profile: Profile | None,
+        limit: int,
+        total: int | None,
         *,
-        control: Control | None,
+        control: Control,
         journal: Journal | None,
         on_progress: Callable[[PrintStatus], None] | None,
-        stop: Flag | None,
         start_s: float,
     ) -> None:
-        self._job, self._journal, self._on_progress = job, journal, on_progress
-        machine = job.profile.machine if job.profile is not None else None
+        self.profile, self.limit, self._total = profile, limit, total
+        self._journal, self._on_progress = journal, on_progress
+        machine = profile.machine if profile is not None else None
         self.modal, self._position = ModalState(axes_of(machine)), ProgramPosition()
         self._planner, self._worth_following, self._reports_stand_still = PlannerReports(), False, False
         self.history = LineHistory(planner=self._planner)
         self._bounds = PrintedBounds(machine) if machine is not None else None
-        self._pending = PendingCommands(self.modal.axes, job.limit, control, stop)
+        self._pending = PendingCommands(self.modal.axes, limit, control)
         # A bed that cannot be heated is as warm as its room.
         watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c or inf)) if machine is not None else Watchdog()
         self.reports = PrinterReports(watchdog, start_s)
@@ -126,7 +131,7 @@ class Feed:
 
     def _commands(self, lines: Iterable[str]) -> Iterator[tuple[int, str]]:
         for line, text in enumerate(lines, 1):
-            command = command_of(text, line, self._job.limit)
+            command = command_of(text, line, self.limit)
             if ";" in text:
                 self._barriers.layer_ended |= self._position.read_comment(text)
             if command:
@@ -218,7 +223,7 @@ class Feed:
         self.set_state(PrintState.PAUSING, why)
         self._record()
         position_known = not self._position_errors()
-        self._pause = Pause(self.exchange, self._pending, self.reports, self.modal, self._job.profile)
+        self._pause = Pause(self.exchange, self._pending, self.reports, self.modal, self.profile)
         for state, words in self._pause.run(self._bounds, why):
             self.set_state(state, words)
             self._record()
@@ -303,9 +308,9 @@ class Feed:
 
     def lift_move(self) -> tuple[str, float] | None:
         """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or it is away already."""
-        if self._job.profile is None or (self._pause is not None and self._pause.aside):
+        if self.profile is None or (self._pause is not None and self._pause.aside):
             return None
-        return lift_move(self.modal, self._job.profile.machine)
+        return lift_move(self.modal, self.profile.machine)
 
     def record_lift(self, position: Mapping[str, float] | None) -> None:
         """The tip was lifted off the print for good; position: where the printer says it stands now."""
@@ -336,9 +341,9 @@ class Feed:
         )  # begins at the end of the stroke under way
         self._on_progress(
             PrintStatus(
-                sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
-                left_s=self._job.left_s(at, history.before, history.acknowledged, elapsed_s, feed_percent),
-                share=at.share(done, self._job.total),
+                sent=self.sent, acknowledged=done, total=self._total, elapsed_s=elapsed_s,
+                left_s=at.left_s(elapsed_s, feed_percent),
+                share=at.share(done, self._total),
                 temperature=self.reports.temperature, heat_age_s=now_s - self.reports.temperature_s,
                 part=at.part, parts=at.parts, layer=at.layer,
                 state=PrintState.PAUSING if pausing else self.state,

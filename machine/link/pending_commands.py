@@ -44,9 +44,13 @@ class PendingCommand:
 
 
 class Control:
-    """Requests in the order they were made, an emergency stop before them. ask() from any thread, take() from the stream's."""
+    """Requests in the order they were made, an emergency stop before them. ask() from any thread, take() from the stream's.
 
-    def __init__(self) -> None:
+    stop: set, it ends the print as CANCEL does.
+    """
+
+    def __init__(self, stop: Flag | None = None) -> None:
+        self.stop = stop or Flag()
         self._waiting: deque[PendingCommand] = deque()
 
     def ask(self, command: Command, value: float = 100.0, text: str = "") -> None:
@@ -75,8 +79,7 @@ class PendingCommands:
 
     axes: Axes
     limit: int = LINE_LIMIT
-    control: Control | None = None
-    stop: Flag | None = None
+    control: Control = field(default_factory=Control)
     pause_s: float | None = None
     resume: bool = False
     lines: deque[str] = field(default_factory=deque)
@@ -86,17 +89,17 @@ class PendingCommands:
 
     def poll(self, state: PrintState, now_s: float) -> None:
         """Take what was asked since. Raises CancelledError, EmergencyError."""
-        if self.stop is not None and self.stop.is_set():
+        if self.control.stop.is_set():
             raise CancelledError
         for _ in range(MOST_AT_ONCE):
-            request = None if self.control is None else self.control.take()
+            request = self.control.take()
             if request is None:
                 return
             self.accept(request, state, now_s)
 
     def heed_emergency(self) -> None:
         """While a print is being ended only the emergency stop still counts. Raises EmergencyError."""
-        while self.control is not None and (request := self.control.take()) is not None:
+        while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
                 raise EmergencyError
 

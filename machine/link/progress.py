@@ -1,33 +1,9 @@
-"""How far a print is by its lines, its dry run, and what the program's own comments and M73 say."""
+"""How far a print is by its lines, and what the program's own comments and M73 say."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from machine.gcode.line_text import begins_layer, begun_part, read_line
 from machine.gcode.words import read_words, split_command
-from machine.link.protocol.framing import LINE_LIMIT
-from profiles.profile import Profile
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """How long a program takes. remaining_s: what is left of it after a line of its file, s, at its own feed rates.
-
-    pace: how many of those seconds pass in one of the clock; None: as many as have so far, whatever the feed.
-    """
-
-    remaining_s: Callable[[int], float]
-    pace: float | None = 1.0
-
-    def left_s(self, begin: int, file_line: int, elapsed_s: float, feed_percent: float) -> float | None:
-        """Time left, s, for a print that began after line `begin`; None where nothing is known yet."""
-        left_s = self.remaining_s(file_line)
-        if self.pace is not None:
-            return left_s / self.pace * 100.0 / feed_percent
-        done_s = self.remaining_s(begin) - left_s
-        return left_s * elapsed_s / done_s if done_s > 0 else None
 
 
 @dataclass
@@ -39,7 +15,7 @@ class ProgramPosition:
     layer: int | None = None
     percent: float | None = None
     minutes_left: float | None = None
-    reported_at_s: float = field(default=0.0)
+    reported_at_s: float = 0.0
 
     def read_comment(self, line: str) -> bool:
         """Take note of what a line says behind its `;`; whether a layer begins there."""
@@ -73,21 +49,3 @@ class ProgramPosition:
         if self.percent is not None:
             return min(1.0, self.percent / 100.0)
         return acknowledged / total if total else None
-
-
-@dataclass(frozen=True)
-class StreamPlan:
-    """What is fixed for a stream before it begins. total: commands; limit: characters of a line that the firmware takes."""
-
-    total: int | None = None
-    schedule: Schedule | None = None
-    limit: int = LINE_LIMIT
-    profile: Profile | None = None
-
-    def left_s(
-        self, position: ProgramPosition, begin: int, file_line: int, elapsed_s: float, feed_percent: float
-    ) -> float | None:
-        """Time left, s, by the schedule, else by what the program says itself; None: not known."""
-        if self.schedule is None:
-            return position.left_s(elapsed_s, feed_percent)
-        return self.schedule.left_s(begin, file_line, elapsed_s, feed_percent)

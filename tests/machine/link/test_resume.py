@@ -17,6 +17,7 @@ from machine.gcode.modes import ModalState, axes_of
 from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from machine.link.medium import SERIAL, Medium, Wire
+from machine.link.pending_commands import Control
 from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
 from machine.link.protocol.framing import frame
@@ -367,7 +368,7 @@ def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text
             stop.set()
 
     with journal_of(text, "first") as journal:
-        print_lines(text, PATH, on_progress=see, stop=stop, medium=printer.medium, profile=PROFILE, journal=journal)
+        print_lines(text, PATH, on_progress=see, control=Control(stop), medium=printer.medium, profile=PROFILE, journal=journal)
     last = read_journal(journal.path).last
     assert last.state == "left"
     assert last.pose[:5] == pytest.approx(tuple(printer.record.end[-1, :5]), abs=0.005)
@@ -522,7 +523,7 @@ def cancelled(text: GcodeFile, port: str) -> Path:
             port,
             250000,
             on_progress=lambda progress: stop.set() if progress.file_line > 190 else None,
-            stop=stop,
+            control=Control(stop),
             profile=PROFILE,
             journal=journal,
         )
@@ -639,7 +640,7 @@ def test_a_cancel_is_heeded_while_the_printer_is_asked_where_it_stands(text: Gco
     printer, stop = VirtualPrinter(PROFILE.machine), Flag()
     deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
     stop.set()
-    outcome = print_lines(text, PATH, stop=stop, medium=deaf, profile=PROFILE, begin=lambda seen: ResumePoint(1, ()))
+    outcome = print_lines(text, PATH, control=Control(stop), medium=deaf, profile=PROFILE, begin=lambda seen: ResumePoint(1, ()))
     assert (outcome.cancelled, outcome.sent, outcome.heaters_off) == (True, 0, None)
     assert printer.now_s < 1.0
 

@@ -623,7 +623,7 @@ def test_scenario_43_a_cancel_while_lines_are_being_repeated(build: BuildOptions
         if way == "<" and b"Resend" in data:
             stop.set()
 
-    done = printed([Fault("drop", byte(LINE, 9, build))], build, listen=listen, stop=stop)
+    done = printed([Fault("drop", byte(LINE, 9, build))], build, listen=listen, control=Control(stop))
     assert done.outcome is not None
     assert (done.outcome.cancelled, done.outcome.heaters_off) == (True, True)
     again = print_lines(PROGRAM, PATH, medium=done.printer.medium)
