@@ -151,8 +151,8 @@ def go_on(text: GcodeFile, port: Path, journal: Path, plan_file: Path) -> None:
 
     def begin(status: PrinterStatus) -> ResumePoint:
         way = plan_resume(point, status, PROFILE)
-        plan_file.write_text(json.dumps([way.start.line, way.reason.partition(":")[0].partition(";")[0]]), encoding="utf-8")
-        return way.start
+        plan_file.write_text(json.dumps([way.line, way.reason.partition(":")[0].partition(";")[0]]), encoding="utf-8")
+        return way
 
     with Journal(journal.with_suffix(".rest"), story.heading) as record:
         print_lines(text, str(port), 250000, medium=QUICK, journal=record, profile=PROFILE, begin=begin)
@@ -285,7 +285,7 @@ def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float,
         if is_in_doubt(way, point, PROFILE):
             doubts.append(len(heights_mm(point)))
             seen_point = replace(point, stood_mm=min(heights_mm(point), key=lambda z: abs(z - stood_mm)))
-        return plan_resume(seen_point, status, PROFILE).start
+        return plan_resume(seen_point, status, PROFILE)
 
     done = len(moves_of(printer))
     try:

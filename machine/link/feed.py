@@ -21,7 +21,7 @@ from machine.link.protocol.framing import command_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
 from machine.link.status import position_differences
-from machine.link.watchdog import PrinterReports, Watchdog
+from machine.link.watchdog import PrinterReports
 from profiles.errors import PrinterError
 from profiles.profile import Profile
 
@@ -60,8 +60,8 @@ class Feed:
         self._bounds = PrintedBounds(machine) if machine is not None else None
         self._pending = PendingCommands(self.modal.axes, limit, control)
         # A bed that cannot be heated is as warm as its room.
-        watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c or inf)) if machine is not None else Watchdog()
-        self.reports = PrinterReports(watchdog, start_s)
+        most_c = (inf, inf) if machine is None else (machine.nozzle_limit_c, machine.bed_limit_c or inf)
+        self.reports = PrinterReports(start_s, most_c)
         self.exchange: Exchange
         self.resume_point: ResumePoint | None = None
         self.state, self._trouble, self.started, self.finished = PrintState.PRINTING, "", False, False
@@ -170,7 +170,7 @@ class Feed:
 
     def _new_history(self, before: int = 0) -> LineHistory:
         connection = self.exchange.connection
-        waiting = None if connection.advanced else connection.greeting.waiting_moves
+        waiting = None if connection.window.numbered else connection.greeting.waiting_moves
         return LineHistory(before, waiting, self._planner)
 
     def _end_moves(self) -> None:
@@ -261,7 +261,7 @@ class Feed:
         """Once a turn of the exchange."""
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self.poll()
-        self.reports.watchdog.check_silence(now_s, self._cannot_report())
+        self.reports.check_silence(now_s, self._cannot_report())
         if self._journal is not None:
             self._journal.update(self._checkpoint(), now_s)
         if now_s - max(self.reports.temperature_s, self._asked_s) >= ASK_S and self.exchange.connection.can_send("M105"):

@@ -53,10 +53,15 @@ NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: q
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """Where a resumed print goes on: the first line of the program to be sent, and commands before it."""
+    """Where a resumed print goes on: the first line of the program to be sent, and commands before it.
+
+    reason: what is certain about it, in words; homes: X and Y.
+    """
 
     line: int
     before: tuple[str, ...]
+    reason: str = ""
+    homes: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,15 +80,6 @@ class InterruptedPrint:
     ahead: Mapping[int, ModalState]
     checkpoint: Checkpoint
     stood_mm: float | None = None
-
-
-@dataclass(frozen=True)
-class ResumePlan:
-    """How the print goes on. reason: what is certain about it, in words; homes: X and Y."""
-
-    start: ResumePoint
-    reason: str
-    homes: bool = False
 
 
 def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile: Profile, limit: int) -> InterruptedPrint:
@@ -124,7 +120,7 @@ def has_not_restarted(point: InterruptedPrint, status: PrinterStatus) -> bool | 
     return point.checkpoint.number > 0 and 0 <= status.last_number - point.checkpoint.number < NUMBERS_AHEAD
 
 
-def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile) -> ResumePlan:
+def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile) -> ResumePoint:
     """Decide. Raises JournalError where going on would be a guess, FirmwareError or SilenceError where the printer has not
     reported its place.
     """
@@ -138,20 +134,18 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     if standing is not None:
         line, modal = standing
         before = (*heat_commands(modal, profile), *modal.lines())
-        done = "the printer stands where this line begins: nothing is repeated"
-        return ResumePlan(ResumePoint(line + 1, before), done)
+        return ResumePoint(line + 1, before, "the printer stands where this line begins: nothing is repeated")
     if not point.stroked:
-        return ResumePlan(ResumePoint(1, ()), f"{TOO_LITTLE}, clear the table of the little there may be")
+        return ResumePoint(1, (), f"{TOO_LITTLE}, clear the table of the little there may be")
     _check(point, profile)
     span = f"lines {point.line} to {point.last} may have been printed already"
     at = _reported_position(point, status) if alive or (alive is None and not begun) else None
     if at is not None and not status.greeted:
         before = _approach(point, profile, *at)
-        return ResumePlan(ResumePoint(point.line, before), f"the printer has not restarted and knows its place; {span}")
+        return ResumePoint(point.line, before, f"the printer has not restarted and knows its place; {span}")
     if not status.greeted:
         _check_begun(status, begun, profile)
-    before = _homed_approach(point, profile)
-    return ResumePlan(ResumePoint(point.line, before), f"the printer has restarted; {span}", homes=True)
+    return ResumePoint(point.line, _homed_approach(point, profile), f"the printer has restarted; {span}", homes=True)
 
 
 def _check_begun(status: PrinterStatus, begun: bool, profile: Profile) -> None:
@@ -286,7 +280,7 @@ def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
     return tuple(z for k, z in enumerate(heights) if k == 0 or z - heights[k - 1] > UNSURE_MM)
 
 
-def is_in_doubt(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> bool:
+def is_in_doubt(way: ResumePoint, point: InterruptedPrint, profile: Profile) -> bool:
     """Whether the height must be seen by a person: Z is not homed, and the tip was neither parked nor at one height only."""
     parked = point.checkpoint.state in PARKED and None not in point.checkpoint.pose[:E_AXIS]
     return way.homes and not profile.machine.gcode.resume and not parked and len(heights_mm(point)) > 1

@@ -10,7 +10,7 @@ from typing import Self
 from machine.firmware.dialect import HOMING_S
 from machine.link.exchange import Exchange
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Kind, Temperature, read_event
+from machine.link.protocol.events import Event, Kind, Temperature, read_event
 from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
 from profiles.errors import PortError, PrinterError, add_words
 
@@ -47,28 +47,27 @@ class Orders:
     _waiting: tuple[str, ...] = field(default=())  # commands to be given as soon as the number is known
     _partial: bytes = b""
 
-    def give(self, commands: Sequence[str], is_wanted: Callable[[bytes], bool], end_s: float) -> bool:
-        """Write commands and listen until a line is wanted (True) or the time has come (False)."""
+    def give(self, commands: Sequence[str], is_wanted: Callable[[Event], bool], end_s: float) -> bool:
+        """Write commands and listen until an event is wanted (True) or the time has come (False)."""
         if self.insists:
             self._ask_number(commands)
         else:
             self.wire.write(as_lines(commands))
-        return self.wait_for(lambda line: self._heed(line, commands) or is_wanted(line), end_s)
+        return self.wait_for(lambda event: self._heed(event, commands) or is_wanted(event), end_s)
 
-    def wait_for(self, is_wanted: Callable[[bytes], bool], end_s: float) -> bool:
-        """Listen until a line is wanted (True) or the time has come (False)."""
+    def wait_for(self, is_wanted: Callable[[Event], bool], end_s: float) -> bool:
+        """Listen until an event is wanted (True) or the time has come (False)."""
         while self.medium.now_s() < end_s:
             self.on_turn()
             *lines, self._partial = (self._partial + self.wire.read()).split(b"\n")
             self._partial = self._partial[-PARTIAL_BYTES:]
-            wanted = [is_wanted(line) for line in lines]  # all of them are heard: a halt may follow an ok at once
+            wanted = [is_wanted(read_event(line)) for line in lines]  # all of them are heard: a halt may follow an ok at once
             if any(wanted):
                 return True
         return False
 
-    def _heed(self, line: bytes, commands: Sequence[str]) -> bool:
+    def _heed(self, event: Event, commands: Sequence[str]) -> bool:
         """Answer a refusal and the number that follows; what was written is not wanted by that."""
-        event = read_event(line)
         if event.lacks_checksum and not self.insists:
             self.insists = True
             self._ask_number(commands)
@@ -107,37 +106,30 @@ def heaters_off(
     halted, start_s, old = False, medium.now_s(), b""
     while (data := wire.read()) and medium.now_s() - start_s < OLD_REPORTS_S:
         *lines, old = (old + data)[-PARTIAL_BYTES:].split(b"\n")
-        halted = halted or any(_shows_kill(line) for line in lines)
-    orders, shown = Orders(wire, medium, on_turn), _Shown(halted)
+        halted = halted or any(read_event(line).is_halt for line in lines)
+    orders = Orders(wire, medium, on_turn)
     commands = HOMING_ORDERS if homing else ORDERS
+    off = answered = False
 
-    def is_over(line: bytes) -> bool:
+    def ends(event: Event) -> bool:
+        """Whether nothing more needs to be asked."""
+        nonlocal halted, off, answered
+        answered = answered or event.kind is Kind.OK
+        halted = halted or event.is_halt
+        off = off or (event.temperature is not None and shows_off(event.temperature))
+        return off or halted
+
+    def ends_homing(event: Event) -> bool:
         """An `ok` tells the end of homing, for G28 is answered when it is done; not the one that belongs to a Resend."""
-        return shown.ends(line) or (shown.answered and not orders.insists)
+        return ends(event) or (answered and not orders.insists)
 
-    if homing and not halted and orders.give(commands, is_over, start_s + HOMING_S):
+    if homing and not halted and orders.give(commands, ends_homing, start_s + HOMING_S):
         commands = ORDERS
     start_s = medium.now_s()
-    while not shown.off and (now_s := medium.now_s()) < start_s + timeout_s:
-        if orders.give(commands, shown.ends, min(now_s + AGAIN_S, start_s + timeout_s)) or shown.halted:
+    while not off and (now_s := medium.now_s()) < start_s + timeout_s:
+        if orders.give(commands, ends, min(now_s + AGAIN_S, start_s + timeout_s)) or halted:
             break
-    return Heaters.OFF if shown.off else Heaters.HALTED if shown.halted else Heaters.UNPROVED
-
-
-class _Shown:
-    """What the answers to the orders have shown."""
-
-    def __init__(self, halted: bool) -> None:
-        self.halted, self.off, self.answered = halted, False, False
-
-    def ends(self, line: bytes) -> bool:
-        """Whether nothing more needs to be asked."""
-        event = read_event(line)
-        report = event.temperature
-        self.answered = self.answered or event.kind is Kind.OK
-        self.halted = self.halted or _shows_kill(line)
-        self.off = self.off or (report is not None and shows_off(report))
-        return self.off or self.halted
+    return Heaters.OFF if off else Heaters.HALTED if halted else Heaters.UNPROVED
 
 
 def shows_off(report: Temperature) -> bool:
@@ -213,9 +205,8 @@ def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn
     """
     position: dict[str, float] | None = None
 
-    def reports_done(line: bytes) -> bool:
+    def reports_done(event: Event) -> bool:
         nonlocal position
-        event = read_event(line)
         position = event.position or position
         return event.kind is Kind.OK and event.temperature is not None
 
@@ -233,13 +224,13 @@ def emergency_stop(wire: Wire, medium: Medium) -> bool:
     try:
         wire.discard()
         start_s, orders = medium.now_s(), Orders(wire, medium)
-        if orders.give(("M112",), _shows_kill, start_s + STOP_AGAIN_S):
+        if orders.give(("M112",), _is_halt, start_s + STOP_AGAIN_S):
             return True
         # One that had shut down before (Klipper) answers M112 with a bare ok, and any other command with its words.
-        return orders.give(("M112", "M107"), _shows_kill, start_s + STOP_MOST_S)
+        return orders.give(("M112", "M107"), _is_halt, start_s + STOP_MOST_S)
     except PortError:
         return False
 
 
-def _shows_kill(line: bytes) -> bool:
-    return read_event(line).is_halt
+def _is_halt(event: Event) -> bool:
+    return event.is_halt

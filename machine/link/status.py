@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from machine.gcode.commands import command_in
 from machine.gcode.modes import E_AXIS, ModalState
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Event, Kind, Temperature, read_event
+from machine.link.protocol.events import Event, Kind, Temperature
 from machine.link.protocol.framing import FAR_NUMBER, frame
 from machine.link.shutdown import Orders
 
-LAST_LINE = re.compile(rb"Last Line: (\d{1,10})")
+LAST_LINE = re.compile(r"Last Line: (\d{1,10})")
 QUESTIONS = ("M400", "M114", "M105")
 TRIES, ANSWER_S = 3, 4.0  # a board that restarts when its port is opened spends two seconds in its boot loader
 STILL_S = 300.0  # a printer that still works on its queue answers when that is empty
@@ -39,27 +39,25 @@ class PrinterStatus:
     greeted: bool = False
     fault: str = ""
 
-    def _read(self, line: bytes) -> Event:
-        """Any line; a board that restarts begins its line numbers anew."""
-        event = read_event(line)
+    def _read(self, event: Event) -> None:
+        """Any event; a board that restarts begins its line numbers anew."""
         if event.kind is Kind.FAULT:
             self.fault = event.text.removeprefix("!!").strip()
         if event.kind in (Kind.START, Kind.BANNER):
             self.greeted, self.last_number = True, None if self.last_number is None else 0
-        return event
 
-    def read_number(self, line: bytes) -> bool:
+    def read_number(self, event: Event) -> bool:
         """Whether the far number was answered, by a refusal or, where numbers are not checked, by what M105 is answered with."""
-        event = self._read(line)
-        if last_line := LAST_LINE.search(line):
+        self._read(event)
+        if last_line := LAST_LINE.search(event.text):
             self.last_number = int(last_line[1])
         elif event.kind is Kind.RESEND and event.line is not None:  # Repetier and OctoPrint's virtual printer name no last line
             self.last_number = event.line - 1
         return self.last_number is not None or (event.kind is Kind.OK and event.temperature is not None)
 
-    def read_position(self, line: bytes) -> bool:
+    def read_position(self, event: Event) -> bool:
         """Take a position; whether the temperature that is asked for after it has come."""
-        event = self._read(line)
+        self._read(event)
         self.position = event.position or self.position
         if event.kind is Kind.OK and event.temperature is not None:
             self.temperature = event.temperature
@@ -79,14 +77,14 @@ def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> Pri
             break
     else:
         return PrinterStatus()
-    orders.wait_for(lambda line: False, medium.now_s() + 0.5)  # the rest of the refusal
+    orders.wait_for(lambda event: False, medium.now_s() + 0.5)  # the rest of the refusal
     for _ in range(TRIES):  # what was asked is lost when the board restarts meanwhile
         before, status.greeted = status.greeted, False
-        orders.give(QUESTIONS, lambda line: status.read_position(line) or status.greeted, medium.now_s() + STILL_S)
+        orders.give(QUESTIONS, lambda event: status.read_position(event) or status.greeted, medium.now_s() + STILL_S)
         again, status.greeted = status.greeted, status.greeted or before
         if not again:
             break
-        orders.wait_for(lambda line: False, medium.now_s() + ANSWER_S)
+        orders.wait_for(lambda event: False, medium.now_s() + ANSWER_S)
     return status
 
 

@@ -5,7 +5,7 @@ A firmware guards its heaters itself (Marlin: 40 s beyond 4 K, 20 s without a ri
 this one speaks only where the firmware's is missing or does not see the fault.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 
 from machine.gcode.commands import command_named
@@ -54,49 +54,21 @@ class HeaterWatch:
             )
 
 
-@dataclass
-class Watchdog:
-    """check() every report, check_silence() now and then. most_c: what nozzle and bed must never exceed by far, deg C."""
-
-    most_c: tuple[float, float] = (inf, inf)
-    reported_s: float | None = None
-    _heaters: tuple[HeaterWatch, ...] = field(
-        default_factory=lambda: (HeaterWatch("nozzle", 20.0, 60.0), HeaterWatch("bed", 15.0, 180.0, 1.0))
-    )
-
-    def check(self, report: Temperature, now_s: float) -> None:
-        """Judge a report. Raises PrinterError."""
-        self.reported_s = now_s
-        pairs = ((report.nozzle_c, report.nozzle_target_c), (report.bed_c, report.bed_target_c))
-        for heater, most_c, (now_c, target_c) in zip(self._heaters, self.most_c, pairs, strict=True):
-            heater.over = heater.over + 1 if now_c is not None and now_c > most_c + OVER_LIMIT_C else 0
-            if heater.over >= OVER_REPORTS:
-                raise PrinterError(f"the {heater.name} is at {now_c:.0f} deg C: this machine allows at most {most_c:g}")
-            if not heater.over:
-                heater.check(now_c, target_c, now_s)
-
-    def check_silence(self, now_s: float, mute: bool = False) -> None:
-        """Judge silence while a heater is on; raises PrinterError. A printer that never reported anything is not judged, nor one
-        that cannot report now (mute).
-        """
-        if mute and self.reported_s is not None:
-            self.reported_s = now_s
-        silent_s = 0.0 if self.reported_s is None else now_s - self.reported_s
-        if silent_s > SILENCE_S and any(heater.target_c for heater in self._heaters):
-            raise PrinterError(f"the printer has reported no temperature for {silent_s:.0f} s although a heater is on")
-
-
 class PrinterReports:
-    """read() every event; temperature_s: when the newest temperature came; unknown: commands that the firmware does not know;
-    waiting: what a person at the printer is waited for, "" when for nothing.
+    """read() every event, check_silence() now and then.
+
+    most_c: what nozzle and bed must never exceed by far, deg C. temperature_s: when the newest temperature came; unknown:
+    commands that the firmware does not know; waiting: what a person at the printer is waited for, "" when for nothing.
     """
 
-    def __init__(self, watchdog: Watchdog, now_s: float) -> None:
+    def __init__(self, now_s: float, most_c: tuple[float, float] = (inf, inf)) -> None:
         self.temperature, self.firmware, self.temperature_s = Temperature(), "unknown", now_s
         self.unknown: set[str] = set()
         self.waiting = ""
         self._warned: dict[str, int] = {}
-        self.watchdog = watchdog
+        self._most_c = most_c
+        self._heaters = HeaterWatch("nozzle", 20.0, 60.0), HeaterWatch("bed", 15.0, 180.0, 1.0)
+        self._silent_since_s: float | None = None  # None: nothing was ever reported
 
     def read(self, event: Event, now_s: float) -> PendingCommand | None:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
@@ -106,8 +78,7 @@ class PrinterReports:
             # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
             self.waiting = "the printer waits for a person: look at its display" if "paused for" in event.text else ""
         if event.temperature is not None:
-            self.temperature, self.temperature_s = event.temperature, now_s
-            self.watchdog.check(event.temperature, now_s)
+            self._check(event.temperature, now_s)
         if event.identity:
             self.firmware = event.identity.removeprefix("FIRMWARE_NAME:").strip()
         elif unknown := event.unknown_command:
@@ -121,6 +92,27 @@ class PrinterReports:
         elif event.kind is Kind.ACTION:
             return self._read_action(event.text)
         return None
+
+    def _check(self, report: Temperature, now_s: float) -> None:
+        """Judge the temperatures. Raises PrinterError."""
+        self.temperature, self.temperature_s, self._silent_since_s = report, now_s, now_s
+        pairs = ((report.nozzle_c, report.nozzle_target_c), (report.bed_c, report.bed_target_c))
+        for heater, most_c, (now_c, target_c) in zip(self._heaters, self._most_c, pairs, strict=True):
+            heater.over = heater.over + 1 if now_c is not None and now_c > most_c + OVER_LIMIT_C else 0
+            if heater.over >= OVER_REPORTS:
+                raise PrinterError(f"the {heater.name} is at {now_c:.0f} deg C: this machine allows at most {most_c:g}")
+            if not heater.over:
+                heater.check(now_c, target_c, now_s)
+
+    def check_silence(self, now_s: float, mute: bool = False) -> None:
+        """Judge silence while a heater is on; raises PrinterError. A printer that never reported anything is not judged, nor one
+        that cannot report now (mute).
+        """
+        if mute and self._silent_since_s is not None:
+            self._silent_since_s = now_s
+        silent_s = 0.0 if self._silent_since_s is None else now_s - self._silent_since_s
+        if silent_s > SILENCE_S and any(heater.target_c for heater in self._heaters):
+            raise PrinterError(f"the printer has reported no temperature for {silent_s:.0f} s although a heater is on")
 
     def leaves_out(self, command: str) -> bool:
         """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""

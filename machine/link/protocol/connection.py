@@ -26,7 +26,7 @@ Bytes become events (decoder), an event or the passing of time amounts to a sign
 from machine.firmware import Firmware
 from machine.firmware.marlin import MARLIN
 from machine.link.protocol import verdict
-from machine.link.protocol.answers import ASKED_LIMIT, QUESTION, QUESTIONS_MOST, Acknowledgement, FlowControl, Questions, Resends
+from machine.link.protocol.answers import ASKED_LIMIT, QUESTION, QUESTIONS_MOST, Acknowledgement, Questions, Resends
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.framing import LINE_LIMIT, frame
@@ -64,23 +64,18 @@ class Connection:
         self.greeting = Greeting(firmware, rx_bytes, baud)
         self.window = Window(limit, self.greeting.rx_bytes)
         self.resends = Resends()
-        self._decoder, self._flow, self._oks, self._questions = LineDecoder(), FlowControl(), Acknowledgement(), Questions()
+        self._decoder, self._oks, self._questions = LineDecoder(), Acknowledgement(), Questions()
         self._timeouts = Timeouts(timing or Timing(), now_s)
         self._out = bytearray()
         self._last_number_used = False
         self.halted = False
-
-    @property
-    def advanced(self) -> bool:
-        """Whether the printer's answers name the line they belong to."""
-        return self._flow.numbered
 
     def can_send(self, command: str) -> bool:
         """Whether this command may be sent now."""
         if self.state is not State.OPEN or self._last_number_used or self._decoder.incomplete:
             return False
         greeting = self.greeting
-        return self.window.has_space(command, self._flow.lines(greeting.firmware.line, greeting.emergency_parser))
+        return self.window.has_space(command, greeting.firmware.line, greeting.emergency_parser)
 
     def send(self, command: str, now_s: float) -> int:
         """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on."""
@@ -180,11 +175,11 @@ class Connection:
         """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
         unknown = self._oks.take_unknown()
         if ok.line is not None:
-            self._flow.learn(ok.rx_free)
+            self.window.learn(ok.rx_free)
             if self.state is State.OPEN:  # nearly every answer
                 self._acknowledge(self.window.line_number(ok.line), False, now_s)
                 return
-        elif ok.planner_free is not None and self.advanced and not unknown:
+        elif ok.planner_free is not None and self.window.numbered and not unknown:
             self._follow(Signal.UNCHECKED, now_s, verdict.torn_line(self.window.last_acknowledged))
             return
         if self.state is State.SYNC:
@@ -196,12 +191,12 @@ class Connection:
             if self.resends.alone and ok.line is None and ok.temperature is None:
                 self._follow(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way
         elif self.state is State.RENUMBER:
-            if self._oks.answers_m110(ok, self.advanced, unknown, now_s):
+            if self._oks.answers_m110(ok, self.window.numbered, unknown, now_s):
                 self.window.restart_numbers()
                 self._last_number_used = False
                 self._follow(Signal.SYNCED, now_s)
         else:
-            self._acknowledge(self._oks.line(ok, self.window, self.advanced, now_s), ok.temperature is not None, now_s)
+            self._acknowledge(self._oks.line(ok, self.window, self.window.numbered, now_s), ok.temperature is not None, now_s)
 
     def _acknowledge(self, number: int | None, to_question: bool, now_s: float) -> None:
         """This line and all before it have arrived; a line that is not in flight makes the answer a stray.
@@ -218,10 +213,8 @@ class Connection:
                 self._follow(Signal.UNCHECKED, now_s, verdict.lost_answer(lost, command, self.greeting.firmware.name))
                 return
             number = window.sent
-        count = window.acknowledge(number)
-        if not count:
+        if not window.acknowledge(number):
             return
-        self._flow.acknowledge(count)
         self.resends.acknowledge(number)
         self._timeouts.acknowledge(oldest, now_s)
         self._questions.acknowledge()
@@ -297,7 +290,7 @@ class Connection:
                 self._questions.end()
             case State.QUIET:
                 self._questions.end()
-                self._flow.back_off()
+                self.window.back_off()
                 self.resends.alone = self.window.sent <= self.resends.next_line
                 self.window.clear_flight()
             case State.REPEAT:
@@ -326,7 +319,7 @@ class Connection:
     def _ask(self, now_s: float) -> None:
         """Ask what has arrived, or give M110, which is not checked for sequence, once more; not without end."""
         if self.state is State.PROBING:
-            self._flow.slow_down()
+            self.window.slow_down()
         if not self._questions.ask():
             self._follow(Signal.SILENT, now_s, verdict.silence(self.window.last_acknowledged + 1, QUESTIONS_MOST))
         elif self.state is State.PROBING:
