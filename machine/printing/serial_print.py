@@ -190,8 +190,7 @@ def time_left_s(remaining_s: Callable[[int], float], first: int, status: PrintSt
 @contextmanager
 def _pointing_to(log: SerialLog) -> Iterator[None]:
     """Say where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
-    if log.trouble:
-        say(f"the traffic is not logged: {log.file}: {log.trouble}")
+    log.say_trouble()
     try:
         yield
     except PrinterError:

@@ -45,8 +45,7 @@ LIMITS = (
 def server_session(server: Server, title: str, kind: str, file: Path | None = None) -> Iterator[tuple[PrintServer, SerialLog]]:
     """A session with a server and the log of it, without keys. kind, file: of the log. Raises ServerError, ProfileError."""
     with new_log(kind, title, file) as record:
-        if record.trouble:
-            say(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
+        record.say_trouble("what is asked and answered")
         with open_server(server, record.note) as session:
             yield session, record
 

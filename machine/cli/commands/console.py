@@ -54,8 +54,7 @@ def console(request: ConsoleRequest, machine: Machine) -> int:
     with ExitStack() as stack:
         log = stack.enter_context(new_log("console", f"console at {at.name}", request.log))
         wire = stack.enter_context(open_line(at, machine))
-        if log.trouble:
-            say(f"the traffic is not logged: {log.file}: {log.trouble}")
+        log.say_trouble()
         stack.enter_context(interrupting())
         shown = Shown(request.reports)
 

@@ -156,8 +156,7 @@ def cold_session(port: PortRequest, machine: Machine, table: ProbedTable | None 
     with ExitStack() as stack:
         log = stack.enter_context(new_log("calibrate", f"calibrate at {port.port}", port.log))
         wire = stack.enter_context(open_line(at, machine, table))
-        if log.trouble:
-            say(f"the traffic is not logged: {log.file}: {log.trouble}")
+        log.say_trouble()
         stack.enter_context(interrupting())
         answer = identify_printer(wire, rate_of(at))
         say(describe_answer(answer, rate_of(at)))
