@@ -104,7 +104,7 @@ def program() -> list[str]:
 
 def serve(link: str, record: str, speed: float) -> None:
     """The printer's process: lives until its standard input ends, then writes down what it has executed."""
-    with SimulatedPrinter(PROFILE.machine, speed, link=Path(link)) as printer:
+    with SimulatedPrinter(PROFILE.machine, speed, at=Path(link)) as printer:
         print("ready", flush=True)
         sys.stdin.read()
         done = printer.record

@@ -6,6 +6,7 @@ end; how it is told to seek contact along Z; and how the simulated printer takes
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Literal
 
 from machine.firmware.dialect import Dialect
@@ -69,17 +70,6 @@ def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, be
 
 
 @dataclass(frozen=True)
-class Idle:
-    """What a firmware does by itself when nothing has moved for after_s: the motors of its first `axes` go off, which M84 S may
-    forbid. shuts_down: heaters, too, and nothing moves any more before it is homed; a dwell is a move, and M84 knows no S.
-    """
-
-    after_s: float
-    axes: int
-    shuts_down: bool = False
-
-
-@dataclass(frozen=True)
 class SimulationRules:
     """What a host sees of the firmware; {} is the command or the coordinates.
 
@@ -94,7 +84,10 @@ class SimulationRules:
     with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
     behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
     it believes itself at its home positions, and keeps only axes that were homed inside the limits.
-    settings: what it tells of its settings. answers_blank: an empty line is answered with ok. idle: None: its motors stay on.
+    settings: what it tells of its settings. answers_blank: an empty line is answered with ok.
+    idle_after_s: when nothing has moved for that long the motors of its first idle_axes go off, which M84 S may forbid; inf: they
+    stay on. idle_shuts_down: heaters go off, too, and nothing moves any more before it is homed; a dwell is a move, and M84 knows
+    no S.
     """
 
     identity: str
@@ -123,7 +116,9 @@ class SimulationRules:
     lacks: frozenset[str] = frozenset()
     starts_at_home: bool = False
     answers_blank: bool = False
-    idle: Idle | None = None
+    idle_after_s: float = inf
+    idle_axes: int = 0
+    idle_shuts_down: bool = False
 
 
 def check_baud(baud: int) -> None:

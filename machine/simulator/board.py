@@ -166,7 +166,7 @@ class Board:
     def forget(self) -> None:
         """The board restarts."""
         self.powered, self.must_home = True, self.build.must_home
-        self.idle_after_s = self.rules.idle.after_s if self.rules.idle is not None else inf
+        self.idle_after_s = self.rules.idle_after_s
         self.awake_s = 0.0  # what is no move has kept the motors on until then
         self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = self.homes = False
         self.report_every_s = self.position_every_s = 0.0
@@ -213,11 +213,10 @@ class Board:
     def idle(self) -> None:
         """Nothing has moved for so long."""
         self.motion.planner.run(self.now_s)
-        idle = self.rules.idle
-        if idle is None or self.idle_s > self.now_s:  # a move that was planned has begun meanwhile
+        if self.idle_s > self.now_s:  # a move that was planned has begun meanwhile
             return
-        self.let_go(range(idle.axes))
-        if idle.shuts_down:
+        self.let_go(range(self.rules.idle_axes))
+        if self.rules.idle_shuts_down:
             self.nozzle.set(0.0, self.now_s)
             self.bed.set(0.0, self.now_s)
             self.motion.homed.clear()

@@ -96,7 +96,7 @@ def _dwell(board: Board, order: Order) -> Iterator[float]:
     until_s = board.now_s + max(0.0, _seconds(order.words))
     while board.now_s < until_s:
         yield until_s
-    if board.rules.idle is not None and board.rules.idle.shuts_down:
+    if board.rules.idle_shuts_down:
         board.awake_s = board.now_s
 
 
@@ -263,9 +263,9 @@ def _stop(board: Board, order: Order) -> Work:
 
 def _rest(board: Board, order: Order) -> Iterator[float]:
     """M18, M84: motors off; with S only after S idle seconds, 0: never."""
-    idle, words = board.rules.idle, order.words
-    if "S" in words and (idle is None or not idle.shuts_down):
-        if idle is not None:
+    words = order.words
+    if "S" in words and not board.rules.idle_shuts_down:
+        if board.rules.idle_after_s < inf:
             board.idle_after_s, board.awake_s = words["S"] or inf, board.now_s
         return
     yield from wait_for_moves(board)
@@ -430,15 +430,14 @@ def _area(board: Board) -> str:
     return f"area:{{full:{{{reach}}},work:{{{reach}}}}}"
 
 
-def _autoreport_temperatures(board: Board, order: Order) -> Work:
-    board.report_every_s = max(0.0, order.words.get("S", 0.0))
-    board.report_s = board.now_s + board.report_every_s if board.report_every_s else inf
-    return None
-
-
-def _autoreport_position(board: Board, order: Order) -> Work:
-    board.position_every_s = max(0.0, order.words.get("S", 0.0))
-    board.position_s = board.now_s + board.position_every_s if board.position_every_s else inf
+def _autoreport(board: Board, order: Order) -> Work:
+    """M155 temperatures, M154 the position, every S seconds; 0: no more."""
+    every_s = max(0.0, order.words.get("S", 0.0))
+    next_s = board.now_s + every_s if every_s else inf
+    if order.name == "M155":
+        board.report_every_s, board.report_s = every_s, next_s
+    else:
+        board.position_every_s, board.position_s = every_s, next_s
     return None
 
 
@@ -514,8 +513,8 @@ COMMANDS: dict[str, Command] = {  # beside G0 and G1, which wait for a free bloc
     "M118": _send_to_host,
     "M119": _report_endstops,
     "M140": _heat,
-    "M154": _autoreport_position,
-    "M155": _autoreport_temperatures,
+    "M154": _autoreport,
+    "M155": _autoreport,
     "M190": _heat_and_wait,
     "M201": _setting(lambda board, words: board.motion.bound(words, board.motion.accelerations)),
     "M203": _setting(lambda board, words: board.motion.bound(words, board.motion.speeds)),
