@@ -14,8 +14,7 @@ from machine.link.pause.park_moves import lift_move
 from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
-from machine.link.print_state import PrintState, PrintStatus
-from machine.link.progress import ProgramPosition
+from machine.link.print_state import PrintState, PrintStatus, ProgramPosition
 from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.framing import command_of
 from machine.link.protocol.states import State

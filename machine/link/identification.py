@@ -2,17 +2,19 @@
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from threading import Event as Flag
-from time import monotonic
 
 from machine.firmware import identify
 from machine.firmware.firmware import BAUDS, LineRules
+from machine.link.medium import SERIAL
+from machine.link.pending_commands import CancelledError
 from machine.link.port import Port
-from machine.link.protocol import events
-from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.framing import FAR_NUMBER, frame
+from machine.link.protocol.events import NAME, Event
+from machine.link.protocol.events import Kind as EventKind
+from machine.link.shutdown import Orders
 
 TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
 QUICK_S = 1.5  # at another rate: it has started by then
@@ -57,7 +59,7 @@ class Answer:
     @property
     def firmware(self) -> str:
         """The firmware's name and version without the rest of its line."""
-        name = KEY.split(self.words.removeprefix(events.NAME).strip())[0]
+        name = KEY.split(self.words.removeprefix(NAME).strip())[0]
         version = VERSION.search(self.words)
         return f"{name} {version[1]}" if version else name
 
@@ -93,39 +95,29 @@ class _Inquiry:
     """What one asking has brought so far."""
 
     def __init__(self, port: Port, stop: Flag) -> None:
-        self._port, self._stop = port, stop
-        self._decoder = LineDecoder()
+        self._stop = stop
+        self._orders = Orders(port, SERIAL, self._check_stop)
         self._words = self._fault = self._letters = ""
         self._area: tuple[tuple[float, float], ...] = ()
-        self._ok = self.named = self.placed = self.starting = self._refused = False
+        self._ok = self.named = self.placed = self.starting = False
         self._busy = ""  # what it says of that
-        self._next_number = 0  # that a firmware which insists on numbers and checksums wants
 
     def listen(self, question: str, timeout_s: float, until: Callable[[], bool]) -> None:
         """Ask again and again until the answer is whole, or the time is over."""
-        end_s = next_s = monotonic()
-        end_s += timeout_s
+        end_s = SERIAL.now_s() + timeout_s
         self._ok = False
-        while not until() and not self._fault and not self._stop.is_set() and (now_s := monotonic()) < end_s:
-            if now_s >= next_s:
-                self._write(question)
-                next_s = now_s + ASK_S
-            if data := self._port.read():
-                before = (self._refused, self._next_number)
-                for event in self._decoder.receive(data, now_s):
-                    self._read(event)
-                if before != (self._refused, self._next_number):
-                    next_s = now_s  # asked in another way at once
 
-    def _write(self, question: str) -> None:
-        """The newline ends what stood on the line before. Where unnumbered lines are refused, empty ones are, too, and a far one
-        brings the number.
-        """
-        if self._next_number:
-            self._port.write(frame(self._next_number, question))
-            self._next_number = 0
-        else:
-            self._port.write(frame(FAR_NUMBER, question) if self._refused else f"\n{question}\n".encode("ascii"))
+        def is_whole(event: Event) -> bool:
+            self._read(event)
+            return until() or bool(self._fault)
+
+        with suppress(CancelledError):
+            while not (until() or self._fault) and (now_s := SERIAL.now_s()) < end_s:
+                self._orders.give((question,), is_whole, min(now_s + ASK_S, end_s))
+
+    def _check_stop(self) -> None:
+        if self._stop.is_set():
+            raise CancelledError
 
     def answer(self) -> Answer:
         """What all of it amounts to."""
@@ -137,31 +129,27 @@ class _Inquiry:
             return Answer(Kind.HALTED, self._fault.removeprefix("!!").strip(), revival=revival)
         if self.starting:
             return Answer(Kind.STARTING, self._words)
-        if self._words or self._ok or self._refused:
+        if self._words or self._ok or self._orders.insists:
             return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
         if self._busy:
             return Answer(Kind.BUSY, self._busy)
-        if self._decoder.rubbish:
+        if self._orders.decoder.rubbish:
             return Answer(Kind.RUBBISH)
-        words = self._decoder.foreign
+        words = self._orders.decoder.foreign
         return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
 
-    def _read(self, event: events.Event) -> None:
+    def _read(self, event: Event) -> None:
         if event.is_starting:
             self.starting = True
-        elif event.kind is events.Kind.FAULT:
+        elif event.kind is EventKind.FAULT:
             self._fault = event.text
-        elif event.kind is events.Kind.BUSY:
+        elif event.kind is EventKind.BUSY:
             self._busy = event.text.rpartition("busy:")[2].strip() or "busy"
-        elif event.lacks_checksum:
-            self._refused = True
-        elif event.kind is events.Kind.RESEND and self._refused:
-            self._next_number = event.line or 0
         self._area = event.area or self._area
         self._words = event.identity or self._words
         if event.position is not None:
             self._letters, self.placed = "".join(letter for letter in event.position if letter != "E"), True
-        if event.kind is events.Kind.OK:
+        if event.kind is EventKind.OK:
             self._ok, self.named = True, bool(self._words)
 
     def _limits(self) -> dict[str, tuple[float, float]]:

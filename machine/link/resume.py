@@ -20,7 +20,7 @@ from machine.link.journal import EVERY_LINES, LEFT, PAUSED, Checkpoint
 from machine.link.line_history import shifts
 from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands, homed_return_moves, return_moves
 from machine.link.pause.printed_bounds import PrintedBounds
-from machine.link.progress import ProgramPosition
+from machine.link.print_state import ProgramPosition
 from machine.link.protocol.framing import command_of
 from machine.link.status import SEVERAL, PrinterStatus
 from machine.planning.stand import Turn

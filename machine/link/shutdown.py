@@ -10,7 +10,8 @@ from typing import Self
 from machine.firmware.dialect import HOMING_S
 from machine.link.exchange import Exchange
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Event, Kind, Temperature, read_event
+from machine.link.protocol.decoder import LineDecoder
+from machine.link.protocol.events import Event, Kind, Temperature
 from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
 from profiles.errors import PortError, PrinterError, add_words
 
@@ -27,7 +28,6 @@ SETTLE_S = 20.0  # lines that the printer had already taken are run first
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
 LIFT_S = 10.0  # a lift of some millimetres at any Z axis' speed
 STOP_AGAIN_S, STOP_MOST_S = 0.5, 2.0
-PARTIAL_BYTES = 4096
 UNCONFIRMED = "did not confirm M112: cut the power"
 
 
@@ -37,15 +37,16 @@ class Orders:
 
     A firmware that insists on checksums refuses them ("Missing checksum": OctoPrint's virtual printer with forceChecksum,
     Repetier). It is asked for its line number, by a line whose number is too far ahead, and gets them once more with both.
-    on_turn: called meanwhile, may raise to end the listening; insists: the firmware wants numbers and checksums.
+    on_turn: called meanwhile, may raise to end the listening; insists: the firmware wants numbers and checksums; decoder: reads
+    what comes.
     """
 
     wire: Wire
     medium: Medium
     on_turn: Callable[[], None] = lambda: None
     insists: bool = False
-    _waiting: tuple[str, ...] = field(default=())  # commands to be given as soon as the number is known
-    _partial: bytes = b""
+    decoder: LineDecoder = field(default_factory=LineDecoder)
+    _waiting: tuple[str, ...] = ()  # commands to be given as soon as the number is known
 
     def give(self, commands: Sequence[str], is_wanted: Callable[[Event], bool], end_s: float) -> bool:
         """Write commands and listen until an event is wanted (True) or the time has come (False)."""
@@ -59,9 +60,9 @@ class Orders:
         """Listen until an event is wanted (True) or the time has come (False)."""
         while self.medium.now_s() < end_s:
             self.on_turn()
-            *lines, self._partial = (self._partial + self.wire.read()).split(b"\n")
-            self._partial = self._partial[-PARTIAL_BYTES:]
-            wanted = [is_wanted(read_event(line)) for line in lines]  # all of them are heard: a halt may follow an ok at once
+            data, now_s = self.wire.read(), self.medium.now_s()
+            events = [*self.decoder.receive(data, now_s), *self.decoder.flush(now_s)]
+            wanted = [is_wanted(event) for event in events]  # all of them are heard: a halt may follow an ok at once
             if any(wanted):
                 return True
         return False
@@ -77,8 +78,10 @@ class Orders:
         return False
 
     def _ask_number(self, commands: Sequence[str]) -> None:
+        """A single command asks by itself: a firmware that wants a checksum, but any number, obeys it."""
         self._waiting = tuple(commands)
-        self.wire.write(frame(FAR_NUMBER, "M105"))  # what was refused has ended a half line
+        question = commands[0] if len(commands) == 1 else "M105"
+        self.wire.write(frame(FAR_NUMBER, question))  # what was refused has ended a half line
 
 
 def as_lines(commands: Sequence[str]) -> bytes:
@@ -103,11 +106,10 @@ def heaters_off(
     may raise. Raises PortError when the port is gone.
     """
     wire.discard()
-    halted, start_s, old = False, medium.now_s(), b""
-    while (data := wire.read()) and medium.now_s() - start_s < OLD_REPORTS_S:
-        *lines, old = (old + data)[-PARTIAL_BYTES:].split(b"\n")
-        halted = halted or any(read_event(line).is_halt for line in lines)
-    orders = Orders(wire, medium, on_turn)
+    orders, halted, start_s = Orders(wire, medium, on_turn), False, medium.now_s()
+    while (data := wire.read()) and (now_s := medium.now_s()) - start_s < OLD_REPORTS_S:
+        halted = any(event.is_halt for event in orders.decoder.receive(data, now_s)) or halted
+    orders.decoder.discard_partial()  # the rest of an old report proves nothing either
     commands = HOMING_ORDERS if homing else ORDERS
     off = answered = False
 

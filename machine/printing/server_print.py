@@ -10,8 +10,7 @@ from time import monotonic
 from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
-from machine.link.print_state import PrintState, PrintStatus, last_known
-from machine.link.progress import ProgramPosition
+from machine.link.print_state import PrintState, PrintStatus, ProgramPosition, last_known
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import (
