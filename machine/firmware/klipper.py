@@ -145,7 +145,7 @@ SIMULATED = SimulationRules(
     out_of_range="!! Move out of range: {}",
     heater_fault="Heater extruder not heating at expected rate",
     kill=("// Klipper state: Shutdown",),
-    # klippy/gcode.py, _respond_error and cmd_default: the reason is told to the next command, not to M105 and what is known
+    # klippy/gcode.py, _respond_error and cmd_default: the next command is answered with the reason, not M105 and what is known
     # without a printer; klippy/klippy.py, message_shutdown.
     after_kill=(
         "// {}",

@@ -27,7 +27,7 @@ from profiles.profile import Profile
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
-BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
+BOUNDARY_S = 15.0  # the longest that a pause waits for the end of a stroke
 WORTH_S = 0.3  # a planner that takes less to run empty is not asked the next time; a simulated one as fast as it goes takes none
 WATCH_S, WATCH_MOST_S = 0.02, 5.0  # the least time between questions how many moves wait, and how long they may bring no news
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
@@ -57,12 +57,11 @@ class Feed:
         self._planner, self._worth_following, self._reports_stand_still = PlannerReports(), False, False
         self.history = LineHistory(planner=self._planner)
         self._bounds = PrintedBounds(machine) if machine is not None else None
-        self._pending = PendingCommands(self.modal.axes, limit, control)
+        self.pending = PendingCommands(self.modal.axes, limit, control)
         # A bed that cannot be heated is as warm as its room.
         most_c = (inf, inf) if machine is None else (machine.nozzle_limit_c, machine.bed_limit_c or inf)
         self.reports = PrinterReports(start_s, most_c)
         self.exchange: Exchange
-        self.resume_point: ResumePoint | None = None
         self.state, self._trouble, self.started, self.finished = PrintState.PRINTING, "", False, False
         self.sent = self._skipped = 0
         self._program_pause = ""  # what the program says of the pause before its next command
@@ -71,15 +70,10 @@ class Feed:
         self._start_s = self._shown_s = self._asked_s = start_s
         self._warned = ""  # the warning that was shown last
 
-    @property
-    def acknowledged(self) -> int:
-        """Commands of the program that the printer has taken."""
-        return self.history.commands
-
-    def run(self, lines: Iterable[str]) -> None:
-        """Feed the program from its beginning, or where the job says, to the barrier at its end."""
+    def run(self, lines: Iterable[str], resume_point: ResumePoint | None = None) -> None:
+        """Feed the program from its beginning, or where an interrupted print goes on, to the barrier at its end."""
         exchange = self.exchange
-        resume_point, self.started, self.history = self.resume_point, True, self._new_history()
+        self.started, self.history = True, self._new_history()
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send(f"M155 S{REPORT_S}")
         for line, command in self._commands(lines):
@@ -136,15 +130,15 @@ class Feed:
             if command:
                 if command[0] in "Mm":
                     self._position.read_m73(command, self.exchange.medium.now_s() - self._start_s)
-                    self._pending.note_override(command)
+                    self.pending.note_override(command)
                 yield line, command
             elif PAUSE_REMARK in text:
                 self._program_pause = text.partition(PAUSE_REMARK)[2].strip()
 
     def _before(self, command: str) -> None:
         """What is due before the next command of the program."""
-        if self._pending.lines:
-            for own in self._pending.next_lines(self.modal):
+        if self.pending.lines:
+            for own in self.pending.next_lines(self.modal):
                 self.exchange.send(own)
         if self._reconnected:
             self._reconnected = False
@@ -159,7 +153,7 @@ class Feed:
         if self._program_pause:
             why, self._program_pause = self._program_pause, ""
             self._rest(f"the program pauses: {why}")
-        since_s = self._pending.pause_s
+        since_s = self.pending.pause_s
         if since_s is not None and (not self._prints(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
             self._rest()
 
@@ -222,11 +216,11 @@ class Feed:
         self.set_state(PrintState.PAUSING, why)
         self._record()
         position_known = not self._position_errors()
-        self._pause = Pause(self.exchange, self._pending, self.reports, self.modal, self.profile)
+        self._pause = Pause(self.exchange, self.pending, self.reports, self.modal, self.profile)
         for state, words in self._pause.run(self._bounds, why):
             self.set_state(state, words)
             self._record()
-        self._pending.end_pause()
+        self.pending.end_pause()
         if position_known:
             self._verify_position("after the pause")
         self._pause = None
@@ -238,7 +232,7 @@ class Feed:
         self.set_state(PrintState.FINISHING)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send("M155 S0")
-        for command in self._pending.undo_overrides():
+        for command in self.pending.undo_overrides():
             exchange.send(command)
         self._end_moves()
         self.finished = True
@@ -254,7 +248,7 @@ class Feed:
                 self.history.acknowledge(window.acknowledged, event.planner_free)
         command = self.reports.read(event, now_s)
         if command is not None:
-            self._pending.accept(command, self.state, now_s)
+            self.pending.accept(command, self.state, now_s)
 
     def handle_turn(self, now_s: float) -> None:
         """Once a turn of the exchange."""
@@ -277,26 +271,22 @@ class Feed:
 
     def poll(self) -> None:
         """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""
-        now_s, message = self.exchange.medium.now_s(), self._pending.message
-        wanted = self._pending.pause_s is not None
-        self._pending.poll(self.state, now_s)
-        changed = self._pending.message != message or (self._pending.pause_s is not None) != wanted
+        now_s, message = self.exchange.medium.now_s(), self.pending.message
+        wanted = self.pending.pause_s is not None
+        self.pending.poll(self.state, now_s)
+        changed = self.pending.message != message or (self.pending.pause_s is not None) != wanted
         if now_s - self._shown_s >= PROGRESS_S or changed or self._warning() != self._warned:
             self.show(now_s)
 
-    def heed_emergency(self) -> None:
-        """While the print is being ended: only the emergency stop still counts. Raises EmergencyError."""
-        self._pending.heed_emergency()
-
     def set_state(self, state: PrintState, message: str = "") -> None:
         """Show a new state at once."""
-        self.state, self._pending.message = state, message
+        self.state, self.pending.message = state, message
         self.show(self.exchange.medium.now_s())
 
     @contextmanager
     def in_state(self, state: PrintState, message: str) -> Iterator[None]:
         """Another state for as long as something takes; the position is proved before the print goes on."""
-        before, words = self.state, self._pending.message
+        before, words = self.state, self.pending.message
         self._reconnected, self._trouble = True, message
         self.set_state(state)
         try:
@@ -333,10 +323,10 @@ class Feed:
         self._shown_s, self._warned = now_s, self._warning()
         if self._on_progress is None:
             return
-        at, history, feed_percent = self._position, self.history, self._pending.feed_percent
+        at, history, feed_percent = self._position, self.history, self.pending.feed_percent
         elapsed_s, done = now_s - self._start_s, self._skipped + history.commands
         pausing = (
-            self.state is PrintState.PRINTING and self._pending.pause_s is not None
+            self.state is PrintState.PRINTING and self.pending.pause_s is not None
         )  # begins at the end of the stroke under way
         self._on_progress(
             PrintStatus(
@@ -347,8 +337,8 @@ class Feed:
                 part=at.part, parts=at.parts, layer=at.layer,
                 state=PrintState.PAUSING if pausing else self.state,
                 file_line=history.acknowledged,
-                feed_percent=feed_percent, flow_percent=self._pending.flow_percent,
-                message=self._pending.message or self._trouble or self.reports.waiting or self._silence(),
+                feed_percent=feed_percent, flow_percent=self.pending.flow_percent,
+                message=self.pending.message or self._trouble or self.reports.waiting or self._silence(),
                 warning=self._warned,
             )
         )  # fmt: skip

@@ -26,7 +26,7 @@ GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of pri
 
 
 class Kind(Enum):
-    """What answers."""
+    """Kinds of answer."""
 
     PRINTER = "printer"
     BUSY = "busy printer"
@@ -44,7 +44,8 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Answer:
-    """What answers. words: the firmware's own line, its error, what it is busy with, or the last words of a stranger.
+    """The answer of whatever stands at a port. words: the firmware's own line, its error, what it is busy with, or the last words
+    of a stranger.
 
     letters: axes that M114 reports, the filament's left out; "" when none. limits: letter -> least and greatest
     value, of a firmware that reports them. revival: what lets a printer that has halted print again.
@@ -74,7 +75,7 @@ def ask(port: Port, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> A
 
 
 def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> tuple[Answer, int]:
-    """What answers and at which rate: the given one, and where nothing sensible comes the usual others.
+    """The answer, and its baud rate: the given one is tried, and where nothing sensible comes the usual others.
 
     Where none makes a printer answer, the answer is that at the given rate, at which the port is left.
     """

@@ -34,11 +34,11 @@ class Wire(Protocol):
 
 @dataclass(frozen=True)
 class Medium:
-    """How a line is opened (name, baud; raises PortError), what time it is (s), and how time is spent (s).
+    """Access to a line and to the clock: opens a line (name, baud; raises PortError), gives the time (s), and waits (s).
 
-    devices: the serial ports that there are, where a lost one may have come back. lost_s: how long a port that vanished in
-    mid-print is waited for; a person finds the plug in two minutes, and a hot nozzle should not stand in the print for longer.
-    timing: how long the printer's answers are waited for.
+    devices: the serial ports that there are, where a lost one may have come back. lost_s: the longest wait for a port that was
+    lost in mid-print; a person finds the plug in two minutes, and a hot nozzle should not stand in the print for longer. timing:
+    the time limits of the printer's answers.
     """
 
     open: Callable[[str, int], Wire] = open_port

@@ -1,4 +1,4 @@
-"""Pending commands: what a person or the printer has asked of a running print, and what of it is still to be done.
+"""Pending commands: requests of a person or of the printer to a running print that are not carried out yet.
 
 Requests come from any thread through a Control; PendingCommands, in the thread that owns the port, refuses or holds them.
 """
@@ -73,8 +73,8 @@ class EmergencyError(Exception):
 
 @dataclass
 class PendingCommands:
-    """pause_s: since when a pause is wanted; resume: the print is to go on; lines: commands to be sent between those of the
-    program; message: why the newest request cannot be granted.
+    """The requests that were accepted. pause_s: since when a pause is wanted; resume: the print is to go on; lines: commands to
+    be sent between those of the program; message: why the newest request cannot be granted.
     """
 
     axes: Axes

@@ -66,9 +66,9 @@ class ResumePoint:
 
 @dataclass(frozen=True)
 class InterruptedPrint:
-    """What a journal and its program say. line: the first one not surely executed; modal: the state before it; ahead: line -> the
-    state after its command, which may have been done since; stroked: whether anything was printed before. stood_mm: the height at
-    which the tip stands, as a person has seen it.
+    """An interrupted print by its journal and its program. line: the first one not surely executed; modal: the state before it;
+    ahead: line -> the state after its command, which may have been done since; stroked: whether anything was printed before.
+    stood_mm: the height of the tip that a person has read off.
     """
 
     line: int

@@ -90,7 +90,7 @@ def as_lines(commands: Sequence[str]) -> bytes:
 
 
 class Heaters(Enum):
-    """What is known of the heaters at an end."""
+    """State of the heaters at the end of a print."""
 
     OFF = "the printer reports its heaters off"
     HALTED = "the printer has halted and switched its heaters off by itself"
@@ -100,7 +100,7 @@ class Heaters(Enum):
 def heaters_off(
     wire: Wire, medium: Medium, timeout_s: float = SETTLE_S, homing: bool = False, on_turn: Callable[[], None] = lambda: None
 ) -> Heaters:
-    """Stop the printer and switch the heaters off; what its own words prove.
+    """Stop the printer and switch the heaters off; returns what its own answers prove.
 
     homing: it is at a command that must not or cannot be stopped and is waited for, HOMING_S at most. on_turn: called meanwhile,
     may raise. Raises PortError when the port is gone.
@@ -201,7 +201,7 @@ class HeaterGuard:
 
 
 def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn: Callable[[], None]) -> dict[str, float] | None:
-    """A step away from the print; words: of G1, relative. Where the printer says it stands then.
+    """Move a step away from the print; words: of G1, relative. Returns the position that the printer reports then.
 
     on_turn: called meanwhile, may raise. Raises PortError.
     """

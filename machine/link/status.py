@@ -66,7 +66,7 @@ class PrinterStatus:
 
 
 def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> PrinterStatus:
-    """Ask; a printer that answers nothing gives a status without anything known.
+    """Ask a printer for its status; all of it is unknown where no answer comes.
 
     Raises PortError, and what on_turn(), called meanwhile, raises to end the asking.
     """

@@ -99,7 +99,7 @@ class _Print:
         )
         feed.exchange = self.exchange
         self.feed, self.medium, self.journal = feed, medium, journal
-        self._guard = HeaterGuard(self.exchange, lambda: feed.started, feed.heed_emergency)
+        self._guard = HeaterGuard(self.exchange, lambda: feed.started, feed.pending.heed_emergency)
 
     def _find(self) -> str | None:
         """The name of the printer's port now. A device that USB tells nothing of is looked for under its own name only."""
@@ -153,10 +153,11 @@ class _Print:
     def _run(self, lines: Iterable[str], begin: Callable[[PrinterStatus], ResumePoint] | None) -> Heaters | None:
         """The print, and what its end has left of the heaters; None when the program has run to its own end, or not begun."""
         try:
+            resume_point = None
             if begin is not None:
-                self.feed.resume_point = begin(query_status(self.exchange.wire, self.medium, self.feed.poll))
+                resume_point = begin(query_status(self.exchange.wire, self.medium, self.feed.poll))
             self.exchange.greet()
-            self.feed.run(lines)
+            self.feed.run(lines, resume_point)
         except CancelledError:
             return self._cancel()
         except EmergencyError:
@@ -208,7 +209,7 @@ class _Print:
             move = feed.lift_move() if heaters is Heaters.OFF and alive else None
             if move is not None:
                 with suppress(PortError):
-                    feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.heed_emergency))
+                    feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.pending.heed_emergency))
         except EmergencyError:
             raise FirmwareError(self._stop()) from None
         return heaters
@@ -229,7 +230,7 @@ class _Print:
         return Outcome(
             cancelled=not feed.finished,
             sent=feed.sent,
-            acknowledged=feed.acknowledged,
+            acknowledged=feed.history.commands,
             repeated=self.exchange.connection.resends.repeated,
             elapsed_s=self.medium.now_s() - start_s,
             firmware=feed.reports.firmware,

@@ -1,5 +1,5 @@
 """Watchdog: what a printer reports while it prints, and what of it ends the print: temperatures that stay away from their target
-or are reported no more, cold extrusion, a wish to be disconnected.
+or are no longer reported, cold extrusion, a request to be disconnected.
 
 A firmware guards its heaters itself (Marlin: 40 s beyond 4 K, 20 s without a rise of 2 K); the bounds here are wider, so that
 this one speaks only where the firmware's is missing or does not see the fault.
@@ -55,7 +55,7 @@ class HeaterWatch:
 
 
 class PrinterReports:
-    """read() every event, check_silence() now and then.
+    """The printer's own reports, judged as they come: read() every event, check_silence() now and then.
 
     most_c: what nozzle and bed must never exceed by far, deg C. temperature_s: when the newest temperature came; unknown:
     commands that the firmware does not know; waiting: what a person at the printer is waited for, "" when for nothing.

@@ -134,7 +134,8 @@ class Heater:
 
 
 class Board:
-    """now_s is virtual; say() adds a line to what the host will read. kept_moves: kept on record, None: all.
+    """Motion, heaters and fan of the printer. now_s is virtual; say() adds a line to the answers. kept_moves: kept on record,
+    None: all.
 
     table: what a probe meets; None: the machine has no probe.
     """
@@ -211,7 +212,7 @@ class Board:
         return since_s + self.idle_after_s
 
     def idle(self) -> None:
-        """Nothing has moved for so long."""
+        """The idle time is over: motors off, and heaters where the firmware shuts down."""
         self.motion.planner.run(self.now_s)
         if self.idle_s > self.now_s:  # a move that was planned has begun meanwhile
             return

@@ -230,7 +230,7 @@ def _leads_to_a_terminal(link: Path) -> bool:
 
 
 class Server:
-    """A TCP port of this computer for one host at a time, others are told so; number 0 takes a free one."""
+    """A TCP port of this computer for one host at a time, others are refused; number 0 takes a free one."""
 
     def __init__(self, number: int) -> None:
         try:

@@ -1,4 +1,4 @@
-"""What the printer's answers tell: which line an `ok` acknowledges, which lines are asked for again, how many questions stay
+"""The meaning of a printer's answers: which line an `ok` acknowledges, which lines are asked for again, how many questions stay
 unanswered.
 
 Most firmwares do not name the line of an `ok`, and some of their oks belong to no line. A question is a numbered M105 that shows
@@ -23,7 +23,7 @@ IDLE_REPORTS = 2  # a printer that says twice in a row that it has nothing to do
 
 
 class Acknowledgement:
-    """What has come so far that makes one `ok` differ from another."""
+    """The line that an `ok` acknowledges, by what came before it."""
 
     def __init__(self) -> None:
         self._reports_temperature = False  # the answer to M105 begins with `ok T:`
@@ -69,8 +69,9 @@ class Acknowledgement:
 
 
 class Resends:
-    """next_line: the first one still to be repeated; repeated: how many were, in all; alone: nothing but the `ok` that belongs to
-    the Resend is on its way; words: what the printer has said of the line that it refused last.
+    """Lines that the printer asks for again. next_line: the first one still to be repeated; repeated: how many were, in all;
+    alone: nothing but the `ok` that belongs to the Resend is on its way; words: what the printer has said of the line that it
+    refused last.
     """
 
     def __init__(self) -> None:
@@ -115,8 +116,8 @@ class Resends:
 
 @dataclass
 class Questions:
-    """unanswered: in a row; first: line number of the first one; implausible: the line that was asked for although it cannot
-    be meant, 0: none.
+    """Questions without an answer. unanswered: in a row; first: line number of the first one; implausible: the line that was
+    asked for although it cannot be meant, 0: none.
     """
 
     unanswered: int = 0

@@ -16,9 +16,9 @@ UNANSWERED_MOST = 3  # M110 in vain; then numbered lines are sent all the same, 
 
 
 class Greeting:
-    """identity: the FIRMWARE_NAME line; firmware: the one it names. heard: the last words of a printer that were no answer to a
-    greeting. wanted: the line number that the printer has asked for since the last attempt, 0: none. keeps_numbers: it ignores
-    M110. asked_plainly: PLAIN_QUESTION is under way.
+    """The attempts to greet a printer, and its answers. identity: the FIRMWARE_NAME line; firmware: the one it names. heard: the
+    last words of a printer that were no answer to a greeting. wanted: the line number that the printer has asked for since the
+    last attempt, 0: none. keeps_numbers: it ignores M110. asked_plainly: PLAIN_QUESTION is under way.
     """
 
     def __init__(self, firmware: Firmware = MARLIN, rx_bytes: int | None = None, baud: int | None = None) -> None:
