@@ -48,8 +48,8 @@ class Exchange:
 
     def send(self, command: str) -> int:
         """Wait for room and send; returns the line's number, counted from the greeting on."""
-        offer, now_s = self.connection.offer, self.medium.now_s
-        while not (number := offer(command, now_s())):
+        send, now_s = self.connection.send, self.medium.now_s
+        while not (number := send(command, now_s())):
             self.pump()
         return number
 

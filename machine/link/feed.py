@@ -257,9 +257,9 @@ class Feed:
         self.reports.check_silence(now_s, self._cannot_report())
         if self._journal is not None:
             self._journal.update(self._checkpoint(), now_s)
-        if now_s - max(self.reports.temperature_s, self._asked_s) >= ASK_S and self.exchange.connection.can_send("M105"):
+        asked_s = max(self.reports.temperature_s, self._asked_s)
+        if now_s - asked_s >= ASK_S and self.exchange.connection.send("M105", now_s):
             self._asked_s = now_s
-            self.exchange.connection.send("M105", now_s)
 
     def _cannot_report(self) -> bool:
         """Whether the printer cannot report temperatures now: it is at a slow command, or waits for a person, and does not report

@@ -34,7 +34,7 @@ from machine.link.protocol.greeting import GREETING, PLAIN_QUESTION, Greeting
 from machine.link.protocol.states import TABLE, Signal, State
 from machine.link.protocol.timeout import Timeouts, Timing
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, GREETING_LINES, Window
-from profiles.errors import LocalProtocolError, PrinterError, SilenceError
+from profiles.errors import PrinterError, SilenceError
 
 BEFORE_NUMBERS = (State.DRAIN, State.SYNC)  # an error is of what came before: no line of ours has a number yet
 GREETING_STATES = (*BEFORE_NUMBERS, State.HELLO)
@@ -78,14 +78,9 @@ class Connection:
         return self.window.has_space(command, greeting.firmware.line, greeting.emergency_parser)
 
     def send(self, command: str, now_s: float) -> int:
-        """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on."""
-        number = self.offer(command, now_s)
-        if not number:
-            raise LocalProtocolError(f"{command!r} was to be sent while the printer has no room for it")
-        return number
-
-    def offer(self, command: str, now_s: float) -> int:
-        """The same where there is room for it; else 0, and nothing is sent."""
+        """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on; 0:
+        the printer has no room for it, nothing is sent.
+        """
         if not self.can_send(command):
             return 0
         self._send(command, now_s)
