@@ -2,10 +2,11 @@
 
 import pytest
 
+from machine.firmware.marlin import MARLIN
 from machine.link.protocol.answers import ASKED_LIMIT, NOISE_LIMIT, Acknowledgement, Resends
 from machine.link.protocol.events import Event, Kind, Temperature
 from machine.link.protocol.framing import frame
-from machine.link.protocol.window import Window
+from machine.link.protocol.window import CLEAN_LINES, Window
 
 OK, WARM = Event(Kind.OK), Event(Kind.OK, temperature=Temperature(20.0, 0.0))
 
@@ -72,3 +73,21 @@ def test_too_many_of_the_last_lines_are_too_much_noise() -> None:
     assert [resends.request(5 * k) for k in range(1, NOISE_LIMIT + 1)] == [""] * NOISE_LIMIT
     assert resends.request(5 * (NOISE_LIMIT + 1)) == "20 of the last 200 lines"
     assert resends.request(10_000) == ""
+
+
+def test_after_a_refused_line_the_next_go_one_by_one_and_after_another_for_longer() -> None:
+    lines = Window()
+
+    def take(count: int) -> int:
+        for _ in range(count):
+            lines.acknowledge(lines.sent if lines.send("G1 X1") else 0)
+        return lines.places(MARLIN.line, emergency_parser=True)
+
+    lines.learn(3)
+    assert [take(CLEAN_LINES - 1), take(1), take(100)] == [1, 4, 4]
+    lines.back_off()
+    assert [take(0), take(4 * CLEAN_LINES - 1), take(1)] == [1, 1, 4]
+    lines.slow_down()
+    assert [take(0), take(4 * CLEAN_LINES)] == [1, 4]
+    lines.back_off()
+    assert [take(16 * CLEAN_LINES - 1), take(1)] == [1, 4]
