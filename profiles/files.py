@@ -13,8 +13,9 @@ import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 from zipfile import BadZipFile, is_zipfile
 
 try:
@@ -77,18 +78,32 @@ def modified_s(path: Path) -> float:
     return path.stat().st_mtime
 
 
-def keep_newest(paths: Iterable[Path], count: int, when: Callable[[Path], float] = modified_s) -> list[Path]:
-    """Delete all but the newest `count` files or folders; those that stay, the newest first. when: their date.
+def dated_name() -> str:
+    """Begin of a file's name that no other has, and by which names are sorted as their files were begun."""
+    return f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
+
+
+def keep_newest(
+    paths: Iterable[Path],
+    count: int,
+    when: Callable[[Path], Any] = modified_s,
+    in_use: Callable[[Path], bool] = lambda path: False,
+) -> list[Path]:
+    """Delete all but the newest `count` files or folders; those that stay, the newest first. when: what they are sorted by: their
+    date, or a name that begins with it. in_use: which older ones stay, too.
 
     Raises OSError.
     """
     newest = sorted(paths, key=when, reverse=True)
+    kept = [*newest[:count], *(path for path in newest[count:] if in_use(path))]
     for path in newest[count:]:
+        if path in kept:
+            continue
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
         else:
             path.unlink(missing_ok=True)
-    return newest[:count]
+    return kept
 
 
 def remove_older(paths: Iterable[Path], seconds: float) -> None:

@@ -33,7 +33,7 @@ import numpy as np
 
 from machine.gcode.lines import GcodeFile
 from machine.link.journal import SYNC_S, Checkpoint, Journal, JournalHeading, read_journal
-from machine.link.medium import Medium, Wire
+from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint, heights_mm, is_in_doubt, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
@@ -47,7 +47,7 @@ from tests.machine.virtual_printer import PATH, VirtualPrinter
 PROFILE = load()
 LIMIT = 95
 GREETING_S = 0.15  # before that nothing has been sent
-QUICK = Timing(drain_s=0.05, quiet_s=0.03)
+QUICK = replace(SERIAL, timing=Timing(drain_s=0.05, quiet_s=0.03))
 START = [
     "G21", "M84 S0", "G90", "M83", "M140 S25", "M104 S175", "G28 X Y Z", "G92 A0 C0", "M190 S25",
     "M109 S175", "G92 E0", "M106 S128",
@@ -104,7 +104,7 @@ def program() -> list[str]:
 
 def serve(link: str, record: str, speed: float) -> None:
     """The printer's process: lives until its standard input ends, then writes down what it has executed."""
-    with SimulatedPrinter(PROFILE.machine, speed, link=Path(link)) as printer:
+    with SimulatedPrinter(PROFILE.machine, speed, at=Path(link)) as printer:
         print("ready", flush=True)
         sys.stdin.read()
         done = printer.record
@@ -141,7 +141,7 @@ def apart(work: Callable[[], object]) -> int:
 def begin_print(text: GcodeFile, port: Path, journal: Path) -> None:
     """A print with a journal."""
     with Journal(journal, JournalHeading(str(text.path), text.sha256(), "campaign", {})) as record:
-        print_lines(text, str(port), 250000, timing=QUICK, journal=record, profile=PROFILE)
+        print_lines(text, str(port), 250000, medium=QUICK, journal=record, profile=PROFILE)
 
 
 def go_on(text: GcodeFile, port: Path, journal: Path, plan_file: Path) -> None:
@@ -151,11 +151,11 @@ def go_on(text: GcodeFile, port: Path, journal: Path, plan_file: Path) -> None:
 
     def begin(status: PrinterStatus) -> ResumePoint:
         way = plan_resume(point, status, PROFILE)
-        plan_file.write_text(json.dumps([way.start.line, way.reason.partition(":")[0].partition(";")[0]]), encoding="utf-8")
-        return way.start
+        plan_file.write_text(json.dumps([way.line, way.reason.partition(":")[0].partition(";")[0]]), encoding="utf-8")
+        return way
 
     with Journal(journal.with_suffix(".rest"), story.heading) as record:
-        print_lines(text, str(port), 250000, timing=QUICK, journal=record, profile=PROFILE, begin=begin)
+        print_lines(text, str(port), 250000, medium=QUICK, journal=record, profile=PROFILE, begin=begin)
 
 
 def moment(delay_s: float, speed: float, folder: Path, whole: list[list[float]]) -> Result:
@@ -285,7 +285,7 @@ def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float,
         if is_in_doubt(way, point, PROFILE):
             doubts.append(len(heights_mm(point)))
             seen_point = replace(point, stood_mm=min(heights_mm(point), key=lambda z: abs(z - stood_mm)))
-        return plan_resume(seen_point, status, PROFILE).start
+        return plan_resume(seen_point, status, PROFILE)
 
     done = len(moves_of(printer))
     try:

@@ -51,7 +51,7 @@ HALTED = "emergency stop: the printer has halted"
 
 def serve() -> None:
     """A printer's process: tells the port of its relay, then the time at which each M112 passes."""
-    with SimulatedPrinter(load().machine, SPEED, tcp=0) as printer, socket.create_server(("127.0.0.1", 0)) as relay:
+    with SimulatedPrinter(load().machine, SPEED, at=0) as printer, socket.create_server(("127.0.0.1", 0)) as relay:
         print(relay.getsockname()[1], flush=True)
         inner = ("127.0.0.1", int(printer.path.rpartition(":")[2]))
         while True:

@@ -6,9 +6,8 @@ the firmware of an answer to M115. `firmware` has what a byte and a numbered lin
 
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware, SimulationRules
-from machine.firmware.grblhal import GRBLHAL
 from machine.firmware.klipper import KLIPPER
-from machine.firmware.linuxcnc import LINUXCNC
+from machine.firmware.linuxcnc import GRBLHAL, LINUXCNC
 from machine.firmware.marlin import MARLIN, REPETIER, SIMULATED, SMOOTHIEWARE
 from machine.firmware.reprapfirmware import REPRAPFIRMWARE
 from profiles.machine import Machine

@@ -34,7 +34,7 @@ class Command:
     motors: it switches motors on or off. changes: it makes the rest of a program mean something else.
     modal: the firmware remembers it, so a pause and a resume say it again. repeatable: done twice in a row it leaves what it
     leaves when done once. shows: it displays or names something, and a print is none the worse without it. tunes: a print goes
-    on without it, too, but the person is told.
+    on without it, too, but with a warning.
     refused: why no program may hold it: the sender alone may give it, or nobody.
     """
 

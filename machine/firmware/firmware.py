@@ -1,11 +1,12 @@
 """Firmware: everything the program knows about one, so that a new one is a new file.
 
-Beside its dialects: the serial line, what a byte and a numbered line cost on it, its rates, how the firmware behaves at its other
-end; how it is told to seek contact along Z; and how the simulated printer takes lines and words its answers in its name.
+Besides its dialects: its baud rates, the overhead of a byte and of a numbered line, the rules of its end of the serial line, its
+command that probes along Z, and the rules by which the simulated printer takes lines and answers them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Literal
 
 from machine.firmware.dialect import Dialect
@@ -28,9 +29,9 @@ FRAME_CHARACTERS = FRAME_BYTES - len("\n") + NUMBER_DIGITS  # of those that a fi
 
 @dataclass(frozen=True)
 class SimulatedSettings:
-    """What a printer stands at. letters: of X Y Z and what turns the table, the filament last; limits: mm or deg, and steps a mm
-    or degree: of all but the filament; speeds, accelerations: of all, per s and s2; printing, travelling: of M204, mm/s2; jerk:
-    mm/s."""
+    """Settings of a simulated printer. letters: of X Y Z and what turns the table, the filament last; limits: mm or deg, and
+    steps a mm or degree: of all but the filament; speeds, accelerations: of all, per s and s2; printing, travelling: of M204,
+    mm/s2; jerk: mm/s."""
 
     letters: str
     limits: Sequence[tuple[float, float]]
@@ -69,19 +70,8 @@ def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, be
 
 
 @dataclass(frozen=True)
-class Idle:
-    """What a firmware does by itself when nothing has moved for after_s: the motors of its first `axes` go off, which M84 S may
-    forbid. shuts_down: heaters, too, and nothing moves any more before it is homed; a dwell is a move, and M84 knows no S.
-    """
-
-    after_s: float
-    axes: int
-    shuts_down: bool = False
-
-
-@dataclass(frozen=True)
 class SimulationRules:
-    """What a host sees of the firmware; {} is the command or the coordinates.
+    """Behaviour of the firmware as a host sees it; {} is the command or the coordinates.
 
     identity: the FIRMWARE_NAME line of M115, {axes}: how many; identity_in_ok: it stands behind the ok. banner: said after a
     restart. numbers: "resend": lines are checked and asked for again; "drop": a bad checksum is dropped in silence, any number
@@ -94,7 +84,10 @@ class SimulationRules:
     with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
     behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
     it believes itself at its home positions, and keeps only axes that were homed inside the limits.
-    settings: what it tells of its settings. answers_blank: an empty line is answered with ok. idle: None: its motors stay on.
+    settings: its answers to commands that ask for its settings. answers_blank: an empty line is answered with ok.
+    idle_after_s: when nothing has moved for that long the motors of its first idle_axes go off, which M84 S may forbid; inf: they
+    stay on. idle_shuts_down: heaters go off, too, and nothing moves any more before it is homed; a dwell is a move, and M84 knows
+    no S.
     """
 
     identity: str
@@ -123,7 +116,9 @@ class SimulationRules:
     lacks: frozenset[str] = frozenset()
     starts_at_home: bool = False
     answers_blank: bool = False
-    idle: Idle | None = None
+    idle_after_s: float = inf
+    idle_axes: int = 0
+    idle_shuts_down: bool = False
 
 
 def check_baud(baud: int) -> None:
@@ -135,7 +130,7 @@ def check_baud(baud: int) -> None:
 
 @dataclass(frozen=True)
 class LineRules:
-    """What the sender may rely on.
+    """Rules of the firmware's end of the serial line, on which the sender relies.
 
     resends: it asks again for a damaged line; one that does not drops the line without a word, and a repeat could be done
     twice, so an unanswered line ends the print. resend_ok: an `ok` that acknowledges nothing follows Resend. places: lines in
@@ -181,7 +176,7 @@ class ProbingRules:
 
 @dataclass(frozen=True)
 class Firmware:
-    """name: what people call it. signs: words of its FIRMWARE_NAME line in M115, lower case; (): it is not recognised.
+    """A firmware. name: as people call it. signs: words of its FIRMWARE_NAME line in M115, lower case; (): it is not recognised.
 
     dialects: name in machine.dialect -> what is written for it; none of a firmware that prints what is written for another.
     line: its end of the serial line. simulated: None: the simulated printer behaves as Marlin. probing: None: it is not asked to.

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from machine.firmware.dialect import HEATING_S, HOMING_S, PERSON_S, PROBING_S, Command, Dialect
-from machine.firmware.firmware import Firmware, Idle, LineRules, ProbingRules, SimulationRules
+from machine.firmware.firmware import Firmware, LineRules, ProbingRules, SimulationRules
 from profiles.axes import RotaryAxis
 
 _STANDS = (
@@ -145,7 +145,7 @@ SIMULATED = SimulationRules(
     out_of_range="!! Move out of range: {}",
     heater_fault="Heater extruder not heating at expected rate",
     kill=("// Klipper state: Shutdown",),
-    # klippy/gcode.py, _respond_error and cmd_default: the reason is told to the next command, not to M105 and what is known
+    # klippy/gcode.py, _respond_error and cmd_default: the next command is answered with the reason, not M105 and what is known
     # without a printer; klippy/klippy.py, message_shutdown.
     after_kill=(
         "// {}",
@@ -162,7 +162,9 @@ SIMULATED = SimulationRules(
     while_heating="",
     lacks=UNKNOWN,
     # klippy/extras/idle_timeout.py: timeout 600, TURN_OFF_HEATERS and M84; stepper_enable.py, motor_off: homing is forgotten.
-    idle=Idle(after_s=600.0, axes=5, shuts_down=True),
+    idle_after_s=600.0,
+    idle_axes=5,
+    idle_shuts_down=True,
 )
 
 # klippy/extras/probe.py, cmd_PROBE: down to position_min of stepper_z, there is no other limit. Since 2026 it answers where

@@ -1,10 +1,16 @@
-"""LinuxCNC: filament is a plain axis in absolute millimetres, heaters and fan are user M-codes whose value is the P word.
+"""LinuxCNC and grblHAL, controllers of milling machines: filament is a plain axis in absolute millimetres, and G0 ignores F, so
+travels are G1.
 
-M104, M106, M107, M109, M140 and M190 are scripts of the machine (its own codes are M100 to M199). G0 ignores F, so travels are
-G1. M428 and M429 switch xyzac-trt-kins as the sample configuration does; a file ends with M2. The interpreter ends a program at a
-code that it does not know and that the machine has not remapped, at a word without a number, and at an E that no command uses
-(rs274ngc/interp_array.cc, interp_check.cc).
+LinuxCNC: heaters and fan are user M-codes whose value is the P word. M104, M106, M107, M109, M140 and M190 are scripts of the
+machine (its own codes are M100 to M199). M428 and M429 switch xyzac-trt-kins as the sample configuration does; a file ends with
+M2. The interpreter ends a program at a code that it does not know and that the machine has not remapped, at a word without a
+number, and at an E that no command uses (rs274ngc/interp_array.cc, interp_check.cc).
+
+grblHAL has no E word. M851 and M850 switch its A/C kinematics, whose places count from the turn axis. Fans come with a plug-in
+that knows on and off; M104, M109, M140 and M190 need a plug-in of the machine's own.
 """
+
+from dataclasses import replace
 
 from machine.firmware.dialect import Command, Dialect
 from machine.firmware.firmware import Firmware
@@ -53,3 +59,28 @@ DIALECT = Dialect(
 )
 
 LINUXCNC = Firmware(name="LinuxCNC", dialects={"linuxcnc": DIALECT})
+
+GRBLHAL_COMMANDS = {
+    "G61": Command("exact path", changes=True),
+    "M850": Command("do not follow the table", changes=True),
+    "M851": Command("follow the table", changes=True),
+}
+
+GRBLHAL_DIALECT = replace(
+    DIALECT,
+    firmware="grblHAL",
+    nozzle="M104 S{}",
+    nozzle_wait="M109 S{}",
+    fan_on="M106 P0",
+    fan_off="M107 P0",
+    modes=("G17 G21 G90 G94",),
+    follow_on="M851",
+    follow_off="M850",
+    follow_from_turn_axis=True,
+    value_word="S",
+    lacks=frozenset({"M82", "M83"}),
+    homed_before=False,
+    commands=GRBLHAL_COMMANDS,
+)
+
+GRBLHAL = Firmware(name="grblHAL", dialects={"grblhal": GRBLHAL_DIALECT})

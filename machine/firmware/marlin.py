@@ -8,7 +8,7 @@ Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
 from collections.abc import Iterable, Mapping
 
 from machine.firmware.dialect import HEATING_S, PROBING_S, Command, Dialect
-from machine.firmware.firmware import Firmware, Idle, LineRules, ProbingRules, SimulatedSettings, SimulationRules
+from machine.firmware.firmware import Firmware, LineRules, ProbingRules, SimulatedSettings, SimulationRules
 
 # Meanings from gcode/gcode.h; what heats: gcode/bedlevel/G26.cpp, gcode/probe/G76_M871.cpp, gcode/temp/M306.cpp.
 # fmt: off
@@ -138,7 +138,8 @@ SIMULATED = SimulationRules(
     # module/motion.cpp, bugfix-2.1.x: current_position begins with the home positions; apply_motion_limits asks axis_was_homed.
     starts_at_home=True,
     # Configuration_adv.h: DEFAULT_STEPPER_TIMEOUT_SEC 120, DISABLE_IDLE_X, _Y, _Z and _E; _I and _J are commented out.
-    idle=Idle(after_s=120.0, axes=3),
+    idle_after_s=120.0,
+    idle_axes=3,
 )
 
 # gcode/probe/G38.cpp, bugfix-2.1.x: G38.3 stops on contact or at its target and says nothing; G38.2 would report an error.

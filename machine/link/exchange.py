@@ -2,50 +2,37 @@
 
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
 
 from machine.gcode.commands import command_in
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.connection import GREETING_STATES, Connection
-from machine.link.protocol.events import Event, Position, position_in
-from machine.link.protocol.framing import LINE_LIMIT
+from machine.link.protocol.events import Event
 from machine.link.protocol.states import State
-from machine.link.protocol.timeout import Timing
 from profiles.errors import PortError
-
-
-class Reconnection(NamedTuple):
-    """A new wire to a printer whose port was lost, and whether what was on its way has been done; None: it is to be asked."""
-
-    wire: Wire
-    done: bool | None
 
 
 class Exchange:
     """`on_event` gets every event after the connection has seen it, `on_turn` is called once a turn with the time, s.
 
-    `on_lost` is called when the port is gone after the greeting: it finds the same printer again or raises. The
-    printer's own faults are raised as the connection reports them.
+    `on_lost` is called when the port is gone after the greeting: it finds the same printer again or raises. It returns the new
+    wire, and whether what was on its way has been done; None: the printer is to be asked. The printer's own faults are raised as
+    the connection reports them.
     """
 
     def __init__(
         self,
         wire: Wire,
         medium: Medium,
+        connection: Connection,
         *,
-        timing: Timing,
         on_event: Callable[[Event], None],
         on_turn: Callable[[float], None],
-        on_lost: Callable[[PortError], Reconnection],
-        limit: int = LINE_LIMIT,
-        rx_bytes: int | None = None,
-        baud: int | None = None,
+        on_lost: Callable[[PortError], tuple[Wire, bool | None]],
     ) -> None:
-        self.wire, self.medium = wire, medium
-        self.connection = Connection(timing, medium.now_s(), limit=limit, rx_bytes=rx_bytes, baud=baud)
+        self.wire, self.medium, self.connection = wire, medium, connection
         self.greeted = False
         self._on_event, self._on_turn, self._on_lost = on_event, on_turn, on_lost
-        self._position: Position | None = None
+        self._position: dict[str, float] | None = None
 
     @property
     def waits(self) -> bool:
@@ -61,8 +48,8 @@ class Exchange:
 
     def send(self, command: str) -> int:
         """Wait for room and send; returns the line's number, counted from the greeting on."""
-        offer, now_s = self.connection.offer, self.medium.now_s
-        while not (number := offer(command, now_s())):
+        send, now_s = self.connection.send, self.medium.now_s
+        while not (number := send(command, now_s())):
             self.pump()
         return number
 
@@ -78,8 +65,8 @@ class Exchange:
         self.send("M105")
         self.settle()
 
-    def ask_position(self) -> Position | None:
-        """Where the printer says it stands, all moves over; None when it does not report it."""
+    def ask_position(self) -> dict[str, float] | None:
+        """Where the printer says it stands, letter -> mm or deg, all moves over; None when it does not report it."""
         self.send("M400")
         self.settle()
         self._position = None
@@ -107,8 +94,8 @@ class Exchange:
         now_s = self.medium.now_s()
         if data:
             for event in connection.receive(data, now_s):
-                if position := position_in(event):
-                    self._position = position
+                if event.position is not None:
+                    self._position = event.position
                 self._on_event(event)
         connection.tick(now_s)
         if connection.fault is not None:

@@ -1,10 +1,9 @@
 """Feed: one print under way; the program's commands in order, and between them what person, printer and journal want."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from math import inf
-from threading import Event as Flag
 
 from machine.gcode.modes import ModalState, axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
@@ -15,50 +14,54 @@ from machine.link.pause.park_moves import lift_move
 from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
-from machine.link.print_state import PrintState, PrintStatus
-from machine.link.progress import ProgramPosition, StreamPlan
-from machine.link.protocol.events import Event, Ok, Position
+from machine.link.print_state import PrintState, PrintStatus, ProgramPosition
+from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.framing import command_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
 from machine.link.status import position_differences
-from machine.link.watchdog import PrinterReports, Watchdog
+from machine.link.watchdog import PrinterReports
 from profiles.errors import PrinterError
+from profiles.profile import Profile
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
-BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
+BOUNDARY_S = 15.0  # the longest that a pause waits for the end of a stroke
 WORTH_S = 0.3  # a planner that takes less to run empty is not asked the next time; a simulated one as fast as it goes takes none
 WATCH_S, WATCH_MOST_S = 0.02, 5.0  # the least time between questions how many moves wait, and how long they may bring no news
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
 
 class Feed:
-    """run() a program over a greeted exchange; handle_event() and handle_turn() are the exchange's callbacks."""
+    """run() a program over a greeted exchange; handle_event() and handle_turn() are the exchange's callbacks.
+
+    limit: characters of a line that the firmware keeps; total: commands of the program, None: not known.
+    """
 
     def __init__(
         self,
-        job: StreamPlan,
+        profile: Profile | None,
+        limit: int,
+        total: int | None,
         *,
-        control: Control | None,
+        control: Control,
         journal: Journal | None,
         on_progress: Callable[[PrintStatus], None] | None,
-        stop: Flag | None,
         start_s: float,
     ) -> None:
-        self._job, self._journal, self._on_progress = job, journal, on_progress
-        machine = job.profile.machine if job.profile is not None else None
+        self.profile, self.limit, self._total = profile, limit, total
+        self._journal, self._on_progress = journal, on_progress
+        machine = profile.machine if profile is not None else None
         self.modal, self._position = ModalState(axes_of(machine)), ProgramPosition()
         self._planner, self._worth_following, self._reports_stand_still = PlannerReports(), False, False
         self.history = LineHistory(planner=self._planner)
         self._bounds = PrintedBounds(machine) if machine is not None else None
-        self._pending = PendingCommands(self.modal.axes, job.limit, control, stop)
+        self.pending = PendingCommands(self.modal.axes, limit, control)
         # A bed that cannot be heated is as warm as its room.
-        watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c or inf)) if machine is not None else Watchdog()
-        self.reports = PrinterReports(watchdog, start_s)
+        most_c = (inf, inf) if machine is None else (machine.nozzle_limit_c, machine.bed_limit_c or inf)
+        self.reports = PrinterReports(start_s, most_c)
         self.exchange: Exchange
-        self.resume_point: ResumePoint | None = None
         self.state, self._trouble, self.started, self.finished = PrintState.PRINTING, "", False, False
         self.sent = self._skipped = 0
         self._program_pause = ""  # what the program says of the pause before its next command
@@ -67,15 +70,10 @@ class Feed:
         self._start_s = self._shown_s = self._asked_s = start_s
         self._warned = ""  # the warning that was shown last
 
-    @property
-    def acknowledged(self) -> int:
-        """Commands of the program that the printer has taken."""
-        return self.history.commands
-
-    def run(self, lines: Iterable[str]) -> None:
-        """Feed the program from its beginning, or where the job says, to the barrier at its end."""
+    def run(self, lines: Iterable[str], resume_point: ResumePoint | None = None) -> None:
+        """Feed the program from its beginning, or where an interrupted print goes on, to the barrier at its end."""
         exchange = self.exchange
-        resume_point, self.started, self.history = self.resume_point, True, self._new_history()
+        self.started, self.history = True, self._new_history()
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send(f"M155 S{REPORT_S}")
         for line, command in self._commands(lines):
@@ -126,21 +124,21 @@ class Feed:
 
     def _commands(self, lines: Iterable[str]) -> Iterator[tuple[int, str]]:
         for line, text in enumerate(lines, 1):
-            command = command_of(text, line, self._job.limit)
+            command = command_of(text, line, self.limit)
             if ";" in text:
                 self._barriers.layer_ended |= self._position.read_comment(text)
             if command:
                 if command[0] in "Mm":
                     self._position.read_m73(command, self.exchange.medium.now_s() - self._start_s)
-                    self._pending.note_override(command)
+                    self.pending.note_override(command)
                 yield line, command
             elif PAUSE_REMARK in text:
                 self._program_pause = text.partition(PAUSE_REMARK)[2].strip()
 
     def _before(self, command: str) -> None:
         """What is due before the next command of the program."""
-        if self._pending.lines:
-            for own in self._pending.next_lines(self.modal):
+        if self.pending.lines:
+            for own in self.pending.next_lines(self.modal):
                 self.exchange.send(own)
         if self._reconnected:
             self._reconnected = False
@@ -155,7 +153,7 @@ class Feed:
         if self._program_pause:
             why, self._program_pause = self._program_pause, ""
             self._rest(f"the program pauses: {why}")
-        since_s = self._pending.pause_s
+        since_s = self.pending.pause_s
         if since_s is not None and (not self._prints(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
             self._rest()
 
@@ -165,7 +163,7 @@ class Feed:
 
     def _new_history(self, before: int = 0) -> LineHistory:
         connection = self.exchange.connection
-        waiting = None if connection.advanced else connection.greeting.waiting_moves
+        waiting = None if connection.window.numbered else connection.greeting.waiting_moves
         return LineHistory(before, waiting, self._planner)
 
     def _end_moves(self) -> None:
@@ -201,7 +199,7 @@ class Feed:
         self._follow_moves()
         position = self.exchange.ask_position()
         self._note_end()
-        return position_differences(self.modal, position.axes, NEAR) if position is not None else []
+        return position_differences(self.modal, position, NEAR) if position is not None else []
 
     def _check_position(self) -> None:
         wrong = self._position_errors()
@@ -218,11 +216,11 @@ class Feed:
         self.set_state(PrintState.PAUSING, why)
         self._record()
         position_known = not self._position_errors()
-        self._pause = Pause(self.exchange, self._pending, self.reports, self.modal, self._job.profile)
+        self._pause = Pause(self.exchange, self.pending, self.reports, self.modal, self.profile)
         for state, words in self._pause.run(self._bounds, why):
             self.set_state(state, words)
             self._record()
-        self._pending.end_pause()
+        self.pending.end_pause()
         if position_known:
             self._verify_position("after the pause")
         self._pause = None
@@ -234,7 +232,7 @@ class Feed:
         self.set_state(PrintState.FINISHING)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send("M155 S0")
-        for command in self._pending.undo_overrides():
+        for command in self.pending.undo_overrides():
             exchange.send(command)
         self._end_moves()
         self.finished = True
@@ -244,24 +242,24 @@ class Feed:
     def handle_event(self, event: Event) -> None:
         """An event of the printer."""
         now_s = self.exchange.medium.now_s()
-        if isinstance(event, Ok) and event.line is not None:
+        if event.kind is Kind.OK and event.line is not None:
             window = self.exchange.connection.window
             if window.line_number(event.line) == window.acknowledged:
                 self.history.acknowledge(window.acknowledged, event.planner_free)
         command = self.reports.read(event, now_s)
         if command is not None:
-            self._pending.accept(command, self.state, now_s)
+            self.pending.accept(command, self.state, now_s)
 
     def handle_turn(self, now_s: float) -> None:
         """Once a turn of the exchange."""
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self.poll()
-        self.reports.watchdog.check_silence(now_s, self._cannot_report())
+        self.reports.check_silence(now_s, self._cannot_report())
         if self._journal is not None:
             self._journal.update(self._checkpoint(), now_s)
-        if now_s - max(self.reports.temperature_s, self._asked_s) >= ASK_S and self.exchange.connection.can_send("M105"):
+        asked_s = max(self.reports.temperature_s, self._asked_s)
+        if now_s - asked_s >= ASK_S and self.exchange.connection.send("M105", now_s):
             self._asked_s = now_s
-            self.exchange.connection.send("M105", now_s)
 
     def _cannot_report(self) -> bool:
         """Whether the printer cannot report temperatures now: it is at a slow command, or waits for a person, and does not report
@@ -273,26 +271,22 @@ class Feed:
 
     def poll(self) -> None:
         """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""
-        now_s, message = self.exchange.medium.now_s(), self._pending.message
-        wanted = self._pending.pause_s is not None
-        self._pending.poll(self.state, now_s)
-        changed = self._pending.message != message or (self._pending.pause_s is not None) != wanted
+        now_s, message = self.exchange.medium.now_s(), self.pending.message
+        wanted = self.pending.pause_s is not None
+        self.pending.poll(self.state, now_s)
+        changed = self.pending.message != message or (self.pending.pause_s is not None) != wanted
         if now_s - self._shown_s >= PROGRESS_S or changed or self._warning() != self._warned:
             self.show(now_s)
 
-    def heed_emergency(self) -> None:
-        """While the print is being ended: only the emergency stop still counts. Raises EmergencyError."""
-        self._pending.heed_emergency()
-
     def set_state(self, state: PrintState, message: str = "") -> None:
         """Show a new state at once."""
-        self.state, self._pending.message = state, message
+        self.state, self.pending.message = state, message
         self.show(self.exchange.medium.now_s())
 
     @contextmanager
     def in_state(self, state: PrintState, message: str) -> Iterator[None]:
         """Another state for as long as something takes; the position is proved before the print goes on."""
-        before, words = self.state, self._pending.message
+        before, words = self.state, self.pending.message
         self._reconnected, self._trouble = True, message
         self.set_state(state)
         try:
@@ -303,15 +297,14 @@ class Feed:
 
     def lift_move(self) -> tuple[str, float] | None:
         """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or it is away already."""
-        if self._job.profile is None or (self._pause is not None and self._pause.aside):
+        if self.profile is None or (self._pause is not None and self._pause.aside):
             return None
-        return lift_move(self.modal, self._job.profile.machine)
+        return lift_move(self.modal, self.profile.machine)
 
-    def record_lift(self, position: Position | None) -> None:
+    def record_lift(self, position: Mapping[str, float] | None) -> None:
         """The tip was lifted off the print for good; position: where the printer says it stands now."""
-        coordinates = dict(position.axes) if position is not None else {}
         if self._journal is not None:
-            pose = tuple(coordinates.get(letter) for letter in self.modal.axes.letters)
+            pose = tuple((position or {}).get(letter) for letter in self.modal.axes.letters)
             self._journal.write(replace(self._checkpoint(), state=LEFT, pose=pose))
 
     def _checkpoint(self) -> Checkpoint:
@@ -330,22 +323,22 @@ class Feed:
         self._shown_s, self._warned = now_s, self._warning()
         if self._on_progress is None:
             return
-        at, history, feed_percent = self._position, self.history, self._pending.feed_percent
+        at, history, feed_percent = self._position, self.history, self.pending.feed_percent
         elapsed_s, done = now_s - self._start_s, self._skipped + history.commands
         pausing = (
-            self.state is PrintState.PRINTING and self._pending.pause_s is not None
+            self.state is PrintState.PRINTING and self.pending.pause_s is not None
         )  # begins at the end of the stroke under way
         self._on_progress(
             PrintStatus(
-                sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
-                left_s=self._job.left_s(at, history.before, history.acknowledged, elapsed_s, feed_percent),
-                share=at.share(done, self._job.total),
+                sent=self.sent, acknowledged=done, total=self._total, elapsed_s=elapsed_s,
+                left_s=at.left_s(elapsed_s, feed_percent),
+                share=at.share(done, self._total),
                 temperature=self.reports.temperature, heat_age_s=now_s - self.reports.temperature_s,
                 part=at.part, parts=at.parts, layer=at.layer,
                 state=PrintState.PAUSING if pausing else self.state,
                 file_line=history.acknowledged,
-                feed_percent=feed_percent, flow_percent=self._pending.flow_percent,
-                message=self._pending.message or self._trouble or self.reports.waiting or self._silence(),
+                feed_percent=feed_percent, flow_percent=self.pending.flow_percent,
+                message=self.pending.message or self._trouble or self.reports.waiting or self._silence(),
                 warning=self._warned,
             )
         )  # fmt: skip

@@ -2,17 +2,19 @@
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from threading import Event as Flag
-from time import monotonic
 
 from machine.firmware import identify
 from machine.firmware.firmware import BAUDS, LineRules
+from machine.link.medium import SERIAL
+from machine.link.pending_commands import CancelledError
 from machine.link.port import Port
-from machine.link.protocol import events
-from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.framing import FAR_NUMBER, frame
+from machine.link.protocol.events import NAME, Event
+from machine.link.protocol.events import Kind as EventKind
+from machine.link.shutdown import Orders
 
 TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
 QUICK_S = 1.5  # at another rate: it has started by then
@@ -24,7 +26,7 @@ GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of pri
 
 
 class Kind(Enum):
-    """What answers."""
+    """Kinds of answer."""
 
     PRINTER = "printer"
     BUSY = "busy printer"
@@ -42,7 +44,8 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Answer:
-    """What answers. words: the firmware's own line, its error, what it is busy with, or the last words of a stranger.
+    """The answer of whatever stands at a port. words: the firmware's own line, its error, what it is busy with, or the last words
+    of a stranger.
 
     letters: axes that M114 reports, the filament's left out; "" when none. limits: letter -> least and greatest
     value, of a firmware that reports them. revival: what lets a printer that has halted print again.
@@ -57,7 +60,7 @@ class Answer:
     @property
     def firmware(self) -> str:
         """The firmware's name and version without the rest of its line."""
-        name = KEY.split(self.words.removeprefix(events.NAME).strip())[0]
+        name = KEY.split(self.words.removeprefix(NAME).strip())[0]
         version = VERSION.search(self.words)
         return f"{name} {version[1]}" if version else name
 
@@ -72,7 +75,7 @@ def ask(port: Port, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> A
 
 
 def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> tuple[Answer, int]:
-    """What answers and at which rate: the given one, and where nothing sensible comes the usual others.
+    """The answer, and its baud rate: the given one is tried, and where nothing sensible comes the usual others.
 
     Where none makes a printer answer, the answer is that at the given rate, at which the port is left.
     """
@@ -93,39 +96,29 @@ class _Inquiry:
     """What one asking has brought so far."""
 
     def __init__(self, port: Port, stop: Flag) -> None:
-        self._port, self._stop = port, stop
-        self._decoder = LineDecoder()
+        self._stop = stop
+        self._orders = Orders(port, SERIAL, self._check_stop)
         self._words = self._fault = self._letters = ""
-        self._area: events.Area | None = None
-        self._ok = self.named = self.placed = self.starting = self._refused = False
+        self._area: tuple[tuple[float, float], ...] = ()
+        self._ok = self.named = self.placed = self.starting = False
         self._busy = ""  # what it says of that
-        self._next_number = 0  # that a firmware which insists on numbers and checksums wants
 
     def listen(self, question: str, timeout_s: float, until: Callable[[], bool]) -> None:
         """Ask again and again until the answer is whole, or the time is over."""
-        end_s = next_s = monotonic()
-        end_s += timeout_s
+        end_s = SERIAL.now_s() + timeout_s
         self._ok = False
-        while not until() and not self._fault and not self._stop.is_set() and (now_s := monotonic()) < end_s:
-            if now_s >= next_s:
-                self._write(question)
-                next_s = now_s + ASK_S
-            if data := self._port.read():
-                before = (self._refused, self._next_number)
-                for event in self._decoder.receive(data, now_s):
-                    self._read(event)
-                if before != (self._refused, self._next_number):
-                    next_s = now_s  # asked in another way at once
 
-    def _write(self, question: str) -> None:
-        """The newline ends what stood on the line before. Where unnumbered lines are refused, empty ones are, too, and a far one
-        brings the number.
-        """
-        if self._next_number:
-            self._port.write(frame(self._next_number, question))
-            self._next_number = 0
-        else:
-            self._port.write(frame(FAR_NUMBER, question) if self._refused else f"\n{question}\n".encode("ascii"))
+        def is_whole(event: Event) -> bool:
+            self._read(event)
+            return until() or bool(self._fault)
+
+        with suppress(CancelledError):
+            while not (until() or self._fault) and (now_s := SERIAL.now_s()) < end_s:
+                self._orders.give((question,), is_whole, min(now_s + ASK_S, end_s))
+
+    def _check_stop(self) -> None:
+        if self._stop.is_set():
+            raise CancelledError
 
     def answer(self) -> Answer:
         """What all of it amounts to."""
@@ -137,37 +130,29 @@ class _Inquiry:
             return Answer(Kind.HALTED, self._fault.removeprefix("!!").strip(), revival=revival)
         if self.starting:
             return Answer(Kind.STARTING, self._words)
-        if self._words or self._ok or self._refused:
+        if self._words or self._ok or self._orders.insists:
             return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
         if self._busy:
             return Answer(Kind.BUSY, self._busy)
-        if self._decoder.rubbish:
+        if self._orders.decoder.rubbish:
             return Answer(Kind.RUBBISH)
-        words = self._decoder.foreign
+        words = self._orders.decoder.foreign
         return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
 
-    def _read(self, event: events.Event) -> None:
-        if events.is_starting(event):
+    def _read(self, event: Event) -> None:
+        if event.is_starting:
             self.starting = True
-        elif isinstance(event, events.FirmwareFault):
+        elif event.kind is EventKind.FAULT:
             self._fault = event.text
-        elif isinstance(event, events.Busy):
+        elif event.kind is EventKind.BUSY:
             self._busy = event.text.rpartition("busy:")[2].strip() or "busy"
-        elif events.lacks_checksum(event):
-            self._refused = True
-        elif isinstance(event, events.Resend) and self._refused:
-            self._next_number = event.line
-        elif isinstance(event, events.Area):
-            self._area = event
-        if identity := events.identity_in(event):
-            self._words = identity.text
-        if position := events.position_in(event):
-            self._letters, self.placed = "".join(letter for letter, _ in position.axes if letter != "E"), True
-        if isinstance(event, events.Ok):
+        self._area = event.area or self._area
+        self._words = event.identity or self._words
+        if event.position is not None:
+            self._letters, self.placed = "".join(letter for letter in event.position if letter != "E"), True
+        if event.kind is EventKind.OK:
             self._ok, self.named = True, bool(self._words)
 
     def _limits(self) -> dict[str, tuple[float, float]]:
         """The area with the letters of M114: Marlin names the axes from the fourth on I, J, K, whatever their words are."""
-        if self._area is None or len(self._letters) < len(self._area.axes):
-            return {}
-        return {letter: (low, high) for letter, (_, low, high) in zip(self._letters, self._area.axes, strict=False)}
+        return {} if len(self._letters) < len(self._area) else dict(zip(self._letters, self._area, strict=False))

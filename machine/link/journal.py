@@ -22,7 +22,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from os.path import isdir, isfile, lexists, samestat
 from pathlib import Path
-from typing import Any, Self
+from typing import IO, Any, Self
 from uuid import uuid4
 from zlib import crc32
 
@@ -114,7 +114,7 @@ class Journal:
         self._writing, self._syncing = threading.Lock(), threading.Lock()
         self._dirty, self._hurry, self._end = threading.Event(), threading.Event(), threading.Event()
         values = {"format": FORMAT, "key": self._key, "boot": boot_id()} | asdict(heading)
-        self._heading = _record(values, BLOCK_BYTES)
+        self._heading = _record(values)
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | BINARY, PRIVATE)
         except FileExistsError:
@@ -123,7 +123,7 @@ class Journal:
             raise OutputError(f"journal {path} cannot be written: {reason(error)}") from None
         lock(self._file)  # before the heading: whoever can read that sees the lock
         try:
-            write_at(self._file, 0, self._heading + SLOTS * _record(_as_list(0, self.last), BLOCK_BYTES))
+            write_at(self._file, 0, self._heading + SLOTS * _slot(0, self.last))
             os.fsync(self._file)
         except OSError as error:
             os.close(self._file)
@@ -157,7 +157,7 @@ class Journal:
             self._records += 1
             self._unsynced = True
             try:
-                record = _record(_as_list(self._records, checkpoint), BLOCK_BYTES)
+                record = _slot(self._records, checkpoint)
                 write_at(self._file, len(self._heading) + self._slot * BLOCK_BYTES, record)
             except OSError as error:
                 self._fail(f"cannot be written: {reason(error)}")
@@ -279,29 +279,30 @@ def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
         raise JournalError(f"journal {path} has changed since it was read: its print was resumed elsewhere")
     resumed = replace(contents.last, state=f"{RESUMED}{rest}")
     try:
-        record = _record(_as_list(contents.records + 1, resumed), BLOCK_BYTES)
+        record = _slot(contents.records + 1, resumed)
         if len(record) > BLOCK_BYTES:
             raise JournalError(f"journal {path} cannot note a path as long as that of {rest}")
         with path.open("r+b", buffering=0) as file:
-            heading = file.readline(LONGEST_BYTES)
-            slots = [_value(file.read(BLOCK_BYTES)) for _ in range(SLOTS)]
-            oldest = min(range(SLOTS), key=lambda slot: slots[slot][0] if slots[slot] is not None else -1)
+            heading, blocks = _blocks(file)
+            numbers = [-1 if (value := _value(block)) is None else value[0] for block in blocks]
+            oldest = numbers.index(min(numbers))
             write_at(file.fileno(), len(heading) + oldest * BLOCK_BYTES, record)
             os.fsync(file.fileno())
     except OSError as error:
         raise JournalError(f"journal {path} cannot be written: {reason(error)}") from None
 
 
-def _record(value: Any, block_bytes: int) -> bytes:
+def _record(value: Any) -> bytes:
     """A line of whole blocks, filled with blanks."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
-    text = text.ljust(-(-(len(text) + 10) // block_bytes) * block_bytes - 10)
+    text = text.ljust(-(-(len(text) + 10) // BLOCK_BYTES) * BLOCK_BYTES - 10)
     return b"%08x %s\n" % (crc32(text), text)
 
 
-def _as_list(number: int, checkpoint: Checkpoint) -> list[Any]:
+def _slot(number: int, checkpoint: Checkpoint) -> bytes:
+    """The record of a checkpoint."""
     lines = [checkpoint.sent, checkpoint.acknowledged, checkpoint.executed, checkpoint.number]
-    return [number, *lines, checkpoint.pose, checkpoint.state]
+    return _record([number, *lines, checkpoint.pose, checkpoint.state])
 
 
 def read_journal(path: Path) -> JournalContents:
@@ -336,13 +337,16 @@ def _read(path: Path) -> tuple[bytes, list[bytes]]:
         raise JournalError(f"journal {path} cannot be read: it is no file")
     try:
         with path.open("rb") as file:
-            first = file.readline(LONGEST_BYTES)
-            slots = [file.read(BLOCK_BYTES) for _ in range(SLOTS)]
+            first, slots = _blocks(file)
     except OSError as error:
         raise JournalError(f"journal {path} cannot be read: {reason(error)}") from None
     if not first:
         raise JournalError(f"journal {path} is empty")
     return first, slots
+
+
+def _blocks(file: IO[bytes]) -> tuple[bytes, list[bytes]]:
+    return file.readline(LONGEST_BYTES), [file.read(BLOCK_BYTES) for _ in range(SLOTS)]
 
 
 def _value(line: bytes) -> Any:

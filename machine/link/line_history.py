@@ -26,7 +26,7 @@ class SentLine(NamedTuple):
 
 
 class PlannerReports:
-    """What ADVANCED_OK reports of a planner: P, the free places right after a line was planned.
+    """The free places of the planner (P of ADVANCED_OK), as reported right after a line was planned.
 
     As many as Marlin's by default, until it reports more, or the same number twice while nothing moves.
     """
@@ -36,8 +36,8 @@ class PlannerReports:
         self._places, self._free, self._idle_free = PLANNED_BLOCKS, 0, 0
 
     def waiting_beside(self, free: int) -> int:
-        """How many moves wait. The less of two reports counts: a damaged digit in one of them must not make a waiting move an
-        executed one.
+        """The number of moves that wait. The lesser of two reports counts: a damaged digit in one of them must not make a waiting
+        move an executed one.
         """
         self.reported, self._places = True, max(self._places, free)
         least, self._free = min(free, self._free), free
@@ -174,7 +174,7 @@ class Barriers:
 def shifts(command: str, letters: Sequence[str]) -> bool:
     """Whether a command without filament takes the tip to another height or turns the table; letters: X Y Z tilt turn E.
 
-    After a power cut X and Y are homed, but not these: a journal tells of such a line before it is sent.
+    After a power cut X and Y are homed, but not these: such a line is recorded in the journal before it is sent.
     """
     text = command.upper()
     if not any(letter in text for letter in letters[2:5]):  # nearly every line

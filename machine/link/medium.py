@@ -1,11 +1,12 @@
 """Medium: what a stream runs on, so that a printer, a simulated one in memory, real and virtual time serve alike."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic, sleep
 from typing import Protocol
 
 from machine.link.port import SerialDevice, open_port, serial_devices
+from machine.link.protocol.timeout import Timing
 from profiles.errors import PortError
 
 EVERY_S = 0.2
@@ -33,11 +34,11 @@ class Wire(Protocol):
 
 @dataclass(frozen=True)
 class Medium:
-    """How a line is opened (name, baud; raises PortError), what time it is (s), and how time is spent (s).
+    """Access to a line and to the clock: opens a line (name, baud; raises PortError), gives the time (s), and waits (s).
 
-    devices: the serial ports that there are, where a lost one may have come back.
-    lost_s: so long a port that vanished in mid-print is waited for; a person finds the plug in two minutes, and a hot nozzle
-    should not stand in the print for longer.
+    devices: the serial ports that there are, where a lost one may have come back. lost_s: the longest wait for a port that was
+    lost in mid-print; a person finds the plug in two minutes, and a hot nozzle should not stand in the print for longer. timing:
+    the time limits of the printer's answers.
     """
 
     open: Callable[[str, int], Wire] = open_port
@@ -45,6 +46,7 @@ class Medium:
     wait: Callable[[float], None] = sleep
     devices: Callable[[], tuple[SerialDevice, ...]] = serial_devices
     lost_s: float = 120.0
+    timing: Timing = field(default_factory=Timing)
 
 
 SERIAL = Medium()

@@ -1,4 +1,4 @@
-"""Pending commands: what a person or the printer has asked of a running print, and what of it is still to be done.
+"""Pending commands: requests of a person or of the printer to a running print that are not carried out yet.
 
 Requests come from any thread through a Control; PendingCommands, in the thread that owns the port, refuses or holds them.
 """
@@ -44,9 +44,13 @@ class PendingCommand:
 
 
 class Control:
-    """Requests in the order they were made, an emergency stop before them. ask() from any thread, take() from the stream's."""
+    """Requests in the order they were made, an emergency stop before them. ask() from any thread, take() from the stream's.
 
-    def __init__(self) -> None:
+    stop: set, it ends the print as CANCEL does.
+    """
+
+    def __init__(self, stop: Flag | None = None) -> None:
+        self.stop = stop or Flag()
         self._waiting: deque[PendingCommand] = deque()
 
     def ask(self, command: Command, value: float = 100.0, text: str = "") -> None:
@@ -69,14 +73,13 @@ class EmergencyError(Exception):
 
 @dataclass
 class PendingCommands:
-    """pause_s: since when a pause is wanted; resume: the print is to go on; lines: commands to be sent between those of the
-    program; message: why the newest request cannot be granted.
+    """The requests that were accepted. pause_s: since when a pause is wanted; resume: the print is to go on; lines: commands to
+    be sent between those of the program; message: why the newest request cannot be granted.
     """
 
     axes: Axes
     limit: int = LINE_LIMIT
-    control: Control | None = None
-    stop: Flag | None = None
+    control: Control = field(default_factory=Control)
     pause_s: float | None = None
     resume: bool = False
     lines: deque[str] = field(default_factory=deque)
@@ -86,17 +89,17 @@ class PendingCommands:
 
     def poll(self, state: PrintState, now_s: float) -> None:
         """Take what was asked since. Raises CancelledError, EmergencyError."""
-        if self.stop is not None and self.stop.is_set():
+        if self.control.stop.is_set():
             raise CancelledError
         for _ in range(MOST_AT_ONCE):
-            request = None if self.control is None else self.control.take()
+            request = self.control.take()
             if request is None:
                 return
             self.accept(request, state, now_s)
 
     def heed_emergency(self) -> None:
         """While a print is being ended only the emergency stop still counts. Raises EmergencyError."""
-        while self.control is not None and (request := self.control.take()) is not None:
+        while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
                 raise EmergencyError
 

@@ -285,11 +285,6 @@ def find_again(lost: SerialDevice, devices: Sequence[SerialDevice]) -> SerialDev
     return same[0] if len(same) == 1 else None
 
 
-def port_names() -> list[str]:
-    """Serial devices that exist, the stable names of USB adapters first."""
-    return [device.name for device in serial_devices()]
-
-
 def refusal(name: str, baud: int, error: Exception) -> str:
     """Why a port cannot be opened, as said behind its name."""
     number = _number(error)
@@ -309,7 +304,7 @@ def refusal(name: str, baud: int, error: Exception) -> str:
 
 def _absence() -> str:
     """The same for a port that does not exist, with those that do."""
-    names = port_names()
+    names = [device.name for device in serial_devices()]
     return f"does not exist: {'there are ' + ', '.join(names) if names else 'no serial port was found'}"
 
 

@@ -20,7 +20,7 @@ from machine.link.journal import EVERY_LINES, LEFT, PAUSED, Checkpoint
 from machine.link.line_history import shifts
 from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands, homed_return_moves, return_moves
 from machine.link.pause.printed_bounds import PrintedBounds
-from machine.link.progress import ProgramPosition
+from machine.link.print_state import ProgramPosition
 from machine.link.protocol.framing import command_of
 from machine.link.status import SEVERAL, PrinterStatus
 from machine.planning.stand import Turn
@@ -57,17 +57,22 @@ NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: q
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """Where a resumed print goes on: the first line of the program to be sent, and commands before it."""
+    """Where a resumed print goes on: the first line of the program to be sent, and commands before it.
+
+    reason: what is certain about it, in words; homes: X and Y.
+    """
 
     line: int
     before: tuple[str, ...]
+    reason: str = ""
+    homes: bool = False
 
 
 @dataclass(frozen=True)
 class InterruptedPrint:
-    """What a journal and its program say. line: the first one not surely executed; modal: the state before it; ahead: line -> the
-    state after its command, which may have been done since; stroked: whether anything was printed before. stood_mm: the height at
-    which the tip stands, as a person has seen it.
+    """An interrupted print by its journal and its program. line: the first one not surely executed; modal: the state before it;
+    ahead: line -> the state after its command, which may have been done since; stroked: whether anything was printed before.
+    stood_mm: the height of the tip that a person has read off.
     """
 
     line: int
@@ -79,15 +84,6 @@ class InterruptedPrint:
     ahead: Mapping[int, ModalState]
     checkpoint: Checkpoint
     stood_mm: float | None = None
-
-
-@dataclass(frozen=True)
-class ResumePlan:
-    """How the print goes on. reason: what is certain about it, in words; homes: X and Y."""
-
-    start: ResumePoint
-    reason: str
-    homes: bool = False
 
 
 def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile: Profile, limit: int) -> InterruptedPrint:
@@ -128,7 +124,7 @@ def has_not_restarted(point: InterruptedPrint, status: PrinterStatus) -> bool | 
     return point.checkpoint.number > 0 and 0 <= status.last_number - point.checkpoint.number < NUMBERS_AHEAD
 
 
-def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile) -> ResumePlan:
+def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile) -> ResumePoint:
     """Decide. Raises JournalError where going on would be a guess, FirmwareError or SilenceError where the printer has not
     reported its place.
     """
@@ -142,20 +138,18 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     if standing is not None:
         line, modal = standing
         before = (*heat_commands(modal, profile), *modal.lines())
-        done = "the printer stands where this line begins: nothing is repeated"
-        return ResumePlan(ResumePoint(line + 1, before), done)
+        return ResumePoint(line + 1, before, "the printer stands where this line begins: nothing is repeated")
     if not point.stroked:
-        return ResumePlan(ResumePoint(1, ()), f"{TOO_LITTLE}, clear the table of the little there may be")
+        return ResumePoint(1, (), f"{TOO_LITTLE}, clear the table of the little there may be")
     _check(point, profile)
     span = f"lines {point.line} to {point.last} may have been printed already"
     at = _reported_position(point, status) if alive or (alive is None and not begun) else None
     if at is not None and not status.greeted:
         before = _approach(point, profile, *at)
-        return ResumePlan(ResumePoint(point.line, before), f"the printer has not restarted and knows its place; {span}")
+        return ResumePoint(point.line, before, f"the printer has not restarted and knows its place; {span}")
     if not status.greeted:
         _check_begun(status, begun, profile)
-    before = _homed_approach(point, profile)
-    return ResumePlan(ResumePoint(point.line, before), f"the printer has restarted; {span}", homes=True)
+    return ResumePoint(point.line, _homed_approach(point, profile), f"the printer has restarted; {span}", homes=True)
 
 
 def _check_begun(status: PrinterStatus, begun: bool, profile: Profile) -> None:
@@ -189,7 +183,7 @@ def _match_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[int
     """The first line whose position the printer reports, with the state after it: of the one before the first, or ahead."""
     if status.position is None:
         return None
-    reported = dict(status.position.axes)
+    reported = status.position
     for line, modal in ((point.line - 1, point.modal), *point.ahead.items()):
         pairs = [(reported[letter], value) for letter, value in zip(modal.axes.letters, modal.at, strict=True)
                  if value is not None and letter in reported]  # fmt: skip
@@ -208,7 +202,7 @@ def stands_as_begun(status: PrinterStatus, machine: Machine) -> bool:
         return True
     if status.last_number is None:
         return False
-    reported, letters = dict(status.position.axes), axes_of(machine).letters
+    reported, letters = status.position, axes_of(machine).letters
     axes: list[tuple[float, ...]] = [(axis.home_mm,) if axis.home_mm is not None else (0.0, *axis.limits_mm)
                                      for axis in (machine.x, machine.y, machine.z)]  # fmt: skip
     for axis in (machine.tilt, machine.turn):
@@ -220,18 +214,18 @@ def stands_as_begun(status: PrinterStatus, machine: Machine) -> bool:
 
 def _nonzero(status: PrinterStatus) -> bool:
     """Whether the printer says that it stands somewhere else than at 0 0 0."""
-    return status.position is not None and sum(abs(value) > SAME for _, value in status.position.axes) >= SEVERAL
+    return status.position is not None and sum(abs(value) > SAME for value in status.position.values()) >= SEVERAL
 
 
 def _in_words(status: PrinterStatus) -> str:
-    return " ".join(f"{letter}{value:g}" for letter, value in status.position.axes) if status.position is not None else ""
+    return " ".join(f"{letter}{value:g}" for letter, value in (status.position or {}).items())
 
 
 def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[Floats, Pose] | None:
     """Where the printer says it stands; None where an axis is missing."""
     if status.position is None:
         return None
-    reported, letters = dict(status.position.axes), point.modal.axes.letters
+    reported, letters = status.position, point.modal.axes.letters
     if any(letter not in reported for letter in letters[:3]):
         return None
     tilt, turn = (reported.get(letter, value) for letter, value in zip(letters[3:E_AXIS], point.modal.at[3:E_AXIS], strict=True))
@@ -290,7 +284,7 @@ def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
     return tuple(z for k, z in enumerate(heights) if k == 0 or z - heights[k - 1] > UNSURE_MM)
 
 
-def is_in_doubt(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> bool:
+def is_in_doubt(way: ResumePoint, point: InterruptedPrint, profile: Profile) -> bool:
     """Whether the height must be seen by a person: Z is not homed, and the tip was neither parked nor at one height only."""
     parked = point.checkpoint.state in PARKED and None not in point.checkpoint.pose[:E_AXIS]
     return way.homes and not profile.machine.gcode.resume and not parked and len(heights_mm(point)) > 1

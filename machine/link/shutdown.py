@@ -10,17 +10,8 @@ from typing import Self
 from machine.firmware.dialect import HOMING_S
 from machine.link.exchange import Exchange
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import (
-    Ok,
-    Position,
-    Resend,
-    Temperature,
-    is_halt,
-    lacks_checksum,
-    position_in,
-    read_event,
-    temperature_in,
-)
+from machine.link.protocol.decoder import LineDecoder
+from machine.link.protocol.events import Event, Kind, Temperature
 from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
 from profiles.errors import PortError, PrinterError, add_words
 
@@ -37,7 +28,6 @@ SETTLE_S = 20.0  # lines that the printer had already taken are run first
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
 LIFT_S = 10.0  # a lift of some millimetres at any Z axis' speed
 STOP_AGAIN_S, STOP_MOST_S = 0.5, 2.0
-PARTIAL_BYTES = 4096
 UNCONFIRMED = "did not confirm M112: cut the power"
 
 
@@ -47,49 +37,51 @@ class Orders:
 
     A firmware that insists on checksums refuses them ("Missing checksum": OctoPrint's virtual printer with forceChecksum,
     Repetier). It is asked for its line number, by a line whose number is too far ahead, and gets them once more with both.
-    on_turn: called meanwhile, may raise to end the listening; insists: the firmware wants numbers and checksums.
+    on_turn: called meanwhile, may raise to end the listening; insists: the firmware wants numbers and checksums; decoder: reads
+    what comes.
     """
 
     wire: Wire
     medium: Medium
     on_turn: Callable[[], None] = lambda: None
     insists: bool = False
-    _waiting: tuple[str, ...] = field(default=())  # commands to be given as soon as the number is known
-    _partial: bytes = b""
+    decoder: LineDecoder = field(default_factory=LineDecoder)
+    _waiting: tuple[str, ...] = ()  # commands to be given as soon as the number is known
 
-    def give(self, commands: Sequence[str], is_wanted: Callable[[bytes], bool], end_s: float) -> bool:
-        """Write commands and listen until a line is wanted (True) or the time has come (False)."""
+    def give(self, commands: Sequence[str], is_wanted: Callable[[Event], bool], end_s: float) -> bool:
+        """Write commands and listen until an event is wanted (True) or the time has come (False)."""
         if self.insists:
             self._ask_number(commands)
         else:
             self.wire.write(as_lines(commands))
-        return self.wait_for(lambda line: self._heed(line, commands) or is_wanted(line), end_s)
+        return self.wait_for(lambda event: self._heed(event, commands) or is_wanted(event), end_s)
 
-    def wait_for(self, is_wanted: Callable[[bytes], bool], end_s: float) -> bool:
-        """Listen until a line is wanted (True) or the time has come (False)."""
+    def wait_for(self, is_wanted: Callable[[Event], bool], end_s: float) -> bool:
+        """Listen until an event is wanted (True) or the time has come (False)."""
         while self.medium.now_s() < end_s:
             self.on_turn()
-            *lines, self._partial = (self._partial + self.wire.read()).split(b"\n")
-            self._partial = self._partial[-PARTIAL_BYTES:]
-            wanted = [is_wanted(line) for line in lines]  # all of them are heard: a halt may follow an ok at once
+            data, now_s = self.wire.read(), self.medium.now_s()
+            events = [*self.decoder.receive(data, now_s), *self.decoder.flush(now_s)]
+            wanted = [is_wanted(event) for event in events]  # all of them are heard: a halt may follow an ok at once
             if any(wanted):
                 return True
         return False
 
-    def _heed(self, line: bytes, commands: Sequence[str]) -> bool:
+    def _heed(self, event: Event, commands: Sequence[str]) -> bool:
         """Answer a refusal and the number that follows; what was written is not wanted by that."""
-        event = read_event(line)
-        if lacks_checksum(event) and not self.insists:
+        if event.lacks_checksum and not self.insists:
             self.insists = True
             self._ask_number(commands)
-        elif isinstance(event, Resend) and self._waiting:
+        elif event.kind is Kind.RESEND and event.line is not None and self._waiting:
             self.wire.write(number_lines(event.line, self._waiting))
             self._waiting = ()
         return False
 
     def _ask_number(self, commands: Sequence[str]) -> None:
+        """A single command asks by itself: a firmware that wants a checksum, but any number, obeys it."""
         self._waiting = tuple(commands)
-        self.wire.write(frame(FAR_NUMBER, "M105"))  # what was refused has ended a half line
+        question = commands[0] if len(commands) == 1 else "M105"
+        self.wire.write(frame(FAR_NUMBER, question))  # what was refused has ended a half line
 
 
 def as_lines(commands: Sequence[str]) -> bytes:
@@ -98,7 +90,7 @@ def as_lines(commands: Sequence[str]) -> bytes:
 
 
 class Heaters(Enum):
-    """What is known of the heaters at an end."""
+    """State of the heaters at the end of a print."""
 
     OFF = "the printer reports its heaters off"
     HALTED = "the printer has halted and switched its heaters off by itself"
@@ -108,46 +100,38 @@ class Heaters(Enum):
 def heaters_off(
     wire: Wire, medium: Medium, timeout_s: float = SETTLE_S, homing: bool = False, on_turn: Callable[[], None] = lambda: None
 ) -> Heaters:
-    """Stop the printer and switch the heaters off; what its own words prove.
+    """Stop the printer and switch the heaters off; returns what its own answers prove.
 
     homing: it is at a command that must not or cannot be stopped and is waited for, HOMING_S at most. on_turn: called meanwhile,
     may raise. Raises PortError when the port is gone.
     """
     wire.discard()
-    halted, start_s, old = False, medium.now_s(), b""
-    while (data := wire.read()) and medium.now_s() - start_s < OLD_REPORTS_S:
-        *lines, old = (old + data)[-PARTIAL_BYTES:].split(b"\n")
-        halted = halted or any(_shows_kill(line) for line in lines)
-    orders, shown = Orders(wire, medium, on_turn), _Shown(halted)
+    orders, halted, start_s = Orders(wire, medium, on_turn), False, medium.now_s()
+    while (data := wire.read()) and (now_s := medium.now_s()) - start_s < OLD_REPORTS_S:
+        halted = any(event.is_halt for event in orders.decoder.receive(data, now_s)) or halted
+    orders.decoder.discard_partial()  # the rest of an old report proves nothing either
     commands = HOMING_ORDERS if homing else ORDERS
+    off = answered = False
 
-    def is_over(line: bytes) -> bool:
+    def ends(event: Event) -> bool:
+        """Whether nothing more needs to be asked."""
+        nonlocal halted, off, answered
+        answered = answered or event.kind is Kind.OK
+        halted = halted or event.is_halt
+        off = off or (event.temperature is not None and shows_off(event.temperature))
+        return off or halted
+
+    def ends_homing(event: Event) -> bool:
         """An `ok` tells the end of homing, for G28 is answered when it is done; not the one that belongs to a Resend."""
-        return shown.ends(line) or (shown.answered and not orders.insists)
+        return ends(event) or (answered and not orders.insists)
 
-    if homing and not halted and orders.give(commands, is_over, start_s + HOMING_S):
+    if homing and not halted and orders.give(commands, ends_homing, start_s + HOMING_S):
         commands = ORDERS
     start_s = medium.now_s()
-    while not shown.off and (now_s := medium.now_s()) < start_s + timeout_s:
-        if orders.give(commands, shown.ends, min(now_s + AGAIN_S, start_s + timeout_s)) or shown.halted:
+    while not off and (now_s := medium.now_s()) < start_s + timeout_s:
+        if orders.give(commands, ends, min(now_s + AGAIN_S, start_s + timeout_s)) or halted:
             break
-    return Heaters.OFF if shown.off else Heaters.HALTED if shown.halted else Heaters.UNPROVED
-
-
-class _Shown:
-    """What the answers to the orders have shown."""
-
-    def __init__(self, halted: bool) -> None:
-        self.halted, self.off, self.answered = halted, False, False
-
-    def ends(self, line: bytes) -> bool:
-        """Whether nothing more needs to be asked."""
-        event = read_event(line)
-        report = temperature_in(event)
-        self.answered = self.answered or isinstance(event, Ok)
-        self.halted = self.halted or _shows_kill(line)
-        self.off = self.off or (report is not None and shows_off(report))
-        return self.off or self.halted
+    return Heaters.OFF if off else Heaters.HALTED if halted else Heaters.UNPROVED
 
 
 def shows_off(report: Temperature) -> bool:
@@ -216,21 +200,21 @@ class HeaterGuard:
         return f"{self._exchange.connection.greeting.firmware.line.revival} before the next print"
 
 
-def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn: Callable[[], None]) -> Position | None:
-    """A step away from the print; words: of G1, relative. Where the printer says it stands then.
+def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn: Callable[[], None]) -> dict[str, float] | None:
+    """Move a step away from the print; words: of G1, relative. Returns the position that the printer reports then.
 
     on_turn: called meanwhile, may raise. Raises PortError.
     """
-    positions: list[Position] = []
+    position: dict[str, float] | None = None
 
-    def reports_done(line: bytes) -> bool:
-        event = read_event(line)
-        positions.extend(filter(None, [position_in(event)]))
-        return isinstance(event, Ok) and event.temperature is not None
+    def reports_done(event: Event) -> bool:
+        nonlocal position
+        position = event.position or position
+        return event.kind is Kind.OK and event.temperature is not None
 
     step = ("M83", "G91", f"G1 {words} F{feed_mm_min:.0f}", "G90", "M400", "M114", "M105")
     arrived = Orders(wire, medium, on_turn).give(step, reports_done, medium.now_s() + LIFT_S)
-    return positions[-1] if arrived and positions else None
+    return position if arrived else None
 
 
 def emergency_stop(wire: Wire, medium: Medium) -> bool:
@@ -242,13 +226,13 @@ def emergency_stop(wire: Wire, medium: Medium) -> bool:
     try:
         wire.discard()
         start_s, orders = medium.now_s(), Orders(wire, medium)
-        if orders.give(("M112",), _shows_kill, start_s + STOP_AGAIN_S):
+        if orders.give(("M112",), _is_halt, start_s + STOP_AGAIN_S):
             return True
         # One that had shut down before (Klipper) answers M112 with a bare ok, and any other command with its words.
-        return orders.give(("M112", "M107"), _shows_kill, start_s + STOP_MOST_S)
+        return orders.give(("M112", "M107"), _is_halt, start_s + STOP_MOST_S)
     except PortError:
         return False
 
 
-def _shows_kill(line: bytes) -> bool:
-    return is_halt(read_event(line))
+def _is_halt(event: Event) -> bool:
+    return event.is_halt

@@ -13,22 +13,11 @@ from dataclasses import dataclass, field
 from machine.gcode.commands import command_in
 from machine.gcode.modes import E_AXIS, ModalState
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import (
-    Banner,
-    Event,
-    FirmwareFault,
-    Ok,
-    Position,
-    Resend,
-    Start,
-    Temperature,
-    position_in,
-    read_event,
-)
+from machine.link.protocol.events import Event, Kind, Temperature
 from machine.link.protocol.framing import FAR_NUMBER, frame
 from machine.link.shutdown import Orders
 
-LAST_LINE = re.compile(rb"Last Line: (\d{1,10})")
+LAST_LINE = re.compile(r"Last Line: (\d{1,10})")
 QUESTIONS = ("M400", "M114", "M105")
 TRIES, ANSWER_S = 3, 4.0  # a board that restarts when its port is opened spends two seconds in its boot loader
 STILL_S = 300.0  # a printer that still works on its queue answers when that is empty
@@ -45,41 +34,39 @@ class PrinterStatus:
     """
 
     last_number: int | None = None
-    position: Position | None = None
+    position: dict[str, float] | None = None
     temperature: Temperature = field(default_factory=Temperature)
     greeted: bool = False
     fault: str = ""
 
-    def _read(self, line: bytes) -> Event:
-        """Any line; a board that restarts begins its line numbers anew."""
-        event = read_event(line)
-        if isinstance(event, FirmwareFault):
+    def _read(self, event: Event) -> None:
+        """Any event; a board that restarts begins its line numbers anew."""
+        if event.kind is Kind.FAULT:
             self.fault = event.text.removeprefix("!!").strip()
-        if isinstance(event, Start | Banner):
+        if event.kind in (Kind.START, Kind.BANNER):
             self.greeted, self.last_number = True, None if self.last_number is None else 0
-        return event
 
-    def read_number(self, line: bytes) -> bool:
+    def read_number(self, event: Event) -> bool:
         """Whether the far number was answered, by a refusal or, where numbers are not checked, by what M105 is answered with."""
-        event = self._read(line)
-        if last_line := LAST_LINE.search(line):
+        self._read(event)
+        if last_line := LAST_LINE.search(event.text):
             self.last_number = int(last_line[1])
-        elif isinstance(event, Resend):  # Repetier and OctoPrint's virtual printer do not name the last line
+        elif event.kind is Kind.RESEND and event.line is not None:  # Repetier and OctoPrint's virtual printer name no last line
             self.last_number = event.line - 1
-        return self.last_number is not None or (isinstance(event, Ok) and event.temperature is not None)
+        return self.last_number is not None or (event.kind is Kind.OK and event.temperature is not None)
 
-    def read_position(self, line: bytes) -> bool:
+    def read_position(self, event: Event) -> bool:
         """Take a position; whether the temperature that is asked for after it has come."""
-        event = self._read(line)
-        self.position = position_in(event) or self.position
-        if isinstance(event, Ok) and event.temperature is not None:
+        self._read(event)
+        self.position = event.position or self.position
+        if event.kind is Kind.OK and event.temperature is not None:
             self.temperature = event.temperature
             return True
         return False
 
 
 def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> PrinterStatus:
-    """Ask; a printer that answers nothing gives a status without anything known.
+    """Ask a printer for its status; all of it is unknown where no answer comes.
 
     Raises PortError, and what on_turn(), called meanwhile, raises to end the asking.
     """
@@ -90,14 +77,14 @@ def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> Pri
             break
     else:
         return PrinterStatus()
-    orders.wait_for(lambda line: False, medium.now_s() + 0.5)  # the rest of the refusal
+    orders.wait_for(lambda event: False, medium.now_s() + 0.5)  # the rest of the refusal
     for _ in range(TRIES):  # what was asked is lost when the board restarts meanwhile
         before, status.greeted = status.greeted, False
-        orders.give(QUESTIONS, lambda line: status.read_position(line) or status.greeted, medium.now_s() + STILL_S)
+        orders.give(QUESTIONS, lambda event: status.read_position(event) or status.greeted, medium.now_s() + STILL_S)
         again, status.greeted = status.greeted, status.greeted or before
         if not again:
             break
-        orders.wait_for(lambda line: False, medium.now_s() + ANSWER_S)
+        orders.wait_for(lambda event: False, medium.now_s() + ANSWER_S)
     return status
 
 
@@ -108,7 +95,7 @@ def line_was_done(command: str, before: Sequence[float | None], after: ModalStat
     """
     if status.position is None or len(before) <= E_AXIS:
         return None
-    reported = dict(status.position.axes)
+    reported = status.position
     letters = [
         letter
         for letter, old, new in zip(after.axes.letters, before, after.at, strict=True)
@@ -158,12 +145,11 @@ def _greatest_difference(a: Mapping[str, float | None], b: Mapping[str, float | 
     return max((abs((a[letter] or 0.0) - (b[letter] or 0.0)) for letter in letters), default=0.0)
 
 
-def position_differences(modal: ModalState, reported: tuple[tuple[str, float], ...], near: float) -> list[str]:
+def position_differences(modal: ModalState, reported: Mapping[str, float], near: float) -> list[str]:
     """Axes on which the printer's own position differs by more than `near` from what the program has led to, in words."""
-    coordinates = dict(reported)
     pairs = zip(modal.axes.letters[:E_AXIS], modal.at[:E_AXIS], strict=True)
     return [
-        f"{letter} {coordinates[letter]:g} instead of {value:.3f}"
+        f"{letter} {reported[letter]:g} instead of {value:.3f}"
         for letter, value in pairs
-        if value is not None and letter in coordinates and abs(coordinates[letter] - value) > near
+        if value is not None and letter in reported and abs(reported[letter] - value) > near
     ]

@@ -3,18 +3,17 @@
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from threading import Event as Flag
 
-from machine.link.exchange import Exchange, Reconnection
+from machine.firmware import dialect_of
+from machine.link.exchange import Exchange
 from machine.link.feed import Feed
 from machine.link.journal import Journal
-from machine.link.medium import SERIAL, Medium, reopen
+from machine.link.medium import SERIAL, Medium, Wire, reopen
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
 from machine.link.port import find_again, find_device, stable_name
 from machine.link.print_state import PrintState, PrintStatus, last_known
-from machine.link.progress import Schedule, StreamPlan
+from machine.link.protocol.connection import Connection
 from machine.link.protocol.framing import LINE_LIMIT, command_of
-from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint
 from machine.link.shutdown import SETTLE_S, HeaterGuard, Heaters, lift_tip
 from machine.link.status import PrinterStatus, line_was_done, query_status
@@ -50,10 +49,6 @@ def print_lines(
     baud: int = 115200,
     *,
     on_progress: Callable[[PrintStatus], None] | None = None,
-    stop: Flag | None = None,
-    schedule: Schedule | None = None,
-    timing: Timing | None = None,
-    limit: int = LINE_LIMIT,
     control: Control | None = None,
     journal: Journal | None = None,
     profile: Profile | None = None,
@@ -63,97 +58,89 @@ def print_lines(
     """Print a program: send every line's command, wait until the last one is done.
 
     What can be read twice (a sequence, a GcodeFile) is checked wholly before the port is opened, an iterator line by line as it
-    is reached; lines are consumed lazily. A plain string is taken as its lines. schedule: for the time left; limit: characters of
-    a line, number and checksum included, that the firmware keeps. control: commands of a person; journal: written for a later
-    resume; profile: lets a pause lift, park and cool the nozzle, and the watchdog know what is too hot; begin: for a resumed
-    print, decides where it goes on.
+    is reached; lines are consumed lazily. A plain string is taken as its lines. control: commands of a person; journal: written
+    for a later resume; profile: tells how long a line the firmware keeps, lets a pause lift, park and cool the nozzle, and the
+    watchdog know what is too hot; begin: decides where a resumed print goes on.
 
-    A set `stop` flag ends the print: feeding stops, moves are stopped, heaters and fan go off, the tip is lifted, nothing homes
-    or turns; the Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises LocalProtocolError for a
-    line that cannot be sent, PortError, FirmwareError, SilenceError or PrinterError; the heaters are
+    A set stop flag of the control ends the print: feeding stops, moves are stopped, heaters and fan go off, the tip is lifted,
+    nothing homes or turns; the Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises
+    LocalProtocolError for a line that cannot be sent, PortError, FirmwareError, SilenceError or PrinterError; the heaters are
     switched off first and the message says whether the printer confirmed it.
     """
     if isinstance(lines, str):
         lines = lines.splitlines()
+    limit = LINE_LIMIT if profile is None else dialect_of(profile.machine).longest_line
     total = None
     if not isinstance(lines, Iterator):
         total = sum(1 for number, line in enumerate(lines, 1) if command_of(line, number, limit))
-    plan = StreamPlan(total, schedule, limit, profile)
-    feed = Feed(plan, control=control, journal=journal, on_progress=on_progress, stop=stop, start_s=medium.now_s())
-    finder = _PortFinder(feed, port, baud, medium)
-    wire = medium.open(port, baud)
-    rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
-    exchange = Exchange(
-        wire, medium, timing=timing or Timing(), on_event=feed.handle_event, on_turn=feed.handle_turn, on_lost=finder,
-        limit=limit, rx_bytes=rx_bytes, baud=baud,
-    )  # fmt: skip
-    feed.exchange = exchange
+    feed = Feed(
+        profile, limit, total, control=control or Control(), journal=journal, on_progress=on_progress, start_s=medium.now_s()
+    )
+    printing = _Print(feed, port, baud, medium, journal)
     try:
-        return _Print(feed, exchange, medium, journal).run(lines, begin)
+        return printing.run(lines, begin)
     finally:
-        exchange.wire.close()
+        printing.exchange.wire.close()
 
 
-class _PortFinder:
-    """Waits for a lost port. A firmware that cannot be asked by line number is asked for its place instead."""
+class _Print:
+    """A print at a port: what finds the port again when it is lost, and the ways to end, each leaving the printer safe."""
 
-    def __init__(self, feed: Feed, port: str, baud: int, medium: Medium) -> None:
-        self._feed, self._name, self._baud, self._medium = feed, stable_name(port), baud, medium
+    def __init__(self, feed: Feed, port: str, baud: int, medium: Medium, journal: Journal | None) -> None:
+        self._name, self._baud = stable_name(port), baud
         self._device = find_device(port, medium.devices())
         self._path = "" if self._device is None else self._device.path
+        profile = feed.profile
+        rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
+        wire = medium.open(port, baud)
+        connection = Connection(medium.timing, medium.now_s(), limit=feed.limit, rx_bytes=rx_bytes, baud=baud)
+        self.exchange = Exchange(
+            wire, medium, connection, on_event=feed.handle_event, on_turn=feed.handle_turn, on_lost=self._reconnect
+        )
+        feed.exchange = self.exchange
+        self.feed, self.medium, self.journal = feed, medium, journal
+        self._guard = HeaterGuard(self.exchange, lambda: feed.started, feed.pending.heed_emergency)
 
     def _find(self) -> str | None:
         """The name of the printer's port now. A device that USB tells nothing of is looked for under its own name only."""
         if self._device is None or not self._device.model:
             return self._name
-        device = find_again(self._device, self._medium.devices())
+        device = find_again(self._device, self.medium.devices())
         if device is None:
             return None
         self._path = device.path
         return device.name
 
-    def __call__(self, error: PortError) -> Reconnection:
-        before = self._path
-        reconnection = self._reconnect(error)
+    def _reconnect(self, error: PortError) -> tuple[Wire, bool | None]:
+        """Wait for a lost port. A firmware that cannot be asked by line number is asked for its place instead."""
+        feed, before = self.feed, self._path
+        wire, done = self._reopen(error)
         if self._path != before:
-            self._feed.set_state(self._feed.state, f"the printer has come back at {self._path}")
-        return reconnection
+            feed.set_state(feed.state, f"the printer has come back at {self._path}")
+        return wire, done
 
-    def _reconnect(self, error: PortError) -> Reconnection:
-        feed, medium = self._feed, self._medium
-        feed.exchange.wire.close()
+    def _reopen(self, error: PortError) -> tuple[Wire, bool | None]:
+        feed, medium = self.feed, self.medium
+        self.exchange.wire.close()
         end_s = medium.now_s() + medium.lost_s
         with feed.in_state(PrintState.RECONNECTING, f"{error}; waiting {medium.lost_s:.0f} s for it to come back"):
             while (wire := reopen(self._find, self._baud, medium, feed.poll, end_s)) is not None:
-                if feed.exchange.connection.greeting.firmware.line.resends:
-                    return Reconnection(wire, None)
-                feed.exchange.wire = wire  # whoever cancels meanwhile wants the heaters off
+                if self.exchange.connection.greeting.firmware.line.resends:
+                    return wire, None
+                self.exchange.wire = wire  # whoever cancels meanwhile wants the heaters off
                 try:
-                    return Reconnection(wire, self._line_was_done(query_status(wire, medium, feed.poll)))
+                    return wire, self._line_was_done(query_status(wire, medium, feed.poll))
                 except PortError:  # a plug that is still loose, or a printer that has stopped reading
                     wire.close()
         raise PortError(f"{error}; it did not come back within {medium.lost_s:.0f} s")
 
     def _line_was_done(self, status: PrinterStatus) -> bool | None:
         """Whether the one line of the program on its way has been done, by where the printer stands; None: nobody can say."""
-        window, history = self._feed.exchange.connection.window, self._feed.history
+        window, history = self.exchange.connection.window, self.feed.history
         step, waiting = history.only_unanswered, [line.number for line in window.flight if not line.asks_temperature]
         if step is None or waiting != [step.number]:
             return None
-        return line_was_done(window.command(step.number), history.pose, self._feed.modal, status)
-
-
-@dataclass
-class _Print:
-    """The ways a print can end, each leaving the printer safe."""
-
-    feed: Feed
-    exchange: Exchange
-    medium: Medium
-    journal: Journal | None
-
-    def __post_init__(self) -> None:
-        self._guard = HeaterGuard(self.exchange, lambda: self.feed.started, self.feed.heed_emergency)
+        return line_was_done(window.command(step.number), history.pose, self.feed.modal, status)
 
     def run(self, lines: Iterable[str], begin: Callable[[PrinterStatus], ResumePoint] | None) -> Outcome:
         start_s = self.medium.now_s()
@@ -166,10 +153,11 @@ class _Print:
     def _run(self, lines: Iterable[str], begin: Callable[[PrinterStatus], ResumePoint] | None) -> Heaters | None:
         """The print, and what its end has left of the heaters; None when the program has run to its own end, or not begun."""
         try:
+            resume_point = None
             if begin is not None:
-                self.feed.resume_point = begin(query_status(self.exchange.wire, self.medium, self.feed.poll))
+                resume_point = begin(query_status(self.exchange.wire, self.medium, self.feed.poll))
             self.exchange.greet()
-            self.feed.run(lines)
+            self.feed.run(lines, resume_point)
         except CancelledError:
             return self._cancel()
         except EmergencyError:
@@ -221,7 +209,7 @@ class _Print:
             move = feed.lift_move() if heaters is Heaters.OFF and alive else None
             if move is not None:
                 with suppress(PortError):
-                    feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.heed_emergency))
+                    feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.pending.heed_emergency))
         except EmergencyError:
             raise FirmwareError(self._stop()) from None
         return heaters
@@ -242,7 +230,7 @@ class _Print:
         return Outcome(
             cancelled=not feed.finished,
             sent=feed.sent,
-            acknowledged=feed.acknowledged,
+            acknowledged=feed.history.commands,
             repeated=self.exchange.connection.resends.repeated,
             elapsed_s=self.medium.now_s() - start_s,
             firmware=feed.reports.firmware,

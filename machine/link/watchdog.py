@@ -1,17 +1,17 @@
 """Watchdog: what a printer reports while it prints, and what of it ends the print: temperatures that stay away from their target
-or are reported no more, cold extrusion, a wish to be disconnected.
+or are no longer reported, cold extrusion, a request to be disconnected.
 
 A firmware guards its heaters itself (Marlin: 40 s beyond 4 K, 20 s without a rise of 2 K); the bounds here are wider, so that
 this one speaks only where the firmware's is missing or does not see the fault.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 
 from machine.gcode.commands import command_named
 from machine.gcode.words import split_command
 from machine.link.pending_commands import Command, PendingCommand
-from machine.link.protocol import events
+from machine.link.protocol.events import Event, Kind, Temperature
 from profiles.errors import PrinterError
 
 SILENCE_S = 120.0  # a report is asked for every few seconds: that many questions do not stay unanswered by chance
@@ -54,21 +54,50 @@ class HeaterWatch:
             )
 
 
-@dataclass
-class Watchdog:
-    """check() every report, check_silence() now and then. most_c: what nozzle and bed must never exceed by far, deg C."""
+class PrinterReports:
+    """The printer's own reports, judged as they come: read() every event, check_silence() now and then.
 
-    most_c: tuple[float, float] = (inf, inf)
-    reported_s: float | None = None
-    _heaters: tuple[HeaterWatch, ...] = field(
-        default_factory=lambda: (HeaterWatch("nozzle", 20.0, 60.0), HeaterWatch("bed", 15.0, 180.0, 1.0))
-    )
+    most_c: what nozzle and bed must never exceed by far, deg C. temperature_s: when the newest temperature came; unknown:
+    commands that the firmware does not know; waiting: what a person at the printer is waited for, "" when for nothing.
+    """
 
-    def check(self, report: events.Temperature, now_s: float) -> None:
-        """Judge a report. Raises PrinterError."""
-        self.reported_s = now_s
+    def __init__(self, now_s: float, most_c: tuple[float, float] = (inf, inf)) -> None:
+        self.temperature, self.firmware, self.temperature_s = Temperature(), "unknown", now_s
+        self.unknown: set[str] = set()
+        self.waiting = ""
+        self._warned: dict[str, int] = {}
+        self._most_c = most_c
+        self._heaters = HeaterWatch("nozzle", 20.0, 60.0), HeaterWatch("bed", 15.0, 180.0, 1.0)
+        self._silent_since_s: float | None = None  # None: nothing was ever reported
+
+    def read(self, event: Event, now_s: float) -> PendingCommand | None:
+        """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
+        if event.kind is Kind.OK:
+            self.waiting = ""
+        elif event.kind is Kind.BUSY:
+            # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
+            self.waiting = "the printer waits for a person: look at its display" if "paused for" in event.text else ""
+        if event.temperature is not None:
+            self._check(event.temperature, now_s)
+        if event.identity:
+            self.firmware = event.identity.removeprefix("FIRMWARE_NAME:").strip()
+        elif unknown := event.unknown_command:
+            self.unknown.add(unknown)
+            # Marlin has M73 and M486 only where it was built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS
+            # (Configuration_adv.h), which it is not unless somebody asks for them.
+            if not command_named(unknown).shows:
+                self._warn(f"Unknown command: {unknown}")
+        elif event.kind is Kind.ECHO:
+            self._read_echo(event.text)
+        elif event.kind is Kind.ACTION:
+            return self._read_action(event.text)
+        return None
+
+    def _check(self, report: Temperature, now_s: float) -> None:
+        """Judge the temperatures. Raises PrinterError."""
+        self.temperature, self.temperature_s, self._silent_since_s = report, now_s, now_s
         pairs = ((report.nozzle_c, report.nozzle_target_c), (report.bed_c, report.bed_target_c))
-        for heater, most_c, (now_c, target_c) in zip(self._heaters, self.most_c, pairs, strict=True):
+        for heater, most_c, (now_c, target_c) in zip(self._heaters, self._most_c, pairs, strict=True):
             heater.over = heater.over + 1 if now_c is not None and now_c > most_c + OVER_LIMIT_C else 0
             if heater.over >= OVER_REPORTS:
                 raise PrinterError(f"the {heater.name} is at {now_c:.0f} °C: this machine allows at most {most_c:g}")
@@ -79,50 +108,11 @@ class Watchdog:
         """Judge silence while a heater is on; raises PrinterError. A printer that never reported anything is not judged, nor one
         that cannot report now (mute).
         """
-        if mute and self.reported_s is not None:
-            self.reported_s = now_s
-        silent_s = 0.0 if self.reported_s is None else now_s - self.reported_s
+        if mute and self._silent_since_s is not None:
+            self._silent_since_s = now_s
+        silent_s = 0.0 if self._silent_since_s is None else now_s - self._silent_since_s
         if silent_s > SILENCE_S and any(heater.target_c for heater in self._heaters):
             raise PrinterError(f"the printer has reported no temperature for {silent_s:.0f} s although a heater is on")
-
-
-class PrinterReports:
-    """read() every event; temperature_s: when the newest temperature came; unknown: commands that the firmware does not know;
-    waiting: what a person at the printer is waited for, "" when for nothing.
-    """
-
-    def __init__(self, watchdog: Watchdog, now_s: float) -> None:
-        self.temperature, self.firmware, self.temperature_s = events.Temperature(), "unknown", now_s
-        self.unknown: set[str] = set()
-        self.waiting = ""
-        self._warned: dict[str, int] = {}
-        self.watchdog = watchdog
-
-    def read(self, event: events.Event, now_s: float) -> PendingCommand | None:
-        """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
-        if isinstance(event, events.PlainOk):  # nearly every answer
-            self.waiting = ""
-            return None
-        if isinstance(event, events.Ok | events.Busy):
-            # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
-            paused = isinstance(event, events.Busy) and "paused for" in event.text
-            self.waiting = "the printer waits for a person: look at its display" if paused else ""
-        if report := events.temperature_in(event):
-            self.temperature, self.temperature_s = report, now_s
-            self.watchdog.check(report, now_s)
-        if identity := events.identity_in(event):
-            self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
-        elif unknown := events.unknown_command(event):
-            self.unknown.add(unknown)
-            # Marlin has M73 and M486 only where it was built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS
-            # (Configuration_adv.h), which it is not unless somebody asks for them.
-            if not command_named(unknown).shows:
-                self._warn(f"Unknown command: {unknown}")
-        elif isinstance(event, events.Echo):
-            self._read_echo(event.text)
-        elif isinstance(event, events.Action):
-            return self._read_action(event)
-        return None
 
     def leaves_out(self, command: str) -> bool:
         """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""
@@ -144,12 +134,13 @@ class PrinterReports:
         if any(word in text for word in WARNS):
             self._warn(text)
 
-    def _read_action(self, action: events.Action) -> PendingCommand | None:
-        if action.name == "disconnect":
+    def _read_action(self, action: str) -> PendingCommand | None:
+        name = action.partition(" ")[0]
+        if name == "disconnect":
             raise PrinterError("the printer asked to be disconnected (//action:disconnect)")
-        if action.name not in ASKS and action.name not in SILENT:
-            self._warn(f"action {action.name} {action.words}".strip())
-        return PendingCommand(ASKS[action.name]) if action.name in ASKS else None
+        if name not in ASKS and name not in SILENT:
+            self._warn(f"action {action}")
+        return PendingCommand(ASKS[name]) if name in ASKS else None
 
     def _warn(self, text: str) -> None:
         if text in self._warned or len(self._warned) < WARNINGS:

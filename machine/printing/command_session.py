@@ -1,14 +1,14 @@
 """Command session: single commands to a printer over the same protocol as a print, and a safe end of it."""
 
 from types import TracebackType
-from typing import Self
+from typing import NoReturn, Self
 
 from machine.gcode.words import split_command
-from machine.link.exchange import Exchange, Reconnection
+from machine.link.exchange import Exchange
 from machine.link.medium import SERIAL, Medium, Wire
-from machine.link.protocol.events import Event, Ok, Position, Temperature, position_in, unknown_command
+from machine.link.protocol.connection import Connection
+from machine.link.protocol.events import Event, Temperature
 from machine.link.protocol.framing import LINE_LIMIT, command_of
-from machine.link.protocol.timeout import Timing
 from machine.link.shutdown import HeaterGuard, Heaters, shows_off
 from profiles.errors import FirmwareError, PortError, PrinterError
 
@@ -38,11 +38,10 @@ class CommandSession:
         self._limit = limit
         self._ordered: type[LeftError | StopError] | None = None
         self.heat = Temperature()
-        self.position: Position | None = None
+        self.position: dict[str, float] | None = None
         self._command = ""
-        self.exchange = Exchange(
-            wire, medium, timing=Timing(), on_event=self._heard, on_turn=self._turned, on_lost=self._lost, limit=limit
-        )
+        connection = Connection(medium.timing, medium.now_s(), limit=limit)
+        self.exchange = Exchange(wire, medium, connection, on_event=self._heard, on_turn=self._turned, on_lost=self._lost)
 
     def __enter__(self) -> Self:
         return self
@@ -114,12 +113,9 @@ class CommandSession:
         return self.exchange.greeted and self.exchange.connection.fault is None and window.acknowledged == window.sent
 
     def _heard(self, event: Event) -> None:
-        self.position = position_in(event) or self.position
-        if isinstance(event, Ok):
-            self.heat = event.temperature or self.heat
-        elif isinstance(event, Temperature):
-            self.heat = event
-        elif unknown_command(event) and self.exchange.greeted:
+        self.position = event.position or self.position
+        self.heat = event.temperature or self.heat
+        if event.unknown_command and self.exchange.greeted:
             self.unknown.append(self._command)
 
     def _turned(self, now_s: float) -> None:
@@ -135,5 +131,5 @@ class CommandSession:
             self._ordered = None
             raise StopError
 
-    def _lost(self, error: PortError) -> Reconnection:
+    def _lost(self, error: PortError) -> NoReturn:
         raise error

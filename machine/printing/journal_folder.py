@@ -1,9 +1,7 @@
 """Journal folder: where the journals of prints are, each with its program beside it, the newest ones only."""
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import datetime
 from os.path import isfile, lexists
 from pathlib import Path
 from time import time
@@ -12,6 +10,7 @@ from machine.gcode.lines import GcodeFile
 from machine.link.journal import LONGEST_BYTES, Checkpoint, Journal, JournalHeading, is_being_printed, read_journal
 from machine.pipeline.output import PROGRAM, program_beside, write_lines
 from profiles.errors import JournalError, OutputError, reason
+from profiles.files import dated_name, keep_newest, modified_s
 from profiles.folders import state_folder
 from profiles.profile import Profile
 
@@ -65,12 +64,12 @@ class ResumableJournal:
 def resumable_journals() -> list[ResumableJournal]:
     """The newest first; those that cannot be read, are being printed, are resumed already or have lost their program are left
     out."""
-    return [journal for journal in map(_resumable, _newest_first(_folder())) if journal is not None]
+    return [journal for journal in map(_resumable, sorted(_journals(_folder()), reverse=True)) if journal is not None]
 
 
 def _resumable(path: Path) -> ResumableJournal | None:
     try:
-        story, written_s = read_journal(path), path.stat().st_mtime
+        story, written_s = read_journal(path), modified_s(path)
     except (JournalError, OSError):
         return None
     last, heading = story.last, story.heading
@@ -87,8 +86,8 @@ def _folder() -> Path:
     return state_folder() / "journals"
 
 
-def _newest_first(folder: Path) -> list[Path]:
-    return sorted((path for path in folder.glob("*.journal") if isfile(path)), reverse=True)
+def _journals(folder: Path) -> list[Path]:
+    return [path for path in folder.glob("*.journal") if isfile(path)]
 
 
 def _new_path(name: str) -> Path:
@@ -96,30 +95,33 @@ def _new_path(name: str) -> Path:
     folder = _folder()
     try:
         folder.mkdir(0o700, exist_ok=True)
-        _thin(folder)
+        _delete_oldest(folder)
     except OSError as error:
         raise OutputError(f"folder {folder} cannot be written: {reason(error)}") from None
     plain = "".join(c if c.isalnum() and c.isascii() else "-" for c in name)[:40].strip("-") or "print"
-    return folder / f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}-{plain}.journal"
+    return folder / f"{dated_name()}-{plain}.journal"
 
 
-def _thin(folder: Path) -> None:
+def _delete_oldest(folder: Path) -> None:
     """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is
     left that names it, a new one only with its journal."""
-    gone = [old for old in _newest_first(folder)[KEPT - 1 :] if not is_being_printed(old)]
-    ended = b"".join(map(_first_line, gone))
-    for old in gone:
-        old.unlink(missing_ok=True)
-    headings = b"".join(map(_first_line, _newest_first(folder)))
+    journals = _journals(folder)
+    before = b"".join(map(_first_line, journals))
+    kept = keep_newest(journals, KEPT - 1, _name, is_being_printed)
+    after = b"".join(map(_first_line, kept))
     for program in folder.glob(f"*{PROGRAM}"):
         name = program.name.encode()
-        if name not in headings and (name in ended or not _is_new(program)):
+        if name not in after and (name in before or not _is_new(program)):
             program.unlink(missing_ok=True)
+
+
+def _name(journal: Path) -> str:
+    return journal.name
 
 
 def _is_new(program: Path) -> bool:
     try:
-        return time() - program.stat().st_mtime < BEGUN_S
+        return time() - modified_s(program) < BEGUN_S
     except FileNotFoundError:  # another process was quicker
         return False
 

@@ -26,7 +26,6 @@ from machine.link.pending_commands import CancelledError
 from machine.link.resume import (
     PARKED,
     InterruptedPrint,
-    ResumePlan,
     ResumePoint,
     heights_mm,
     is_in_doubt,
@@ -138,8 +137,8 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
                 way = plan_resume(point, status, cut_off.profile)
             if person.ask(_question(way, point, cut_off.profile)) is None:
                 raise CancelledError
-            _hand_over(cut_off, further, way.start.line - 1)
-            return way.start
+            _hand_over(cut_off, further, way.line - 1)
+            return way
 
         title = f"the rest of {rest.name} to {cut_off.at.name}"
         with new_log("print", title, job.log) as log:
@@ -221,9 +220,9 @@ def _height_question(point: InterruptedPrint) -> str:
     return f"the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
 
 
-def _question(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> str:
+def _question(way: ResumePoint, point: InterruptedPrint, profile: Profile) -> str:
     """What is going to be done, and what the person must make sure of."""
-    reason = f"it goes on with line {way.start.line}: {way.reason}"
+    reason = f"it goes on with line {way.line}: {way.reason}"
     if not way.homes:
         return reason
     (x, y, z), pose = position_at_interruption(point, profile)

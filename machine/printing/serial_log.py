@@ -3,7 +3,7 @@
 import os
 import time
 from collections import deque
-from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from io import BufferedWriter
@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Self
 
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
-from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event, unknown_command
+from machine.link.protocol.events import Kind, read_event
+from machine.notices import say
 from profiles.errors import reason
+from profiles.files import dated_name, keep_newest
 from profiles.folders import state_folder
 
 KEPT = 10  # logs of each kind
@@ -49,6 +51,11 @@ class SerialLog:
         if len(self._unwritten) >= UNWRITTEN or now_s > self._due_s:
             self._due_s = now_s + UNWRITTEN_S
             self._flush()
+
+    def say_trouble(self, what: str = "the traffic") -> None:
+        """Tell the person when nothing can be logged. what: that would be."""
+        if self.trouble:
+            say(f"{what} is not logged: {self.file}: {self.trouble}")
 
     def remark(self, text: str) -> None:
         """Add a line of this program's own."""
@@ -183,22 +190,14 @@ def new_log(kind: str, title: str, file: Path | None = None) -> SerialLog:
     if file is not None:
         return SerialLog(file, title)
     folder = state_folder() / "logs"
-    try:
+    with suppress(OSError):  # what cannot be deleted stays; the log itself says whether it can be written
         folder.mkdir(0o700, exist_ok=True)
-        _thin(folder.glob(f"{kind}-*.log"))
-    except OSError:  # what cannot be thinned stays; the log itself says whether it can be written
-        pass
-    return SerialLog(folder / f"{kind}-{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}.log", title)
-
-
-def _thin(files: Iterable[Path]) -> None:
-    """Leave room for one more: delete all but the newest KEPT - 1 logs, each with its pieces."""
-    pieces: dict[str, list[Path]] = {}
-    for file in files:
-        pieces.setdefault(file.name.partition(".")[0], []).append(file)
-    for name in sorted(pieces, reverse=True)[KEPT - 1 :]:
-        for file in pieces[name]:
-            file.unlink(missing_ok=True)
+        files = [*folder.glob(f"{kind}-*.log")]
+        kept = keep_newest((file for file in files if "." not in file.stem), KEPT - 1, lambda file: file.name)
+        for file in files:  # a piece goes with the beginning of its log
+            if file.with_name(f"{file.stem.partition('.')[0]}.log") not in kept:
+                file.unlink(missing_ok=True)
+    return SerialLog(folder / f"{kind}-{dated_name()}.log", title)
 
 
 class PrinterMessages:
@@ -238,10 +237,10 @@ class PrinterMessages:
 def printer_message(line: bytes) -> str:
     """What a line tells a person, "" for reports and answers."""
     event = read_event(line)
-    if isinstance(event, Start):
+    if event.kind is Kind.START:
         return "the printer has started"
-    if isinstance(event, Action):
-        return f"the printer asks: {event.name} {event.words}".rstrip()
-    if unknown := unknown_command(event):
+    if event.kind is Kind.ACTION:
+        return f"the printer asks: {event.text}"
+    if unknown := event.unknown_command:
         return f"Unknown command: {unknown}"
-    return event.text if isinstance(event, Echo | FirmwareFault | LineError | Unknown) else ""
+    return event.text if event.kind in (Kind.ECHO, Kind.FAULT, Kind.LINE_ERROR, Kind.UNKNOWN) else ""

@@ -7,12 +7,10 @@ from itertools import chain
 from math import inf, isfinite
 
 from machine.dryrun.timeline import Timeline
-from machine.firmware import dialect_of
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal
 from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
-from machine.link.progress import Schedule
 from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
@@ -148,26 +146,26 @@ def stream_program(
         if begun:
             tell(None)
 
+        first = 1
+
         def begin_then_show(status: PrinterStatus) -> ResumePoint:
-            nonlocal begun
+            nonlocal begun, first
             assert begin is not None
             start = begin(status)
-            begun = True
+            begun, first = True, start.line
             tell(None)
             return start
 
         def on_progress(status: PrintStatus) -> None:
             if begun:
-                tell(replace(status, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))
+                left_s = time_left_s(timeline.remaining_s, first, status, pace)
+                tell(replace(status, left_s=left_s, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))
 
         return print_lines(
             loaded.program.lines,
             at.name,
             at.baud,
             on_progress=on_progress,
-            stop=person.stop,
-            schedule=Schedule(timeline.remaining_s, pace),
-            limit=dialect_of(loaded.profile.machine).longest_line,
             control=person.commands,
             profile=loaded.profile,
             medium=tap(traffic),
@@ -176,11 +174,23 @@ def stream_program(
         )
 
 
+def time_left_s(remaining_s: Callable[[int], float], first: int, status: PrintStatus, pace: float | None) -> float | None:
+    """Time left of a print that began with a line of its file; None where nothing is known yet.
+
+    remaining_s: what is left of the program after a line, s, at its own feed rates. pace: seconds of the print that pass in one
+    of the clock; None: as many as have so far, whatever the feed.
+    """
+    left_s = remaining_s(status.file_line)
+    if pace is not None:
+        return left_s / pace * 100.0 / status.feed_percent
+    done_s = remaining_s(first - 1) - left_s
+    return left_s * status.elapsed_s / done_s if done_s > 0 else None
+
+
 @contextmanager
 def _pointing_to(log: SerialLog) -> Iterator[None]:
     """Say where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
-    if log.trouble:
-        say(f"the traffic is not logged: {log.file}: {log.trouble}")
+    log.say_trouble()
     try:
         yield
     except PrinterError:

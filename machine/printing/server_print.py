@@ -10,8 +10,7 @@ from time import monotonic
 from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
-from machine.link.print_state import PrintState, PrintStatus, last_known
-from machine.link.progress import ProgramPosition
+from machine.link.print_state import PrintState, PrintStatus, ProgramPosition, last_known
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import (
@@ -45,8 +44,7 @@ LIMITS = (
 def server_session(server: Server, title: str, kind: str, file: Path | None = None) -> Iterator[tuple[PrintServer, SerialLog]]:
     """A session with a server and the log of it, without keys. kind, file: of the log. Raises ServerError, ProfileError."""
     with new_log(kind, title, file) as record:
-        if record.trouble:
-            say(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
+        record.say_trouble("what is asked and answered")
         with open_server(server, record.note) as session:
             yield session, record
 

@@ -134,7 +134,8 @@ class Heater:
 
 
 class Board:
-    """now_s is virtual; say() adds a line to what the host will read. kept_moves: kept on record, None: all.
+    """Motion, heaters and fan of the printer. now_s is virtual; say() adds a line to the answers. kept_moves: kept on record,
+    None: all.
 
     table: what a probe meets; None: the machine has no probe.
     """
@@ -166,7 +167,7 @@ class Board:
     def forget(self) -> None:
         """The board restarts."""
         self.powered, self.must_home = True, self.build.must_home
-        self.idle_after_s = self.rules.idle.after_s if self.rules.idle is not None else inf
+        self.idle_after_s = self.rules.idle_after_s
         self.awake_s = 0.0  # what is no move has kept the motors on until then
         self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = self.homes = False
         self.report_every_s = self.position_every_s = 0.0
@@ -211,13 +212,12 @@ class Board:
         return since_s + self.idle_after_s
 
     def idle(self) -> None:
-        """Nothing has moved for so long."""
+        """The idle time is over: motors off, and heaters where the firmware shuts down."""
         self.motion.planner.run(self.now_s)
-        idle = self.rules.idle
-        if idle is None or self.idle_s > self.now_s:  # a move that was planned has begun meanwhile
+        if self.idle_s > self.now_s:  # a move that was planned has begun meanwhile
             return
-        self.let_go(range(idle.axes))
-        if idle.shuts_down:
+        self.let_go(range(self.rules.idle_axes))
+        if self.rules.idle_shuts_down:
             self.nozzle.set(0.0, self.now_s)
             self.bed.set(0.0, self.now_s)
             self.motion.homed.clear()

@@ -3,11 +3,12 @@
 import random
 from collections import deque
 from collections.abc import Iterator
-from heapq import heapify, heappop, heapreplace
+from heapq import merge
+from itertools import repeat
 from math import inf
 
 from machine.firmware.firmware import BYTE_BITS
-from machine.simulator.faults import OK_KINDS, Fault, FaultScript
+from machine.simulator.faults import OK_KINDS, Fault, FaultScript, Unit
 from machine.simulator.firmware import SimulatedFirmware
 
 ERROR = "Error:Heating failed, system stopped! Heater_ID: 0"
@@ -18,28 +19,21 @@ LATE_S = 1e-9  # the firmware is asked this much late, because a clock in anothe
 class _FaultQueue:
     """Where faults strike that count the same thing, in order."""
 
-    def __init__(self, script: FaultScript, indices: list[int]) -> None:
-        self._script = script
-        self._heap: list[tuple[int, int, Iterator[int]]] = []
-        for index in indices:
-            strikes = script.strikes(index)
-            self._heap.append((next(strikes), index, strikes))
-        heapify(self._heap)
+    def __init__(self, script: FaultScript, unit: Unit, to_host: bool | None = None) -> None:
+        chosen = [k for k, fault in enumerate(script.faults) if fault.counted == unit and to_host in (None, fault.to_host)]
+        self._faults = script.faults
+        self._strikes = merge(*(zip(script.strikes(k), repeat(k), strict=False) for k in chosen))
+        self._next = next(self._strikes, None)
 
     def __bool__(self) -> bool:
-        return bool(self._heap)
+        return self._next is not None
 
     def before(self, end: int) -> Iterator[tuple[int, Fault]]:
         """Places below `end` with their faults; they are used up."""
-        heap = self._heap
-        while heap and heap[0][0] < end:
-            strike, index, strikes = heap[0]
-            next_strike = next(strikes, None)
-            if next_strike is None:
-                heappop(heap)
-            else:
-                heapreplace(heap, (next_strike, index, strikes))
-            yield strike, self._script.faults[index]
+        while self._next is not None and self._next[0] < end:
+            place, index = self._next
+            self._next = next(self._strikes, None)
+            yield place, self._faults[index]
 
 
 class _Direction:
@@ -81,9 +75,9 @@ class Cable:
         script = script or FaultScript()
         self._speed = speed
         self._firmware = firmware
-        self._in = _Direction(_fault_queue(script, "byte", False))
-        self._out = _Direction(_fault_queue(script, "byte", True))
-        self._answers, self._lines = _fault_queue(script, "answer"), _fault_queue(script, "line")
+        self._in = _Direction(_FaultQueue(script, "byte", False))
+        self._out = _Direction(_FaultQueue(script, "byte", True))
+        self._answers, self._lines = _FaultQueue(script, "answer"), _FaultQueue(script, "line")
         self._clean = not script.faults
         self._rng = random.Random(script.seed)
         self._answered = 0
@@ -232,11 +226,6 @@ class Cable:
         if fault.kind == "error":
             return f"{fault.text or ERROR}\n".encode("latin-1")
         return fault.text.encode("latin-1") or bytes(self._rng.choice(range(128, 256)) for _ in range(GARBAGE_BYTES))
-
-
-def _fault_queue(script: FaultScript, unit: str, to_host: bool | None = None) -> _FaultQueue:
-    chosen = [k for k, fault in enumerate(script.faults) if fault.counted == unit and to_host in (None, fault.to_host)]
-    return _FaultQueue(script, chosen)
 
 
 def _damaged_ok(fault: Fault, line: bytes) -> bytes:

@@ -96,7 +96,7 @@ def _dwell(board: Board, order: Order) -> Iterator[float]:
     until_s = board.now_s + max(0.0, _seconds(order.words))
     while board.now_s < until_s:
         yield until_s
-    if board.rules.idle is not None and board.rules.idle.shuts_down:
+    if board.rules.idle_shuts_down:
         board.awake_s = board.now_s
 
 
@@ -131,10 +131,7 @@ def _home(board: Board, order: Order) -> Iterator[float]:
 
 
 def _home_by_macro(board: Board, order: Order) -> Iterator[float]:
-    return _home_letters(board, order.name.upper().removeprefix("HOME_"))
-
-
-def _home_letters(board: Board, letters: str) -> Iterator[float]:
+    letters = order.name.upper().removeprefix("HOME_")
     return _seek_endstops(board, [axis for axis, letter in enumerate(board.motion.letters[:5]) if letter in letters])
 
 
@@ -148,30 +145,22 @@ def _seek_endstops(board: Board, axes: Sequence[int]) -> Iterator[float]:
     board.note("homed " + "".join(board.motion.letters[axis] for axis in axes))
 
 
-def _probe(board: Board, order: Order) -> Work:
+def _probe(board: Board, order: Order) -> Iterator[float]:
     """G38.3: down to a Z or to contact, as Marlin's gcode/probe/G38.cpp and RepRapFirmware's straight probe do."""
     if board.table is None:
         board.refuse(order.text)
-        return None
-    return _probe_to(board, {letter: value for letter, value in order.words.items() if letter in "ZF"})
-
-
-def _probe_to(board: Board, words: WordValues) -> Iterator[float]:
+        return
     yield from wait_for_moves(board)
-    yield from _seek_contact(board, board.motion.target(words))
+    yield from _seek_contact(board, board.motion.target({letter: v for letter, v in order.words.items() if letter in "ZF"}))
 
 
-def _probe_by_macro(board: Board, order: Order) -> Work:
+def _probe_by_macro(board: Board, order: Order) -> Iterator[float]:
     """PROBE, as klippy/extras/probe.py and homing.py word it; the probe's own offset in the configuration is 0."""
     if board.table is None:
         board.refuse("PROBE")
-        return None
-    return _probe_down(board, _number(order, "PROBE_SPEED", 5.0))
-
-
-def _probe_down(board: Board, speed_mm_s: float) -> Iterator[float]:
+        return
     yield from wait_for_moves(board)
-    motion = board.motion
+    motion, speed_mm_s = board.motion, _number(order, "PROBE_SPEED", 5.0)
     if 2 not in motion.homed:
         board.say("!! Must home before probe")
         return
@@ -203,7 +192,7 @@ def _seek_contact(board: Board, target: list[float], feed_mm_s: float | None = N
     return met
 
 
-def _turn(board: Board, order: Order) -> Work:
+def _turn(board: Board, order: Order) -> Iterator[float]:
     """MANUAL_STEPPER: SYNC=0 begins a turn that goes on together with the next one."""
     machine, values = board.machine, order.values
     axes = {stepper_name(machine.tilt): (3, machine.tilt), stepper_name(machine.turn): (4, machine.turn)}
@@ -211,14 +200,16 @@ def _turn(board: Board, order: Order) -> Work:
     if axis is None:
         board.unknown += 1
         board.say(f"!! The value '{values.get('STEPPER', '')}' is not valid for STEPPER")
-        return None
+        return
     if "SET_POSITION" in values:
         board.motion.set_coordinate(index, _number(order, "SET_POSITION"))
     if values.get("STOP_ON_ENDSTOP", "0") != "0":
-        return _home_letters(board, axis.letter)
+        yield from _seek_endstops(board, [index])
+        return
     if "MOVE" in values:
         board.turning[index] = (_number(order, "MOVE"), max(_number(order, "SPEED", axis.speed_deg_s), 1e-3))
-    return _turn_together(board) if board.turning and values.get("SYNC", "1") != "0" else None
+    if board.turning and values.get("SYNC", "1") != "0":
+        yield from _turn_together(board)
 
 
 def _turn_together(board: Board) -> Iterator[float]:
@@ -263,9 +254,9 @@ def _stop(board: Board, order: Order) -> Work:
 
 def _rest(board: Board, order: Order) -> Iterator[float]:
     """M18, M84: motors off; with S only after S idle seconds, 0: never."""
-    idle, words = board.rules.idle, order.words
-    if "S" in words and (idle is None or not idle.shuts_down):
-        if idle is not None:
+    words = order.words
+    if "S" in words and not board.rules.idle_shuts_down:
+        if board.rules.idle_after_s < inf:
             board.idle_after_s, board.awake_s = words["S"] or inf, board.now_s
         return
     yield from wait_for_moves(board)
@@ -430,15 +421,14 @@ def _area(board: Board) -> str:
     return f"area:{{full:{{{reach}}},work:{{{reach}}}}}"
 
 
-def _autoreport_temperatures(board: Board, order: Order) -> Work:
-    board.report_every_s = max(0.0, order.words.get("S", 0.0))
-    board.report_s = board.now_s + board.report_every_s if board.report_every_s else inf
-    return None
-
-
-def _autoreport_position(board: Board, order: Order) -> Work:
-    board.position_every_s = max(0.0, order.words.get("S", 0.0))
-    board.position_s = board.now_s + board.position_every_s if board.position_every_s else inf
+def _autoreport(board: Board, order: Order) -> Work:
+    """M155 temperatures, M154 the position, every S seconds; 0: no more."""
+    every_s = max(0.0, order.words.get("S", 0.0))
+    next_s = board.now_s + every_s if every_s else inf
+    if order.name == "M155":
+        board.report_every_s, board.report_s = every_s, next_s
+    else:
+        board.position_every_s, board.position_s = every_s, next_s
     return None
 
 
@@ -514,8 +504,8 @@ COMMANDS: dict[str, Command] = {  # beside G0 and G1, which wait for a free bloc
     "M118": _send_to_host,
     "M119": _report_endstops,
     "M140": _heat,
-    "M154": _autoreport_position,
-    "M155": _autoreport_temperatures,
+    "M154": _autoreport,
+    "M155": _autoreport,
     "M190": _heat_and_wait,
     "M201": _setting(lambda board, words: board.motion.bound(words, board.motion.accelerations)),
     "M203": _setting(lambda board, words: board.motion.bound(words, board.motion.speeds)),

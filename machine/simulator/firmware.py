@@ -14,7 +14,7 @@ from machine.gcode.words import read_words, split_command
 from machine.simulator.board import Board, BuildOptions, Order, Work
 from machine.simulator.commands import command_of, move
 from machine.simulator.contact import ProbedTable
-from machine.simulator.receiver import EmergencyParser, Receiver
+from machine.simulator.receiver import Receiver
 from machine.simulator.record import Record, record_of
 from profiles.machine import Machine
 
@@ -47,7 +47,7 @@ class SimulatedFirmware:
         self.board.busy_every_s = self._busy_default_s = busy_s if self._build.busy and self._rules.has_build_options else 0.0
         self._receiver = Receiver(self._rules, dialect_of(machine).longest_line, self._build.rx_ring, self._build.checksums)
         self._room = (self._build.queue if self._rules.has_build_options else None) or self._rules.queue_lines
-        self._emergency = EmergencyParser(self._build.realtime) if self._reads_bytes() else None
+        self._reads_bytes = self._rules.urgent == "bytes" and (self._build.emergency_parser or self._build.realtime)
         self._busy_s = self._wait_s = inf
         self._queue: deque[tuple[str, str, str, str]] = deque()  # label of the answer; text; its name and rest
         self._wake_s: float | None = None
@@ -58,15 +58,12 @@ class SimulatedFirmware:
         self._reason = ""  # for which it has stopped
         self.dead = False
 
-    def _reads_bytes(self) -> bool:
-        return self._rules.urgent == "bytes" and (self._build.emergency_parser or self._build.realtime)
-
     def receive(self, data: bytes) -> None:
         """Bytes arrive on the line."""
         if self.dead and not self._rules.after_kill:
             return
-        if self._emergency is not None:
-            for order in self._emergency.read(data):
+        if self._reads_bytes:
+            for order in self._receiver.urgent_orders(data):
                 self._do_urgent(order)
             if self.dead:
                 return
@@ -145,11 +142,6 @@ class SimulatedFirmware:
         """Number of the last numbered line that was taken."""
         return self._receiver.last
 
-    @property
-    def taken(self) -> int:
-        """How many lines were executed."""
-        return self._taken
-
     def record(self) -> Record:
         """What was done so far."""
         return record_of(self.board, self._taken, self._receiver.lost_bytes)
@@ -187,8 +179,6 @@ class SimulatedFirmware:
 
     def _forget(self) -> None:
         self._queue.clear()
-        if self._emergency is not None:
-            self._emergency.forget()
         self._wake_s = self._work = None
         self._busy_s = self._wait_s = inf
         self._watched = self._taken
@@ -243,7 +233,7 @@ class SimulatedFirmware:
             if taken is not None:
                 label, text = taken
                 queue.append((label, text, *split_command(text)))
-                if self._emergency is None and self._rules.urgent == "bytes" and text in URGENT:
+                if not self._reads_bytes and self._rules.urgent == "bytes" and text in URGENT:
                     self._act_at_once(text)
 
     def _run(self) -> None:

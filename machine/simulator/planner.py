@@ -75,7 +75,7 @@ class Block:
 
 
 class ExecutedMoves:
-    """kept_moves: how many moves stay in `rows` at least (twice as many at most); None: all.
+    """The moves that have begun. kept_moves: how many moves stay in `rows` at least (twice as many at most); None: all.
 
     moves, strokes, pushed_mm, moving_s: sums over all of them; strokes push filament while another axis moves.
     """

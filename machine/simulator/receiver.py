@@ -27,7 +27,7 @@ class Receiver:
         self._rules, self._longest, self._rx_ring, self._insists = rules, longest, rx_ring, insists
         self.last = self.lost_bytes = 0
         self.lines: deque[bytes] = deque()
-        self._half = b""
+        self._half = self._urgent_half = b""
         self._read = 0  # bytes of the oldest line that have left the ring
 
     def __len__(self) -> int:
@@ -46,8 +46,22 @@ class Receiver:
             self._half = self._half[:CHECKSUM_BYTES]
         return lines
 
+    def urgent_orders(self, data: bytes) -> list[str]:
+        """What an emergency parser reads: the orders that stand at the begin of lines which end in these bytes; numbers and
+        checksums are not looked at."""
+        scanned = self._urgent_half + data
+        end = scanned.rfind(b"\n") + 1
+        self._urgent_half = scanned[end:][:ORDER_BYTES]
+        if not any(sign in scanned for sign in SIGNS):
+            return []
+        return [order[1].decode() for line in scanned[:end].splitlines() if (order := ORDER.match(line))]
+
     def forget(self) -> None:
-        """What has come is thrown away."""
+        """The board restarts or has stopped: what has come is thrown away."""
+        self._drop()
+        self._urgent_half = b""
+
+    def _drop(self) -> None:
         self.lines.clear()
         self._half = b""
         self._read = 0
@@ -92,7 +106,7 @@ class Receiver:
         """The answer to a bad line; all that has come behind it is thrown away, unless it merely lacks a checksum."""
         if complaint == MISSING:
             return [f"Error: {MISSING}"]
-        self.forget()
+        self._drop()
         return [f"Error:{complaint}, Last Line: {self.last}", f"Resend: {self.last + 1}", *(["ok"] if ok else [])]
 
     def _strip_number(self, line: bytes) -> bytes:
@@ -123,25 +137,3 @@ def _checksum_matches(line: bytes, star: int) -> bool:
     """Whether the checksum behind the star is right; a CRC of five digits (RepRapFirmware) is believed."""
     digits = DIGITS.match(line, star + 1)
     return (0 if digits is None else int(digits[1])) == checksum(line[:star]) or (digits is not None and len(digits[1]) == 5)
-
-
-class EmergencyParser:
-    """realtime: S000, P000 and R000 too (REALTIME_REPORTING_COMMANDS)."""
-
-    def __init__(self, realtime: bool = False) -> None:
-        self._realtime = realtime
-        self._half = b""
-
-    def read(self, data: bytes) -> list[str]:
-        """The orders that stand at the begin of lines which end in these bytes; numbers and checksums are not looked at."""
-        scanned = self._half + data
-        end = scanned.rfind(b"\n") + 1
-        self._half = scanned[end:][:ORDER_BYTES]
-        if not any(sign in scanned for sign in SIGNS):
-            return []
-        orders = [order[1].decode() for line in scanned[:end].splitlines() if (order := ORDER.match(line))]
-        return [order for order in orders if order[0] == "M" or self._realtime]
-
-    def forget(self) -> None:
-        """The board restarts."""
-        self._half = b""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 from math import pi
 
@@ -53,11 +54,6 @@ class Record:
         """Whether an event that begins so is on record."""
         return any(text.startswith(what) for _, text in self.events)
 
-    def paths(self) -> Floats:
-        """(n, 2, 3) every move in the workpiece frame, mm; a move that turns the table is a curve there, these are its ends."""
-        ends = [workpiece_path(self.machine, points[:, :5]) for points in (self.start, self.end)]
-        return np.stack(ends, axis=1)
-
     def deposited(self, filament_diameter_mm: float = 1.75) -> tuple[Floats, Floats]:
         """Strokes: (n, 2, 3) segments in the workpiece frame and (n,) volumes mm3, of moves that push filament while moving."""
         pushed = self.end[:, 5] - self.start[:, 5]
@@ -69,12 +65,10 @@ class Record:
 
 def record_of(board: Board, lines: int, lost_bytes: int) -> Record:
     """The record of a printer's board as it stands."""
-    executed, planner = board.motion.executed, board.motion.planner
-    rows = np.array(executed.rows, dtype=np.float64).reshape(-1, ROW)
-    ahead = [(*b.start, *b.end, b.feed, b.begin_s, b.duration_s) for b in planner.ahead()]
-    table = np.vstack([rows, np.array(ahead, dtype=np.float64).reshape(-1, ROW)])
-    pushed = table[len(rows) :, 11] - table[len(rows) :, 5]
-    strokes = (pushed > EXTRUDES_MM) & (table[len(rows) :, :5] != table[len(rows) :, 6:11]).any(axis=1)
+    planner, moves = board.motion.planner, deepcopy(board.motion.executed)
+    for block in planner.ahead():
+        moves.add(block)
+    table = np.array(moves.rows, dtype=np.float64).reshape(-1, ROW)
     return Record(
         machine=board.machine,
         start=table[:, :6],
@@ -82,11 +76,11 @@ def record_of(board: Board, lines: int, lost_bytes: int) -> Record:
         feed_mm_s=table[:, 12],
         begin_s=table[:, 13],
         duration_s=table[:, 14],
-        first=executed.moves - len(rows),
-        moves=executed.moves + len(ahead),
-        strokes=executed.strokes + int(strokes.sum()),
-        pushed_mm=executed.pushed_mm + float(pushed[strokes].sum()),
-        moving_s=executed.moving_s + float(table[len(rows) :, 14].sum()),
+        first=moves.moves - len(table),
+        moves=moves.moves,
+        strokes=moves.strokes,
+        pushed_mm=moves.pushed_mm,
+        moving_s=moves.moving_s,
         events=tuple(board.events),
         troubles=tuple(board.troubles),
         nozzle_target_c=board.nozzle.target_c,

@@ -34,8 +34,9 @@ class SimulatedPrinter:
     """`with SimulatedPrinter(machine) as printer:` open printer.path with pyserial, look at printer.record afterwards.
 
     speed: virtual seconds in a real one; inf never sleeps, the clock jumps over every wait. faults: what goes wrong; after a
-    disconnection the terminal is gone (reading fails) and comes back at a new printer.path, or behind the same `link` (a symbolic
-    link to keep). tcp: a port number of this computer (0: a free one) instead of a terminal; path is then a socket:// address.
+    disconnection the terminal is gone (reading fails) and comes back at a new printer.path, or behind the same symbolic link.
+    at: the path of that link, or a TCP port number of this computer (0: a free one) instead of a terminal; path is then a
+    socket:// address.
     baud: every byte takes the time of 10 bits, both ways, and what a ring of machine.receive_bytes cannot hold is lost (build
     of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path
     with means nothing. kept_moves: how many moves the record holds at least, None: all (120 bytes a move).
@@ -51,8 +52,7 @@ class SimulatedPrinter:
         *,
         build: BuildOptions | None = None,
         faults: FaultScript | Iterable[Fault] = (),
-        link: Path | None = None,
-        tcp: int | None = None,
+        at: Path | int | None = None,
         baud: int | None = None,
         kept_moves: int | None = None,
         table: ProbedTable | None = None,
@@ -66,13 +66,16 @@ class SimulatedPrinter:
         self._cable = Cable(self._firmware, faults if isinstance(faults, FaultScript) else FaultScript(tuple(faults)), speed)
         self._line = self._cable if baud is None else Uart(self._cable, baud)
         self._lock = threading.Lock()
-        self._link, self._tcp = link, tcp
+        self._at = at
         self._out = b""
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
-        by_terminal = self._tcp is None and (self._link is not None or terminals_exist())
-        self._terminal: Terminal | Server = Terminal(self._link) if by_terminal else Server(self._tcp or 0)
+        self._terminal: Terminal | Server
+        if isinstance(self._at, Path) or (self._at is None and terminals_exist()):
+            self._terminal = Terminal(self._at)
+        else:
+            self._terminal = Server(self._at or 0)
         self._terminal.open()
         self._end, self._wake = socket.socketpair()  # Windows cannot wait for pipes
         self._began_s = monotonic()
@@ -227,7 +230,7 @@ def _leads_to_a_terminal(link: Path) -> bool:
 
 
 class Server:
-    """A TCP port of this computer for one host at a time, others are told so; number 0 takes a free one."""
+    """A TCP port of this computer for one host at a time, others are refused; number 0 takes a free one."""
 
     def __init__(self, number: int) -> None:
         try:

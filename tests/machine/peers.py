@@ -9,6 +9,7 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from time import monotonic
 from types import ModuleType
 
@@ -187,7 +188,7 @@ class Ear:
 
 def hear_out(monkeypatch: pytest.MonkeyPatch, asker: ModuleType, *mute: str) -> None:
     """Let a module ask its ports once, with an ear; mute: ports at which nothing will be said, which are given up soon."""
-    monkeypatch.setattr(identification, "monotonic", Ear.now_s)
+    monkeypatch.setattr(identification, "SERIAL", replace(identification.SERIAL, now_s=Ear.now_s))
     monkeypatch.setattr(identification, "ASK_S", 10 * PATIENCE_S)
     monkeypatch.setattr(identification, "POSITION_S", PATIENCE_S)
     monkeypatch.setattr(identification, "QUICK_S", 0.1 if mute else PATIENCE_S)

@@ -14,7 +14,7 @@ from machine.cli.terminal.interrupts import calling, interrupting
 from machine.cli.terminal.requests import ConsoleRequest
 from machine.firmware import dialect_of
 from machine.firmware.firmware import check_baud
-from machine.link.protocol import events
+from machine.link.protocol.events import Kind, read_event
 from machine.notices import say, show
 from machine.pipeline.output import check_writable, write_json
 from machine.pipeline.requests import STDOUT
@@ -50,11 +50,11 @@ HELP = """What you type is sent, one line after the other is answered. Besides:
   /quit     leave; Ctrl-D and Ctrl-C do too
 """
 DIM, RED, YELLOW, CYAN = "2", "31", "33", "36"
-COLOURS: dict[type[events.Event], str] = {
-    **dict.fromkeys((events.Ok, events.PlainOk, events.Busy), DIM),
-    events.Temperature: CYAN,
-    **dict.fromkeys((events.Echo, events.Action, events.Start, events.Banner), YELLOW),
-    **dict.fromkeys((events.LineError, events.Resend, events.FirmwareFault), RED),
+COLOURS: dict[Kind, str] = {
+    **dict.fromkeys((Kind.OK, Kind.BUSY), DIM),
+    Kind.TEMPERATURE: CYAN,
+    **dict.fromkeys((Kind.ECHO, Kind.ACTION, Kind.START, Kind.BANNER), YELLOW),
+    **dict.fromkeys((Kind.LINE_ERROR, Kind.RESEND, Kind.FAULT), RED),
 }
 
 
@@ -67,8 +67,7 @@ def console(request: ConsoleRequest, machine: Machine) -> int:
     with ExitStack() as stack:
         log = stack.enter_context(new_log("console", f"console at {at.name}", request.log))
         wire = stack.enter_context(open_line(at, machine))
-        if log.trouble:
-            say(f"the traffic is not logged: {log.file}: {log.trouble}")
+        log.say_trouble()
         stack.enter_context(interrupting())
         shown = Shown(request.reports)
 
@@ -275,10 +274,10 @@ class Shown:
                 self._show(line)
 
     def _show(self, line: bytes) -> None:
-        event = events.read_event(line)
-        if isinstance(event, events.Temperature) and not self.reports:
+        event = read_event(line)
+        if event.kind is Kind.TEMPERATURE and not self.reports:
             return
-        if isinstance(event, events.Busy):
+        if event.kind is Kind.BUSY:
             self._busy += 1
             if self._busy > 1:
                 return
@@ -287,7 +286,7 @@ class Shown:
                 self.write(f"(busy {self._busy - 1} more times)")
             self._busy = 0
         text = "".join(c if c.isprintable() else "?" for c in line.decode("ascii", "replace"))
-        colour = COLOURS.get(type(event))
+        colour = COLOURS.get(event.kind)
         self.write(f"\x1b[{colour}m{text}\x1b[0m" if colour and self._colours else text)
 
     def write(self, text: str) -> None:

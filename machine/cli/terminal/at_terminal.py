@@ -41,7 +41,8 @@ class AtTerminal:
     """The `Person` at the terminal. yes: what is asked is answered by yes; follow: told each moment, too."""
 
     def __init__(self, yes: bool = False) -> None:
-        self.commands, self.stop = Control(), Flag()
+        self.stop = Flag()
+        self.commands = Control(self.stop)
         self.follow: Callable[[PrintStatus], None] = lambda status: None
         self._yes, self._board = yes, Keyboard(self.commands)
 

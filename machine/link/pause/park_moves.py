@@ -6,7 +6,7 @@ never move.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot
 
 import numpy as np
@@ -35,27 +35,19 @@ NEAR_MM = 2.0
 STILL_DEG = 0.01
 
 
-@dataclass(frozen=True)
-class ParkMoves:
-    """Commands away from the print, down to it again, and those that push the filament then. park: None where the tip stays
-    because its place is not known or no way is clear.
+def plan_park(
+    modal: ModalState, profile: Profile | None, bounds: PrintedBounds | None
+) -> tuple[list[str], list[str], Park | None]:
+    """How to leave a print that stands at modal's place, all moves over, and how to come back: commands away from the print,
+    and back to it. The third value is None where the tip stays because its place is not known or no way is clear.
     """
-
-    away: tuple[str, ...]
-    down: tuple[str, ...]
-    push: tuple[str, ...]
-    park: Park | None
-
-
-def plan_park(modal: ModalState, profile: Profile | None, bounds: PrintedBounds | None) -> ParkMoves:
-    """How to leave a print that stands at modal's place, all moves over, and how to come back."""
     pull, push = filament_commands(modal, profile)
     up, down, park = _moves(modal, profile, bounds)
     away = ["G21", *pull, "G90", *up]
     standby_c = profile.material.standby_c if profile is not None else None
     if standby_c is not None and profile is not None and pull and standby_c < modal.nozzle_c:
         away.append(dialect_of(profile.machine).nozzle.format(number(standby_c)))
-    return ParkMoves(tuple(away), ("G21", "G90", *down), tuple(push), park)
+    return away, ["G21", "G90", *down, *push], park
 
 
 def lift_move(modal: ModalState, machine: Machine) -> tuple[str, float] | None:

@@ -45,11 +45,11 @@ class Pause:
     def run(self, bounds: PrintedBounds | None, why: str) -> Iterator[tuple[PrintState, str]]:
         """The whole pause: each of its states as it begins, with the words to be shown. bounds: what was printed."""
         modal, bed_c, self.printing_c = self.modal, self.modal.bed_c, self.modal.nozzle_c
-        moves = plan_park(modal, self.profile, bounds)
-        self._send(moves.away)
+        away, back, park = plan_park(modal, self.profile, bounds)
+        self._send(away)
         self.exchange.drain()
-        self.aside = moves.park is not None
-        self.stands = (*moves.park.stand_mm, *modal.at[3:]) if moves.park is not None else modal.coordinates()
+        self.aside = park is not None
+        self.stands = (*park.stand_mm, *modal.at[3:]) if park is not None else modal.coordinates()
         yield PrintState.PAUSED, why
         for words in self._wait(why):
             yield PrintState.PAUSED, words
@@ -63,7 +63,7 @@ class Pause:
         self.exchange.drain()
         self.stands, self.aside = None, False
         yield PrintState.RESUMING, ""
-        self._send((*moves.down, *moves.push, *modal.lines()))
+        self._send((*back, *modal.lines()))
 
     def _wait(self, why: str) -> Iterator[str]:
         """Until the print is to go on; the words to be shown when they change."""

@@ -1,5 +1,5 @@
-"""What the printer's answers tell: which line an `ok` acknowledges, which lines are asked for again, how many questions stay
-unanswered, and how many lines may be on their way.
+"""The meaning of a printer's answers: which line an `ok` acknowledges, which lines are asked for again, how many questions stay
+unanswered.
 
 Most firmwares do not name the line of an `ok`, and some of their oks belong to no line. A question is a numbered M105 that shows
 what has arrived when an answer is missing; its number is a new one each time: Marlin swallows a repeat of its last line without a
@@ -10,8 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 from math import inf
 
-from machine.firmware.firmware import LineRules
-from machine.link.protocol.events import Ok
+from machine.link.protocol.events import Event
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, Window
 
 UNKNOWN_COMMAND = "nknown command"  # echoed with the text of a line that was not understood, ahead of its ok
@@ -21,15 +20,10 @@ NOISE_LIMIT = 20  # of them asked for again: a tenth, at which a print has a blo
 QUESTION = "M105"
 QUESTIONS_MOST = 4  # in a row without any answer before the printer counts as gone
 IDLE_REPORTS = 2  # a printer that says twice in a row that it has nothing to do has lost the line in flight
-CLEAN_LINES = 8  # acknowledgements awaited one by one before the window opens
-# After each error four times as many: when a line is refused the printer throws away what it has of the next one, and the rest of
-# that one may be run without check. A window of one line cannot be torn so, and costs a tenth of the speed.
-CAUTION_MOST = 8192
-PLACES_MOST = 16  # Marlin's BUFSIZE is 4 to 16; a greater number is a damaged answer
 
 
 class Acknowledgement:
-    """What has come so far that makes one `ok` differ from another."""
+    """The line that an `ok` acknowledges, by what came before it."""
 
     def __init__(self) -> None:
         self._reports_temperature = False  # the answer to M105 begins with `ok T:`
@@ -55,13 +49,13 @@ class Acknowledgement:
         until_s, self._resend_ok_until_s = self._resend_ok_until_s, -inf
         return now_s < until_s
 
-    def answers_m110(self, ok: Ok, numbered: bool, unknown: bool, now_s: float) -> bool:
+    def answers_m110(self, ok: Event, numbered: bool, unknown: bool, now_s: float) -> bool:
         """Whether the numbers begin anew as M110 has asked; unknown: the `ok` belongs to a line that was not understood."""
         if numbered:
             return ok.line == FIRST_NUMBER_AGAIN
         return not (unknown or ok.temperature or self.belongs_to_resend(now_s))
 
-    def line(self, ok: Ok, window: Window, numbered: bool, now_s: float) -> int | None:
+    def line(self, ok: Event, window: Window, numbered: bool, now_s: float) -> int | None:
         """The number of the line that is answered, None for none; numbered: this printer's answers name their lines."""
         if ok.temperature is not None:
             self._reports_temperature = True
@@ -75,8 +69,9 @@ class Acknowledgement:
 
 
 class Resends:
-    """next_line: the first one still to be repeated; repeated: how many were, in all; alone: nothing but the `ok` that belongs to
-    the Resend is on its way; words: what the printer has said of the line that it refused last.
+    """Lines that the printer asks for again. next_line: the first one still to be repeated; repeated: how many were, in all;
+    alone: nothing but the `ok` that belongs to the Resend is on its way; words: what the printer has said of the line that it
+    refused last.
     """
 
     def __init__(self) -> None:
@@ -121,8 +116,8 @@ class Resends:
 
 @dataclass
 class Questions:
-    """unanswered: in a row; first: line number of the first one; implausible: the line that was asked for although it cannot
-    be meant, 0: none.
+    """Questions without an answer. unanswered: in a row; first: line number of the first one; implausible: the line that was
+    asked for although it cannot be meant, 0: none.
     """
 
     unanswered: int = 0
@@ -150,41 +145,3 @@ class Questions:
     def end(self) -> None:
         """What has arrived is known."""
         self.unanswered = self.first = self.implausible = 0
-
-
-class FlowControl:
-    """`numbered`: the answers name the line they belong to."""
-
-    def __init__(self) -> None:
-        self.numbered = False
-        self._free = 0
-        self._clean, self._caution = 0, CLEAN_LINES
-
-    def lines(self, rules: LineRules, emergency_parser: bool) -> int:
-        """Lines in flight. Without an emergency parser one place of the printer stays free, so that it sees an M112 at once."""
-        if self._clean < self._caution:
-            return 1
-        if not self.numbered:
-            return rules.places_plain
-        if not self._free:
-            return rules.places
-        return self._free if emergency_parser else max(1, self._free - 1)
-
-    def learn(self, rx_free: int | None) -> None:
-        """A numbered answer has come, with or without the free places of the printer's queue."""
-        self.numbered = True
-        if rx_free is not None:
-            self._free = max(self._free, min(rx_free + 1, PLACES_MOST))  # B counts the line itself as still there
-
-    def acknowledge(self, lines: int) -> None:
-        """So many lines were acknowledged."""
-        self._clean += lines
-
-    def slow_down(self) -> None:
-        """An answer is missing: one by one for a while."""
-        self._clean = 0
-
-    def back_off(self) -> None:
-        """A line was refused: one by one for longer than the last time."""
-        self._clean = 0
-        self._caution = min(4 * self._caution, CAUTION_MOST)

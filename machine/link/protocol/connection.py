@@ -25,15 +25,16 @@ Bytes become events (decoder), an event or the passing of time amounts to a sign
 
 from machine.firmware import Firmware
 from machine.firmware.marlin import MARLIN
-from machine.link.protocol import events, verdict
-from machine.link.protocol.answers import ASKED_LIMIT, QUESTION, QUESTIONS_MOST, Acknowledgement, FlowControl, Questions, Resends
+from machine.link.protocol import verdict
+from machine.link.protocol.answers import ASKED_LIMIT, QUESTION, QUESTIONS_MOST, Acknowledgement, Questions, Resends
 from machine.link.protocol.decoder import LineDecoder
+from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.framing import LINE_LIMIT, frame
 from machine.link.protocol.greeting import GREETING, PLAIN_QUESTION, Greeting
 from machine.link.protocol.states import TABLE, Signal, State
 from machine.link.protocol.timeout import Timeouts, Timing
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, GREETING_LINES, Window
-from profiles.errors import LocalProtocolError, PrinterError, SilenceError
+from profiles.errors import PrinterError, SilenceError
 
 BEFORE_NUMBERS = (State.DRAIN, State.SYNC)  # an error is of what came before: no line of ours has a number yet
 GREETING_STATES = (*BEFORE_NUMBERS, State.HELLO)
@@ -63,33 +64,23 @@ class Connection:
         self.greeting = Greeting(firmware, rx_bytes, baud)
         self.window = Window(limit, self.greeting.rx_bytes)
         self.resends = Resends()
-        self._decoder, self._flow, self._oks, self._questions = LineDecoder(), FlowControl(), Acknowledgement(), Questions()
+        self._decoder, self._oks, self._questions = LineDecoder(), Acknowledgement(), Questions()
         self._timeouts = Timeouts(timing or Timing(), now_s)
         self._out = bytearray()
         self._last_number_used = False
         self.halted = False
-
-    @property
-    def advanced(self) -> bool:
-        """Whether the printer's answers name the line they belong to."""
-        return self._flow.numbered
 
     def can_send(self, command: str) -> bool:
         """Whether this command may be sent now."""
         if self.state is not State.OPEN or self._last_number_used or self._decoder.incomplete:
             return False
         greeting = self.greeting
-        return self.window.has_space(command, self._flow.lines(greeting.firmware.line, greeting.emergency_parser))
+        return self.window.has_space(command, greeting.firmware.line, greeting.emergency_parser)
 
     def send(self, command: str, now_s: float) -> int:
-        """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on."""
-        number = self.offer(command, now_s)
-        if not number:
-            raise LocalProtocolError(f"{command!r} was to be sent while the printer has no room for it")
-        return number
-
-    def offer(self, command: str, now_s: float) -> int:
-        """The same where there is room for it; else 0, and nothing is sent."""
+        """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on; 0:
+        the printer has no room for it, nothing is sent.
+        """
         if not self.can_send(command):
             return 0
         self._send(command, now_s)
@@ -103,7 +94,7 @@ class Connection:
         self._out.clear()
         return out
 
-    def receive(self, data: bytes, now_s: float) -> list[events.Event]:
+    def receive(self, data: bytes, now_s: float) -> list[Event]:
         """The events of received bytes, in any portions."""
         self._timeouts.heard_s = now_s
         received = self._decoder.receive(data, now_s)
@@ -145,52 +136,45 @@ class Connection:
             self._timeouts.progress_s = now_s
         self._out += self.window.send(command, now_s)
 
-    def _handle(self, event: events.Event, now_s: float) -> None:
-        match event:
-            case events.Ok():
-                if not isinstance(event, events.PlainOk) and (identity := events.identity_in(event)):
-                    self._learn(identity)
+    def _handle(self, event: Event, now_s: float) -> None:
+        if event.identity or event.kind is Kind.CAPABILITY:
+            self.greeting.learn(event)
+            self.window.rx_bytes = self.greeting.rx_bytes
+        match event.kind:
+            case Kind.OK:
                 self._handle_ok(event, now_s)
-            case events.Resend() if self.state is State.SYNC:
-                self.greeting.wanted = event.line
-            case events.Resend():
-                self._handle_resend(event, now_s)
-            case events.LineError() if self.state in BEFORE_NUMBERS:
+            case Kind.RESEND:
+                self._handle_resend(event.line or 0, now_s)
+            case Kind.LINE_ERROR if self.state in BEFORE_NUMBERS:
                 self.greeting.heard = event.text
-            case events.LineError():
+            case Kind.LINE_ERROR:
                 self.resends.words = event.text
                 self._oks.expect_resend_ok(self._timeouts.hear_line_error(now_s))
-            case events.Busy():
+            case Kind.BUSY:
                 self.greeting.heard = event.text
                 self._timeouts.hear_busy(now_s)
-            case events.Start():
+            case Kind.BANNER if self.state in GREETING_STATES:
+                pass  # it follows a `start` that was heeded
+            case Kind.START | Kind.BANNER:
                 self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
-            case events.Banner() if self.state not in GREETING_STATES:  # there it follows a `start` that was heeded
-                self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
-            case events.FirmwareFault():
-                self.halted = self.halted or events.is_halt(event)
+            case Kind.FAULT:
+                self.halted = self.halted or event.is_halt
                 self._follow(Signal.FAULT, now_s, verdict.firmware_fault(event.text))
-            case events.Wait():
+            case Kind.WAIT:
                 if self._questions.hear_idle(bool(self.window.flight)):
                     self._follow(Signal.STALL, now_s)
-            case events.Echo():
+            case Kind.ECHO:
                 self._oks.hear_echo(event.text)
-            case events.Identity() | events.Capability() | events.Area():
-                self._learn(event)
 
-    def _learn(self, answer: events.Identity | events.Capability | events.Area) -> None:
-        self.greeting.learn(answer)
-        self.window.rx_bytes = self.greeting.rx_bytes
-
-    def _handle_ok(self, ok: events.Ok, now_s: float) -> None:
+    def _handle_ok(self, ok: Event, now_s: float) -> None:
         """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
         unknown = self._oks.take_unknown()
         if ok.line is not None:
-            self._flow.learn(ok.rx_free)
-            if self.state is State.OPEN and isinstance(ok, events.PlainOk):  # nearly every answer
+            self.window.learn(ok.rx_free)
+            if self.state is State.OPEN:  # nearly every answer
                 self._acknowledge(self.window.line_number(ok.line), False, now_s)
                 return
-        elif ok.planner_free is not None and self.advanced and not unknown:
+        elif ok.planner_free is not None and self.window.numbered and not unknown:
             self._follow(Signal.UNCHECKED, now_s, verdict.torn_line(self.window.last_acknowledged))
             return
         if self.state is State.SYNC:
@@ -202,12 +186,12 @@ class Connection:
             if self.resends.alone and ok.line is None and ok.temperature is None:
                 self._follow(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way
         elif self.state is State.RENUMBER:
-            if self._oks.answers_m110(ok, self.advanced, unknown, now_s):
+            if self._oks.answers_m110(ok, self.window.numbered, unknown, now_s):
                 self.window.restart_numbers()
                 self._last_number_used = False
                 self._follow(Signal.SYNCED, now_s)
         else:
-            self._acknowledge(self._oks.line(ok, self.window, self.advanced, now_s), ok.temperature is not None, now_s)
+            self._acknowledge(self._oks.line(ok, self.window, self.window.numbered, now_s), ok.temperature is not None, now_s)
 
     def _acknowledge(self, number: int | None, to_question: bool, now_s: float) -> None:
         """This line and all before it have arrived; a line that is not in flight makes the answer a stray.
@@ -224,10 +208,8 @@ class Connection:
                 self._follow(Signal.UNCHECKED, now_s, verdict.lost_answer(lost, command, self.greeting.firmware.name))
                 return
             number = window.sent
-        count = window.acknowledge(number)
-        if not count:
+        if not window.acknowledge(number):
             return
-        self._flow.acknowledge(count)
         self.resends.acknowledge(number)
         self._timeouts.acknowledge(oldest, now_s)
         self._questions.acknowledge()
@@ -240,17 +222,20 @@ class Connection:
         ):
             self._follow(Signal.ANSWERED, now_s)
 
-    def _handle_resend(self, resend: events.Resend, now_s: float) -> None:
+    def _handle_resend(self, wire_number: int, now_s: float) -> None:
+        if self.state is State.SYNC:
+            self.greeting.wanted = wire_number
+            return
         ok_until_s = self._timeouts.hear_resend(now_s, self.state is State.RENUMBER)
         if self.greeting.firmware.line.resend_ok:
             self._oks.expect_resend_ok(ok_until_s)
         if self.state is State.RENUMBER:
             return
         window = self.window
-        number = window.line_number(resend.line)
+        number = window.line_number(wire_number)
         plausible = window.can_mean(number)
         if self.state is State.HELLO:
-            self.greeting.wanted = resend.line
+            self.greeting.wanted = wire_number
             self._follow(Signal.RESEND, now_s)
         elif plausible and self.state is not State.QUIET:
             if too_much := self.resends.request(number):
@@ -261,7 +246,7 @@ class Connection:
         elif plausible:
             self.resends.next_line = number
         elif self.state is State.PROBING and self._questions.implausible == number:
-            error = verdict.implausible_resend(resend.line, window.wire_number(window.sent), window.last_acknowledged)
+            error = verdict.implausible_resend(wire_number, window.wire_number(window.sent), window.last_acknowledged)
             self._follow(Signal.IMPOSSIBLE, now_s, error)
         else:
             self._questions.implausible = number
@@ -300,7 +285,7 @@ class Connection:
                 self._questions.end()
             case State.QUIET:
                 self._questions.end()
-                self._flow.back_off()
+                self.window.back_off()
                 self.resends.alone = self.window.sent <= self.resends.next_line
                 self.window.clear_flight()
             case State.REPEAT:
@@ -329,7 +314,7 @@ class Connection:
     def _ask(self, now_s: float) -> None:
         """Ask what has arrived, or give M110, which is not checked for sequence, once more; not without end."""
         if self.state is State.PROBING:
-            self._flow.slow_down()
+            self.window.slow_down()
         if not self._questions.ask():
             self._follow(Signal.SILENT, now_s, verdict.silence(self.window.last_acknowledged + 1, QUESTIONS_MOST))
         elif self.state is State.PROBING:

@@ -1,6 +1,6 @@
 """The line decoder: received bytes, cut anywhere, become events; bounded, with a count of what could not be read."""
 
-from machine.link.protocol.events import Event, Unknown, read_event
+from machine.link.protocol.events import Event, Kind, read_event
 
 LONGEST_LINE = 4096  # a line without end is thrown away beyond this; Marlin's longest answer has 300 characters
 TAIL_S = 0.25  # the second line of an error follows at once; 300 characters take this long at 9600 baud
@@ -74,7 +74,7 @@ class LineDecoder:
             self._held, self._held_s = line, now_s
             return
         event = read_event(line)
-        if isinstance(event, Unknown):
+        if event.kind is Kind.UNKNOWN:
             self.last = event.text or self.last
         else:
             self._understood += 1

@@ -1,7 +1,8 @@
-"""What a printer says: one frozen event for each kind of line, and the reading of a line into an event."""
+"""What a printer says: an event for each of its lines, and the reading of a line into an event."""
 
 import re
 from dataclasses import dataclass
+from enum import Enum, auto
 from typing import NamedTuple
 
 
@@ -21,110 +22,71 @@ class Temperature:
         return ", ".join(f"{name} {now_c:.0f} °C" for name, now_c in degrees if now_c is not None)
 
 
-@dataclass(frozen=True, slots=True)
-class Position:
-    """Answer to M114 or an autoreport: (letter, value) pairs, rotary letters included."""
+class Kind(Enum):
+    """What a line of the printer is."""
 
-    axes: tuple[tuple[str, float], ...]
+    OK = auto()  # a line was accepted
+    RESEND = auto()  # the printer wants this line and all after it again; one `ok` that acknowledges nothing follows
+    BUSY = auto()  # the printer lives but has no time for more lines
+    LINE_ERROR = auto()  # an error of the transmission only (checksum, line number); a Resend follows
+    FAULT = auto()  # any other error: the printer has stopped or must be stopped
+    START = auto()  # the printer has just started: counters, position and temperatures are gone
+    BANNER = auto()  # words that a firmware says only while it starts; they betray a restart whose `start` was lost
+    WAIT = auto()  # the printer has nothing to do (Repetier says so every second)
+    TEMPERATURE = auto()
+    POSITION = auto()  # answer to M114 or an autoreport
+    IDENTITY = auto()  # the FIRMWARE_NAME line of the answer to M115
+    CAPABILITY = auto()  # `Cap:NAME:1` of the answer to M115, as NAME:1
+    AREA = auto()  # the geometry report of M115
+    ACTION = auto()  # `//action:NAME`: the printer asks the sender for something (pause, cancel, disconnect, ...), as NAME
+    ECHO = auto()  # words for people: `echo:`, `//`, `Warning:`
+    UNKNOWN = auto()  # anything else, rubbish included
 
 
-class Ok(NamedTuple):
-    """A line was accepted. Number and free places come with Marlin's ADVANCED_OK, a temperature after M105.
+class Event(NamedTuple):
+    """A line of the printer. text: what of its words matters.
 
-    position: Smoothie puts the answer to M114 behind its ok.
+    line: the number that an ok acknowledges or a Resend asks for; it and the free places of the planner and of the receive buffer
+    come with Marlin's ADVANCED_OK. temperature, position (letter -> mm or deg, rotary letters included), identity (the
+    FIRMWARE_NAME words): in a line of their own or behind an ok (M105; Smoothieware, Klipper). area: least and greatest value of
+    each axis.
     """
 
+    kind: Kind
+    text: str = ""
     line: int | None = None
     planner_free: int | None = None
     rx_free: int | None = None
     temperature: Temperature | None = None
-    text: str = ""
-    position: Position | None = None
+    position: dict[str, float] | None = None
+    identity: str = ""
+    area: tuple[tuple[float, float], ...] = ()
 
+    @property
+    def unknown_command(self) -> str:
+        """The name of a command that the firmware says it does not know, "" of other words. Marlin and Klipper quote the whole
+        line, RepRapFirmware names the code.
+        """
+        match = UNKNOWN.search(self.text) if self.kind is Kind.ECHO else None
+        return "" if match is None else match[1] or match[2]
 
-class PlainOk(Ok):
-    """An ok with nothing but number and free places behind it, or nothing at all; equal to the Ok that says the same."""
+    @property
+    def lacks_checksum(self) -> bool:
+        """Whether a line was refused because it had no number or no checksum."""
+        return self.kind is Kind.LINE_ERROR and any(words in self.text.lower() for words in MISSING)
 
-    __slots__ = ()
+    @property
+    def is_starting(self) -> bool:
+        """Whether a firmware refuses a command because it is still starting: it will take it in a few moments."""
+        return self.kind is Kind.FAULT and any(words in self.text.lower() for words in STARTING)
 
+    @property
+    def is_halt(self) -> bool:
+        """Whether the firmware says that it has stopped for good and switched its heaters off. No other error says so."""
+        if self.kind is Kind.OK:
+            return HALTED_OK in self.text
+        return self.kind is Kind.FAULT and (self.text == HALTED or any(words in self.text.lower() for words in KILLED))
 
-@dataclass(frozen=True, slots=True)
-class Resend:
-    """The printer wants this line and all after it again; one `ok` that acknowledges nothing follows."""
-
-    line: int
-
-
-@dataclass(frozen=True, slots=True)
-class Text:
-    """A line, or what of it matters, as it was said."""
-
-    text: str
-
-
-class Busy(Text):
-    """The printer lives but has no time for more lines."""
-
-
-class LineError(Text):
-    """An error of the transmission only (checksum, line number); a Resend follows."""
-
-
-class FirmwareFault(Text):
-    """Any other error: the printer has stopped or must be stopped."""
-
-
-class Identity(Text):
-    """The FIRMWARE_NAME line of the answer to M115."""
-
-
-class Echo(Text):
-    """Words for people: `echo:`, `//`, `Warning:`."""
-
-
-class Banner(Text):
-    """Words that a firmware says only while it starts; they betray a restart whose `start` was lost."""
-
-
-class Unknown(Text):
-    """Anything else, rubbish included."""
-
-
-@dataclass(frozen=True, slots=True)
-class Capability:
-    """A `Cap:NAME:1` line of the answer to M115."""
-
-    name: str
-    present: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Area:
-    """The geometry report of M115: (letter, least, greatest) of each axis. Marlin calls the fourth to sixth axis I, J, K."""
-
-    axes: tuple[tuple[str, float, float], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Action:
-    """`//action:NAME`: the printer asks the sender for something (pause, resume, cancel, disconnect, poweroff, ...)."""
-
-    name: str
-    words: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """The printer has just started: counters, position and temperatures are gone."""
-
-
-@dataclass(frozen=True, slots=True)
-class Wait:
-    """The printer has nothing to do (Repetier says so every second)."""
-
-
-Report = Temperature | Position | Capability | Identity | Area | Action | Echo | Unknown
-Event = Ok | Resend | Busy | LineError | FirmwareFault | Start | Banner | Wait | Report
 
 NAME = "FIRMWARE_NAME:"
 OK = re.compile(rb"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
@@ -133,7 +95,7 @@ RESEND = re.compile(r"(?:resend:|rs)\s*N?:?(\d{1,10})(?:\s+expected (?:checksum|
 NOZZLE = re.compile(r"(?:^|\s)T0?:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 BED = re.compile(r"(?:^|\s)B:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 AXIS = re.compile(r"([A-Z]):\s*(-?\d+\.?\d*)")
-CAPABILITY = re.compile(r"Cap:(\w+):([01])")
+CAPABILITY = re.compile(r"Cap:(\w+:[01])")
 AREA = re.compile(r"area:.*?full:\{min:\{([^}]*)\},?max:\{([^}]*)\}")
 REACH = re.compile(r"([a-z]):(-?\d+\.?\d*)")
 ACTION = re.compile(r"//\s*action:\s*(\w+)\s*(.*)")
@@ -161,7 +123,7 @@ DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed"
 
 
 def read_event(raw: bytes) -> Event:
-    """The event of one received line (without its newline). Never raises: rubbish is Unknown."""
+    """The event of one received line (without its newline). Never raises: rubbish is UNKNOWN."""
     if ok := OK.fullmatch(raw):  # nearly every line
         return _plain_ok(ok)
     text = raw.decode("ascii", "replace").strip()
@@ -169,109 +131,73 @@ def read_event(raw: bytes) -> Event:
         return _ok(text)
     folded = text.lower()
     if resend := RESEND.fullmatch(text):
-        return Resend(int(resend[1]))
+        return Event(Kind.RESEND, line=int(resend[1]))
     if folded.startswith(("error:", "!!", "fatal:", "alarm:")) or any(word in folded for word in DEADLY):
-        return _error(text, folded)
+        return Event(_error_kind(folded), text)
     if folded.startswith(("echo:busy:", "busy:")):
-        return Busy(text)
+        return Event(Kind.BUSY, text)
     return _read_report(text)
 
 
-def temperature_in(event: Event) -> Temperature | None:
-    """What a line reports of the heaters: by itself, or behind the ok of M105."""
-    return event.temperature if isinstance(event, Ok) else event if isinstance(event, Temperature) else None
-
-
-def position_in(event: Event) -> Position | None:
-    """Where a line says that the axes stand: by itself, or behind an ok as Smoothie has it."""
-    return event.position if isinstance(event, Ok) else event if isinstance(event, Position) else None
-
-
-def identity_in(event: Event) -> Identity | None:
-    """The firmware's name: a line of its own, or behind an ok as Klipper has it."""
-    if isinstance(event, Ok) and NAME in event.text:
-        return Identity(event.text[event.text.index(NAME) :])
-    return event if isinstance(event, Identity) else None
-
-
-def unknown_command(event: Event) -> str:
-    """The name of a command that the firmware says it does not know, "" of other words. Marlin and Klipper quote the whole line,
-    RepRapFirmware names the code.
-    """
-    match = UNKNOWN.search(event.text) if isinstance(event, Echo) else None
-    return "" if match is None else match[1] or match[2]
-
-
-def lacks_checksum(event: Event) -> bool:
-    """Whether a line was refused because it had no number or no checksum."""
-    return isinstance(event, LineError) and any(words in event.text.lower() for words in MISSING)
-
-
-def is_starting(event: Event) -> bool:
-    """Whether a firmware refuses a command because it is still starting: it will take it in a few moments."""
-    return isinstance(event, FirmwareFault) and any(words in event.text.lower() for words in STARTING)
-
-
-def is_halt(event: Event) -> bool:
-    """Whether the firmware says that it has stopped for good and switched its heaters off. Any other error does not say so."""
-    if isinstance(event, Ok):
-        return HALTED_OK in event.text
-    return isinstance(event, FirmwareFault) and (event.text == HALTED or any(words in event.text.lower() for words in KILLED))
-
-
-def _error(text: str, folded: str) -> Event:
+def _error_kind(folded: str) -> Kind:
     if any(word in folded for word in OF_THE_LINE):
-        return LineError(text)
-    return Echo(text) if any(word in folded for word in OF_THE_CARD) else FirmwareFault(text)
+        return Kind.LINE_ERROR
+    return Kind.ECHO if any(word in folded for word in OF_THE_CARD) else Kind.FAULT
 
 
 def _read_report(text: str) -> Event:
     """What is no answer to a line."""
     if text.startswith("X:"):
-        return _position(text)
+        return Event(Kind.POSITION, position=_position(text))
     if text == "wait":
-        return Wait()
+        return Event(Kind.WAIT)
     if START.fullmatch(text):
-        return Start()
+        return Event(Kind.START)
     if shutdown := SHUTDOWN.fullmatch(text):
-        return FirmwareFault(shutdown[1])
+        return Event(Kind.FAULT, shutdown[1])
     if action := ACTION.fullmatch(text):
-        return Action(action[1].lower(), action[2])
+        return Event(Kind.ACTION, f"{action[1].lower()} {action[2]}".strip())
     if GREETS.fullmatch(text):
-        return Banner(text)
+        return Event(Kind.BANNER, text)
     if text.startswith(("echo:", "//", "Warning:")):  # the last is RepRapFirmware's
-        return Echo(text.removeprefix("echo:").removeprefix("//").strip())
+        return Event(Kind.ECHO, text.removeprefix("echo:").removeprefix("//").strip())
     if text.startswith(NAME):
-        return Identity(text)
+        return Event(Kind.IDENTITY, text, identity=text)
     if capability := CAPABILITY.fullmatch(text):
-        return Capability(capability[1], capability[2] == "1")
-    return _area(text) or _temperature(text) or Unknown(text)
+        return Event(Kind.CAPABILITY, capability[1])
+    if area := _area(text):
+        return Event(Kind.AREA, area=area)
+    if (temperature := _temperature(text)) is not None:
+        return Event(Kind.TEMPERATURE, temperature=temperature)
+    return Event(Kind.UNKNOWN, text)
 
 
-def _plain_ok(ok: re.Match[bytes]) -> PlainOk:
+def _plain_ok(ok: re.Match[bytes]) -> Event:
     """An ok with its numbers, or alone."""
     line, planner, rx = ok.groups()
-    return PlainOk(_whole(line), _whole(planner), _whole(rx), None, ok[0].decode("ascii"))
+    return Event(Kind.OK, ok[0].decode("ascii"), _whole(line), _whole(planner), _whole(rx))
 
 
 def _ok(text: str) -> Event:
+    """An ok with something else behind it."""
     if ok := OK.fullmatch(text.encode("ascii", "replace")):
         return _plain_ok(ok)
     if not text.isascii() or not text.startswith("ok "):
-        return Unknown(text)
+        return Event(Kind.UNKNOWN, text)
     if text.startswith(("ok T", "ok B:")):  # Klipper reports the bed first
-        return Ok(temperature=_temperature(text), text=text)
-    return Ok(text=text, position=_position(text) if " X:" in text else None)
+        return Event(Kind.OK, text, temperature=_temperature(text))
+    identity = text[text.index(NAME) :] if NAME in text else ""
+    return Event(Kind.OK, text, position=_position(text) if " X:" in text else None, identity=identity)
 
 
 def _whole(digits: bytes | None) -> int | None:
     return None if digits is None else int(digits)
 
 
-def _position(text: str) -> Position:
+def _position(text: str) -> dict[str, float]:
     """The axes' places; what follows Count (steps) and Machine (RepRapFirmware, before the table's map) is left out."""
     text = text[text.index("X:") :].partition(" Count")[0].partition(" Machine")[0]
-    return Position(tuple((letter, float(value)) for letter, value in AXIS.findall(text)))
+    return {letter: float(value) for letter, value in AXIS.findall(text)}
 
 
 def _temperature(text: str) -> Temperature | None:
@@ -286,9 +212,9 @@ def _pair(pattern: re.Pattern[str], text: str) -> tuple[float | None, float | No
     return float(match[1]), None if match[2] is None else float(match[2])
 
 
-def _area(text: str) -> Area | None:
+def _area(text: str) -> tuple[tuple[float, float], ...]:
     match = AREA.match(text)
     if match is None:
-        return None
+        return ()
     least, most = dict(REACH.findall(match[1])), dict(REACH.findall(match[2]))
-    return Area(tuple((letter.upper(), float(least[letter]), float(most[letter])) for letter in least if letter in most))
+    return tuple((float(least[letter]), float(most[letter])) for letter in least if letter in most)

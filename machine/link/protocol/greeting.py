@@ -3,7 +3,7 @@
 from machine.firmware import Firmware, identify
 from machine.firmware.marlin import MARLIN
 from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.events import Area, Capability, Identity
+from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.verdict import failed_greeting
 from profiles.errors import PrinterError
 
@@ -16,7 +16,7 @@ UNANSWERED_MOST = 3  # M110 in vain; then numbered lines are sent all the same, 
 
 
 class Greeting:
-    """identity: the FIRMWARE_NAME line; firmware: the one it names; area: limits of its axes, where it reports them. heard: the
+    """The attempts to greet a printer, and its answers. identity: the FIRMWARE_NAME line; firmware: the one it names. heard: the
     last words of a printer that were no answer to a greeting. wanted: the line number that the printer has asked for since the
     last attempt, 0: none. keeps_numbers: it ignores M110. asked_plainly: PLAIN_QUESTION is under way.
     """
@@ -24,7 +24,6 @@ class Greeting:
     def __init__(self, firmware: Firmware = MARLIN, rx_bytes: int | None = None, baud: int | None = None) -> None:
         self.firmware, self.identity, self.heard = firmware, "", ""
         self.capabilities: dict[str, bool] = {}
-        self.area: Area | None = None
         self.wanted = self._wanted_before = 0
         self.keeps_numbers = self.asked_plainly = self._skipped = False
         self._rx_bytes, self._baud, self._tries = rx_bytes, baud, 0
@@ -49,14 +48,13 @@ class Greeting:
         """What keeps its motors on in a pause; of a firmware that has no name M84 might switch them off (Smoothieware's does)."""
         return "" if identify(self.identity) is None else self.firmware.line.keep_awake
 
-    def learn(self, answer: Identity | Capability | Area) -> None:
-        """A line of the answer to M115."""
-        if isinstance(answer, Identity):
-            self.identity, self.firmware = answer.text, identify(answer.text) or self.firmware
-        elif isinstance(answer, Capability):
-            self.capabilities[answer.name] = answer.present
-        else:
-            self.area = answer
+    def learn(self, answer: Event) -> None:
+        """Take note of a line of the answer to M115."""
+        if answer.identity:
+            self.identity, self.firmware = answer.identity, identify(answer.identity) or self.firmware
+        if answer.kind is Kind.CAPABILITY:
+            name, _, present = answer.text.partition(":")
+            self.capabilities[name] = present == "1"
 
     def attempt(self, decoder: LineDecoder) -> int | PrinterError:
         """How to greet once more: the number of the first line, 0: after M110. Or why there is no sense in it.

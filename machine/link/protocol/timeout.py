@@ -1,4 +1,4 @@
-"""Timeouts: how long the sender waits for what, and since when."""
+"""Timeouts: the time limits of the printer's answers, by the state of the conversation."""
 
 from dataclasses import dataclass
 from math import inf
@@ -14,7 +14,7 @@ TURNS = 3.0  # round trips of silence after which nothing is on its way any more
 
 @dataclass(frozen=True)
 class Timing:
-    """How long the sender waits, s."""
+    """Time limits of the printer's answers, s."""
 
     # Marlin says `busy:` every 2 s. A question does no harm to a printer that has only no time, so it is asked early of
     # one that never says so, too; but how long that one may then stay silent depends on its longest move.
@@ -27,7 +27,7 @@ class Timing:
 
 
 class Timeouts:
-    """Times of the clock handed in: when something was heard, when something was achieved, when the state began."""
+    """Times of the newest byte, of the newest progress and of the begin of the state, and what they amount to."""
 
     def __init__(self, timing: Timing, now_s: float) -> None:
         self._timing = timing

@@ -1,4 +1,4 @@
-"""The lines between sender and printer: which are in flight, which were acknowledged, which can be repeated."""
+"""The lines between sender and printer: which are in flight and how many may be, which have arrived, which can be repeated."""
 
 from collections import deque
 from typing import NamedTuple
@@ -10,6 +10,11 @@ from machine.link.protocol.framing import LINE_LIMIT, frame
 GREETING_LINES = 2  # M115 and M105 are lines 1 and 2; a later Resend for one of them means that the printer restarted
 HISTORY = 512  # lines kept for a repeat: far more than any printer's buffers hold
 FIRST_NUMBER_AGAIN = 1000  # numbers begin here when they begin anew: a printer that asks for line 1 or 2 has restarted
+CLEAN_LINES = 8  # acknowledgements awaited one by one before the window opens
+# After each error four times as many: when a line is refused the printer throws away what it has of the next one, and the rest of
+# that one may be run without check. A window of one line cannot be torn so, and costs a tenth of the speed.
+CAUTION_MOST = 8192
+PLACES_MOST = 16  # Marlin's BUFSIZE is 4 to 16; a greater number is a damaged answer
 NEAR = 8  # one acknowledgement too many or few is usual after noise; a Resend for a line further back is asked about
 
 
@@ -27,7 +32,7 @@ class Window:
     """Lines are counted from 1; `sent` is the last one given, `acknowledged` the last one known to have arrived.
 
     The numbers on the wire are these counts until they begin anew, then less by a constant. limit: characters of a line
-    that the firmware keeps; rx_bytes: what its receive buffer holds.
+    that the firmware keeps; rx_bytes: what its receive buffer holds; numbered: its answers name the line they belong to.
     """
 
     def __init__(self, limit: int = LINE_LIMIT, rx_bytes: int = LineRules.rx_bytes) -> None:
@@ -39,6 +44,9 @@ class Window:
         self._bytes = 0
         self._before = 0
         self._history: dict[int, bytes] = {}
+        self.numbered = False
+        self._free = self._clean = 0
+        self._caution = CLEAN_LINES
 
     def reset(self, first: int = 1) -> None:
         """Nothing was sent yet. first: the number of the first line on the wire."""
@@ -70,12 +78,37 @@ class Window:
         known = number in self._history or number == self.sent + 1
         return known and number > self.acknowledged - NEAR and self.wire_number(number) > GREETING_LINES
 
-    def has_space(self, command: str, lines: int) -> bool:
-        """Whether a command may follow what is in flight, at most `lines` of them together."""
+    def learn(self, rx_free: int | None) -> None:
+        """A numbered answer has come, with or without the free places of the printer's queue."""
+        self.numbered = True
+        if rx_free is not None:
+            self._free = max(self._free, min(rx_free + 1, PLACES_MOST))  # B counts the line itself as still there
+
+    def slow_down(self) -> None:
+        """An answer is missing: one by one for a while."""
+        self._clean = 0
+
+    def back_off(self) -> None:
+        """A line was refused: one by one for longer than the last time."""
+        self._clean = 0
+        self._caution = min(4 * self._caution, CAUTION_MOST)
+
+    def places(self, rules: LineRules, emergency_parser: bool) -> int:
+        """Lines in flight. Without an emergency parser one place of the printer stays free, so that it sees an M112 at once."""
+        if self._clean < self._caution:
+            return 1
+        if not self.numbered:
+            return rules.places_plain
+        if not self._free:
+            return rules.places
+        return self._free if emergency_parser else max(1, self._free - 1)
+
+    def has_space(self, command: str, rules: LineRules, emergency_parser: bool) -> bool:
+        """Whether a command may follow what is in flight."""
         flight = self.flight
         if not flight:
             return True
-        if len(flight) >= lines or flight[-1].slow_timeout_s or not self.fits_buffer(command):
+        if len(flight) >= self.places(rules, emergency_parser) or flight[-1].slow_timeout_s or not self.fits_buffer(command):
             return False
         return not _slow_timeout_s(command)
 
@@ -114,6 +147,7 @@ class Window:
             count += 1
         if number > self.acknowledged:
             self.acknowledged = number
+        self._clean += count
         return count
 
     def clear_flight(self) -> None:

@@ -117,7 +117,7 @@ class Hand:
         self._person.tell(state=status.state, progress=status, told_s=time())
 
     def _at(self) -> dict[str, float]:
-        return {} if self._session.position is None else dict(self._session.position.axes)
+        return dict(self._session.position or {})
 
     def _do(self, command: HandCommand) -> None:
         """One command; what cannot be done is told, and nothing moves. Raises PrinterError."""

@@ -175,7 +175,8 @@ class AtPage:
     """
 
     def __init__(self, reporter: StateReporter, cut_off: Path | None = None) -> None:
-        self.commands, self.stop = Control(), Flag()
+        self.stop = Flag()
+        self.commands = Control(self.stop)
         self.agreed = False
         self.tell, self._cut_off = reporter.tell, cut_off
         self._checks: tuple[Notice, ...] = ()

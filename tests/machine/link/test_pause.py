@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Mapping
-from threading import Event as Flag
 from typing import Any
 
 import numpy as np
@@ -57,12 +56,11 @@ class Watcher:
         """The commands sent, without number and checksum."""
         return [re.sub(r"^N\d+ |\*\d+$", "", line) for line in self.sent.decode().splitlines()]
 
-    def run(self, program: list[str], medium: Medium | None = None, stop: Flag | None = None) -> Outcome:
+    def run(self, program: list[str], medium: Medium | None = None) -> Outcome:
         return print_lines(
             program,
             PATH,
             on_progress=self.see,
-            stop=stop,
             control=self.control,
             profile=self.profile,
             medium=tap(self.traffic, medium or self.printer.medium),
@@ -384,9 +382,9 @@ def test_a_plug_that_stays_loose_is_waited_for_no_longer_than_is_said() -> None:
 
 
 def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:
-    watcher, stop = watched({}, Fault("disconnect", at=120, unit="line", seconds=1e6)), Flag()
-    watcher.when = {"reconnecting": stop.set}
-    outcome = watcher.run(PROGRAM, stop=stop)
+    watcher = watched({}, Fault("disconnect", at=120, unit="line", seconds=1e6))
+    watcher.when = {"reconnecting": watcher.control.stop.set}
+    outcome = watcher.run(PROGRAM)
     assert (outcome.cancelled, outcome.heaters_off) == (True, False)
 
 

@@ -28,7 +28,9 @@ from tests.machine.peers import PATIENCE_S, RATES, behind_rfc2217, on_socket, on
 from tests.machine.virtual_printer import VirtualPrinter
 
 MACHINE = load().machine
-PATIENT = Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
+PATIENT = replace(
+    SERIAL, timing=Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
+)
 PROGRAM = ["M83", *(f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 F3000" for i in range(300))]
 
 
@@ -54,14 +56,14 @@ def accepted() -> Iterator[tuple[Port, socket.socket]]:
 def test_a_printer_behind_a_socket_prints_every_line_once(build: BuildOptions) -> None:
     firmware = SimulatedFirmware(MACHINE, build)
     with on_socket(firmware) as address:
-        outcome = print_lines(PROGRAM, address, 115200, timing=PATIENT)
+        outcome = print_lines(PROGRAM, address, 115200, medium=PATIENT)
     assert (outcome.acknowledged, outcome.repeated) == (301, 0)
     assert [round(x, 5) for x in firmware.record().end[:, 0]] == [float(f"{1 + i % 90}.{i:05d}") for i in range(300)]
 
 
 def test_a_printer_behind_rfc_2217_prints_every_line_once() -> None:
     with SimulatedPrinter(MACHINE) as printer, behind_rfc2217(printer.path) as address:
-        outcome = print_lines(PROGRAM, address, 115200, timing=PATIENT)
+        outcome = print_lines(PROGRAM, address, 115200, medium=PATIENT)
         record = printer.record
     assert (outcome.acknowledged, outcome.repeated) == (301, 0)
     assert [round(x, 5) for x in record.end[:, 0]] == [float(f"{1 + i % 90}.{i:05d}") for i in range(300)]
@@ -167,7 +169,7 @@ def test_a_network_printer_lost_in_mid_print_ends_it_and_leaves_no_thread() -> N
         thread, address = threading.Thread(target=serve), f"socket://localhost:{server.getsockname()[1]}"
         thread.start()
         with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
-            print_lines(PROGRAM, address, 115200, timing=PATIENT, medium=replace(SERIAL, lost_s=0.2))
+            print_lines(PROGRAM, address, 115200, medium=replace(PATIENT, lost_s=0.2))
         thread.join(PATIENCE_S)
     assert set(threading.enumerate()) <= before
 

@@ -17,11 +17,11 @@ from machine.gcode.modes import ModalState, axes_of
 from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from machine.link.medium import SERIAL, Medium, Wire
+from machine.link.pending_commands import Control
 from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
-from machine.link.protocol.events import Position, Temperature
 from machine.link.protocol.framing import frame
-from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, heights_mm, plan_resume, read_interrupted_print
+from machine.link.resume import InterruptedPrint, ResumePoint, heights_mm, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
 from machine.printing.journal_folder import continue_journal
@@ -95,14 +95,14 @@ def cut_off(program: Iterable[str], last: Checkpoint) -> InterruptedPrint:
     return read_interrupted_print(program, last, PROFILE, LIMIT)
 
 
-def resumed(text: GcodeFile, printer: VirtualPrinter, story: JournalContents) -> tuple[ResumePlan, list[str]]:
+def resumed(text: GcodeFile, printer: VirtualPrinter, story: JournalContents) -> tuple[ResumePoint, list[str]]:
     """Resume; the decision, and the commands sent."""
-    plans: list[ResumePlan] = []
+    plans: list[ResumePoint] = []
     sent: list[bytes] = []
 
     def begin(seen: PrinterStatus) -> ResumePoint:
         plans.append(plan_resume(cut_off(text, story.last), seen, PROFILE))
-        return plans[0].start
+        return plans[0]
 
     with journal_of(text, "rest") as journal:
         print_lines(
@@ -144,11 +144,11 @@ def test_after_the_host_has_died_the_rest_follows_without_gap_or_overlap(
 def test_a_print_that_had_hardly_begun_begins_anew(text: GcodeFile, whole: np.ndarray) -> None:
     printer = VirtualPrinter(PROFILE.machine)
     way, _ = resumed(text, printer, killed(text, printer, 9))
-    assert way.start == ResumePoint(1, ())
+    assert (way.line, way.before) == (1, ())
     assert np.array_equal(moved(printer)[-len(whole) :], whole)
 
 
-def cold(text: GcodeFile, writings: int) -> tuple[VirtualPrinter, JournalContents, ResumePlan, list[str]]:
+def cold(text: GcodeFile, writings: int) -> tuple[VirtualPrinter, JournalContents, ResumePoint, list[str]]:
     """The power goes for host and printer, and comes back."""
     printer = VirtualPrinter(PROFILE.machine)
     story = killed(text, printer, writings)
@@ -158,9 +158,9 @@ def cold(text: GcodeFile, writings: int) -> tuple[VirtualPrinter, JournalContent
 
 def test_after_a_power_cut_all_that_was_not_surely_printed_is_printed_again(text: GcodeFile, whole: np.ndarray) -> None:
     printer, story, way, _ = cold(text, 233)
-    assert way.start.line == story.last.executed + 1
+    assert way.line == story.last.executed + 1
     done = moved(printer)[:, [0, 1, 5]]
-    rest = whole[sum(is_move(line) for line in PROGRAM[: way.start.line - 1]) :][:, [0, 1, 5]]
+    rest = whole[sum(is_move(line) for line in PROGRAM[: way.line - 1]) :][:, [0, 1, 5]]
     assert np.array_equal(done[-len(rest) :], rest)
 
 
@@ -170,21 +170,21 @@ def is_move(line: str) -> bool:
 
 def test_after_a_power_cut_z_and_the_table_are_neither_homed_nor_turned(text: GcodeFile) -> None:
     _, _, way, _ = cold(text, 233)
-    homed = [line for line in way.start.before if line.startswith("G28")]
+    homed = [line for line in way.before if line.startswith("G28")]
     assert homed == ["G28 X Y"]
-    assert not [line for line in way.start.before if re.match(r"G[01] .*[AC]", line)]
+    assert not [line for line in way.before if re.match(r"G[01] .*[AC]", line)]
 
 
 def test_after_a_power_cut_the_bed_heats_first_and_the_tip_rises_before_anything_else_moves(text: GcodeFile) -> None:
     _, _, way, _ = cold(text, 233)
-    order = [next(i for i, line in enumerate(way.start.before) if line.startswith(word)) for word in (
+    order = [next(i for i, line in enumerate(way.before) if line.startswith(word)) for word in (
         "G92 X", "M190 S60", "M109 S200", "G1 E-", "G0 Z", "G28 X Y", "G0 X", "G1 Z", "M106")]  # fmt: skip
     assert order == sorted(order)
 
 
 def test_the_turns_of_the_table_are_not_forgotten(text: GcodeFile) -> None:
     _, _, way, _ = cold(text, 150)
-    assert any(line.startswith("G92 X") and line.endswith("A30 C725") for line in way.start.before)
+    assert any(line.startswith("G92 X") and line.endswith("A30 C725") for line in way.before)
 
 
 def test_a_parked_printer_whose_host_has_died_comes_back_without_homing(text: GcodeFile, whole: np.ndarray) -> None:
@@ -197,7 +197,7 @@ def test_a_parked_printer_whose_host_has_died_comes_back_without_homing(text: Gc
     way, sent = resumed(text, printer, story)
     assert "has not restarted and knows its place" in way.reason
     assert not [line for line in sent if line.startswith(("G28", "G92 X"))]
-    rest = whole[sum(is_move(line) for line in PROGRAM[: way.start.line - 1]) :]
+    rest = whole[sum(is_move(line) for line in PROGRAM[: way.line - 1]) :]
     assert np.array_equal(moved(printer)[-len(rest) :], rest)
 
 
@@ -208,7 +208,7 @@ def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whol
     with journal_of(text, "second") as journal, pytest.raises(KilledError):
         print_lines(
             text, PATH, medium=medium, profile=PROFILE, journal=journal,
-            begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE).start,
+            begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE),
         )  # fmt: skip
     again = read_journal(journal.path)
     assert again.last.executed > story.last.executed
@@ -327,7 +327,7 @@ def point(executed: int, acknowledged: int | None = None, number: int = 100) -> 
 
 
 def asked(position: dict[str, float] | None = None, last: int | None = 0) -> PrinterStatus:
-    return PrinterStatus(last, Position(tuple(position.items())) if position is not None else None, Temperature())
+    return PrinterStatus(last, position)
 
 
 LINE = PROGRAM.index(";PART:2 of 3") + 40
@@ -350,13 +350,13 @@ def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> 
     still = [*START, "G0 X10 Y20 Z30", "G1 X11 E1 F600", "M106 S10", "M106 S20", "M106 S30", "G1 X12 E1"]
     at = cut_off(still, Checkpoint(13, 13, 13, 5))
     way = plan_resume(at, asked({"X": 11.0, "Y": 20.0, "Z": 30.0, "E": 1.0}), PROFILE)
-    assert way.start.line == still.index("M106 S10") + 1
+    assert way.line == still.index("M106 S10") + 1
 
 
 @pytest.mark.parametrize("state", ["paused", "left"])
 def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> None:
     moment = Checkpoint(LINE + 3, LINE, LINE, 100, (159.0, -159.0, 120.0, 30.0, 725.0, 5.0), state)
-    before = plan_resume(cut_off(PROGRAM, moment), asked(), PROFILE).start.before
+    before = plan_resume(cut_off(PROGRAM, moment), asked(), PROFILE).before
     assert "G92 X159 Y-159 Z120 A30 C725" in before
 
 
@@ -368,7 +368,7 @@ def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text
             stop.set()
 
     with journal_of(text, "first") as journal:
-        print_lines(text, PATH, on_progress=see, stop=stop, medium=printer.medium, profile=PROFILE, journal=journal)
+        print_lines(text, PATH, on_progress=see, control=Control(stop), medium=printer.medium, profile=PROFILE, journal=journal)
     last = read_journal(journal.path).last
     assert last.state == "left"
     assert last.pose[:5] == pytest.approx(tuple(printer.record.end[-1, :5]), abs=0.005)
@@ -377,7 +377,7 @@ def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text
 def test_a_profiles_own_block_homes_instead() -> None:
     block = "G28 Z\nG28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
     profile = load(settings=[f"machine.gcode.resume={block!r}"])
-    before = plan_resume(point(LINE), asked(), with_block(profile, block)).start.before
+    before = plan_resume(point(LINE), asked(), with_block(profile, block)).before
     assert before[before.index("G28 Z") : before.index("G28 Z") + 3] == ("G28 Z", "G28 X Y", "HOME_AC")
     assert "G0 A30 C725" in before
     assert not [line for line in before if line.startswith("G92 X")]
@@ -395,7 +395,7 @@ def test_a_marlin_that_has_restarted_believes_itself_at_its_home_positions_and_i
     way = plan_resume(point(LINE), asked(AT_HOME), PROFILE)
     assert way.reason.startswith("the printer has restarted")
     assert way.homes
-    assert "G92 X" in " ".join(way.start.before)
+    assert "G92 X" in " ".join(way.before)
 
 
 TURN = PROGRAM.index("G0 A30 C725 F6000")
@@ -445,7 +445,7 @@ def test_a_board_that_restarts_while_it_is_asked_has_begun_its_numbers_anew() ->
     seen = status.query_status(line, printer.medium, lambda: None)
     assert (seen.greeted, seen.last_number) == (True, 0)
     assert seen.position is not None
-    assert dict(seen.position.axes) == AT_HOME
+    assert seen.position == AT_HOME
 
 
 def test_the_command_resumes_after_a_power_cut(
@@ -466,7 +466,7 @@ def test_the_command_resumes_after_a_power_cut(
 def test_when_the_table_must_turn_back_it_turns_above_everything() -> None:
     turned = {"X": 20.0, "Y": 14.0, "Z": 150.0, "A": -20.0, "C": 360.0, "E": 3.0}
     way = plan_resume(point(LINE, number=10), asked(turned, last=20), PROFILE)
-    lines = list(way.start.before)
+    lines = list(way.before)
     turn = next(i for i, line in enumerate(lines) if re.match(r"G0 A30\S* C725", line))
     heights = [float(m[1]) for line in lines[:turn] if (m := re.match(r"G0 Z(\S+)", line))]
     assert heights[0] >= 80.0
@@ -510,8 +510,8 @@ def test_every_firmware_is_told_where_its_axes_stand(dialect: str) -> None:
     x, y = (0.5 * sum(axis.limits_mm) for axis in (profile.machine.x, profile.machine.y))
     lines = [f"G92 {letters[0]}0 {letters[1]}0", f"G0 X{x} Y{y} Z60 F600", "M109 S200", *(f"G1 X{x + k} E1" for k in range(9))]
     way = plan_resume(read_interrupted_print(lines, Checkpoint(6, 6, 6, 5), profile, 120), asked(), profile)
-    assert re.search(r"(G92 X\S+ Y\S+ Z60|SET_KINEMATIC_POSITION X=\S+ Y=\S+ Z=60)", "\n".join(way.start.before))
-    assert "G28 X Y" in way.start.before
+    assert re.search(r"(G92 X\S+ Y\S+ Z60|SET_KINEMATIC_POSITION X=\S+ Y=\S+ Z=60)", "\n".join(way.before))
+    assert "G28 X Y" in way.before
 
 
 def cancelled(text: GcodeFile, port: str) -> Path:
@@ -523,7 +523,7 @@ def cancelled(text: GcodeFile, port: str) -> Path:
             port,
             250000,
             on_progress=lambda progress: stop.set() if progress.file_line > 190 else None,
-            stop=stop,
+            control=Control(stop),
             profile=PROFILE,
             journal=journal,
         )
@@ -640,7 +640,7 @@ def test_a_cancel_is_heeded_while_the_printer_is_asked_where_it_stands(text: Gco
     printer, stop = VirtualPrinter(PROFILE.machine), Flag()
     deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
     stop.set()
-    outcome = print_lines(text, PATH, stop=stop, medium=deaf, profile=PROFILE, begin=lambda seen: ResumePoint(1, ()))
+    outcome = print_lines(text, PATH, control=Control(stop), medium=deaf, profile=PROFILE, begin=lambda seen: ResumePoint(1, ()))
     assert (outcome.cancelled, outcome.sent, outcome.heaters_off) == (True, 0, None)
     assert printer.now_s < 1.0
 
@@ -659,11 +659,11 @@ def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
 
     def begin(asked: PrinterStatus) -> ResumePoint:
         seen.append(asked)
-        return plan_resume(cut_off(text, story.last), asked, PROFILE).start
+        return plan_resume(cut_off(text, story.last), asked, PROFILE)
 
     with pytest.raises(SilenceError, match=r"did not answer when it was asked where it stands"):
         print_lines(text, PATH, medium=deaf, profile=PROFILE, begin=begin)
-    assert seen == [PrinterStatus(None, None, Temperature())]
+    assert seen == [PrinterStatus()]
 
 
 class _Deaf:

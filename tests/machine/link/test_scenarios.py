@@ -25,7 +25,7 @@ from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
 from machine.link.protocol.answers import ASKED_LIMIT
 from machine.link.protocol.connection import Connection
-from machine.link.protocol.events import Position, Temperature, read_event
+from machine.link.protocol.events import Temperature, read_event
 from machine.link.protocol.framing import command_of, frame
 from machine.link.stream import Outcome, print_lines
 from machine.printing.serial_log import tap
@@ -539,11 +539,11 @@ def test_scenario_36_two_waits_with_a_line_in_flight_find_the_lost_one() -> None
 
 def test_scenario_37_the_c_axis_and_the_chamber_are_not_confused() -> None:
     position = read_event(b"X:1.00 Y:2.00 Z:3.00 A:-30.00 C:725.00 E:0.10 Count X:80 Y:160 Z:1200 A:-240 C:5800")
-    assert position == Position((("X", 1.0), ("Y", 2.0), ("Z", 3.0), ("A", -30.0), ("C", 725.0), ("E", 0.1)))
+    assert position.position == {"X": 1.0, "Y": 2.0, "Z": 3.0, "A": -30.0, "C": 725.0, "E": 0.1}
     heat = read_event(b" T:210.10 /210.00 B:60.00 /60.00 C:35.20 /40.00 @:50 B@:20 C@:0")
-    assert heat == Temperature(210.1, 210.0, 60.0, 60.0)
-    assert read_event(b"X:1.00 Y:2.00 Z:3.00 B:30.00 C:5.00 E:0.00") == Position((
-        ("X", 1.0), ("Y", 2.0), ("Z", 3.0), ("B", 30.0), ("C", 5.0), ("E", 0.0)))  # fmt: skip
+    assert heat.temperature == Temperature(210.1, 210.0, 60.0, 60.0)
+    other = read_event(b"X:1.00 Y:2.00 Z:3.00 B:30.00 C:5.00 E:0.00")
+    assert (other.position, other.temperature) == ({"X": 1.0, "Y": 2.0, "Z": 3.0, "B": 30.0, "C": 5.0, "E": 0.0}, None)
     assert_exact(printed(lines=["M155 S1", "M154 S1", *HEAT, *STROKES[:70], "G92 E0", *STROKES[70:]], build=PLAIN))
 
 
@@ -623,7 +623,7 @@ def test_scenario_43_a_cancel_while_lines_are_being_repeated(build: BuildOptions
         if way == "<" and b"Resend" in data:
             stop.set()
 
-    done = printed([Fault("drop", byte(LINE, 9, build))], build, listen=listen, stop=stop)
+    done = printed([Fault("drop", byte(LINE, 9, build))], build, listen=listen, control=Control(stop))
     assert done.outcome is not None
     assert (done.outcome.cancelled, done.outcome.heaters_off) == (True, True)
     again = print_lines(PROGRAM, PATH, medium=done.printer.medium)

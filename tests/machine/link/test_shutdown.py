@@ -46,7 +46,7 @@ def watching(medium: Medium, word: bytes, act: object) -> Medium:
 def cancelled_in_homing(printer: VirtualPrinter) -> Outcome:
     stop = Flag()
     medium = watching(printer.medium, b"G28 X Y Z", stop.set)
-    return print_lines(HOMING, PATH, stop=stop, medium=medium, profile=SLOW)
+    return print_lines(HOMING, PATH, control=Control(stop), medium=medium, profile=SLOW)
 
 
 def test_a_cancel_waits_for_the_end_of_homing_and_does_not_kill_the_printer() -> None:
@@ -61,23 +61,25 @@ def test_a_cancel_waits_for_the_end_of_homing_and_does_not_kill_the_printer() ->
 
 
 def test_an_emergency_stop_is_heeded_while_homing_is_waited_for() -> None:
-    printer, control, stop = VirtualPrinter(SLOW.machine), Control(), Flag()
+    printer, stop = VirtualPrinter(SLOW.machine), Flag()
+    control = Control(stop)
 
     def press() -> None:
         stop.set()
         control.ask(Command.EMERGENCY_STOP)
 
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; switch it off and on, or press its reset"):
-        print_lines(HOMING, PATH, stop=stop, control=control, medium=watching(printer.medium, b"G28 X Y Z", press), profile=SLOW)
+        print_lines(HOMING, PATH, control=control, medium=watching(printer.medium, b"G28 X Y Z", press), profile=SLOW)
     assert not printer.record.happened("homed XYZ")
 
 
 def test_an_emergency_stop_is_heeded_while_the_tip_is_lifted() -> None:
-    printer, control, stop = VirtualPrinter(SLOW.machine), Control(), Flag()
+    printer, stop = VirtualPrinter(SLOW.machine), Flag()
+    control = Control(stop)
     program = ["G28 X Y Z", "G92 A0 C0", "G0 Z60 F9000", "G0 X10 Y10 F9000", "M117 here", *["G0 X9 F9000", "G0 X10"] * 20]
     medium = watching(watching(printer.medium, b"M117", stop.set), b"G91", lambda: control.ask(Command.EMERGENCY_STOP))
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"):
-        print_lines(program, PATH, stop=stop, control=control, medium=medium, profile=SLOW)
+        print_lines(program, PATH, control=control, medium=medium, profile=SLOW)
 
 
 def test_a_printer_that_falls_silent_in_homing_is_not_waited_for_twice() -> None:
@@ -128,7 +130,7 @@ def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_ask
     seen = query_status(wire, printer.medium, lambda: None)
     assert seen.last_number == last
     assert seen.position is not None
-    assert dict(seen.position.axes)["X"] == 10.0
+    assert seen.position["X"] == 10.0
     assert heaters_off(wire, printer.medium) is Heaters.OFF
 
 

@@ -5,6 +5,7 @@ import signal
 import threading
 import tty
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -12,9 +13,10 @@ import numpy as np
 import pytest
 
 from machine.gcode.reader.parse import parse_gcode
+from machine.link.medium import SERIAL
+from machine.link.pending_commands import Control
 from machine.link.port import open_port, refusal
 from machine.link.print_state import PrintStatus
-from machine.link.progress import Schedule
 from machine.link.protocol.timeout import Timing
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
@@ -27,9 +29,11 @@ from tests.machine.peers import PATIENCE_S
 from tests.machine.virtual_printer import HEALED, random_script
 
 MACHINE = load().machine
-QUICK = Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=1.0, drain_s=0.05, quiet_s=0.03)
+QUICK = replace(SERIAL, timing=Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=1.0, drain_s=0.05, quiet_s=0.03))
 # Where nothing goes wrong nobody has to be asked again, however long a busy machine takes.
-PATIENT = Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
+PATIENT = replace(
+    SERIAL, timing=Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
+)
 PLAIN = BuildOptions(advanced_ok=False)
 HEAT = ["M140 S60", "M104 S200", "M109 S200"]
 OFF = ["M104 S0", "M140 S0"]
@@ -59,7 +63,7 @@ def assert_executed(record: Record, lines: list[str], whole: bool = True) -> Non
 
 def run(lines: list[str], faults: tuple[Fault, ...] = (), build: BuildOptions | None = None) -> tuple[Outcome, Record]:
     with SimulatedPrinter(MACHINE, build=build, faults=faults) as printer:
-        return print_lines(lines, printer.path, 250000, timing=QUICK if faults else PATIENT), printer.record
+        return print_lines(lines, printer.path, 250000, medium=QUICK if faults else PATIENT), printer.record
 
 
 @pytest.mark.parametrize("build", [BuildOptions(), PLAIN, BuildOptions(emergency_parser=False, autoreport=False, busy=False)])
@@ -80,7 +84,7 @@ def test_comments_and_blank_lines_are_never_sent() -> None:
 
 def test_the_end_of_a_print_is_the_end_of_its_moves() -> None:
     with SimulatedPrinter(MACHINE, speed=50.0) as printer:
-        print_lines(["G1 X60 F600"], printer.path, 250000, timing=PATIENT)
+        print_lines(["G1 X60 F600"], printer.path, 250000, medium=PATIENT)
         record = printer.record
         assert record.begin_s[-1] + record.duration_s[-1] <= printer._firmware.board.now_s
 
@@ -89,7 +93,7 @@ def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
     shown: list[PrintStatus] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + body, printer.path, 250000, on_progress=shown.append, timing=PATIENT)
+        print_lines(HEAT + body, printer.path, 250000, on_progress=shown.append, medium=PATIENT)
     last = shown[-1]
     assert (last.sent, last.acknowledged, last.total) == (6, 6, 6)
     assert (last.part, last.parts, last.layer, last.share) == (2, 2, 2, 0.5)
@@ -109,7 +113,7 @@ COMMENTED = {
 def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) -> None:
     shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=shown.append, timing=PATIENT)
+        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=shown.append, medium=PATIENT)
     parsed = parse_gcode(COMMENTED[slicer], MACHINE)
     assert (shown[-1].layer, shown[-1].part or 0) == (2, parsed.part[-1]) == (parsed.layer[-1], parsed.part[-1])
 
@@ -117,39 +121,29 @@ def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) ->
 def test_m73_and_m220_count_in_lower_case_too() -> None:
     shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, on_progress=shown.append, timing=PATIENT)
+        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, on_progress=shown.append, medium=PATIENT)
     assert (shown[-1].share, shown[-1].feed_percent) == (0.5, 80.0)
 
 
-def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
+def test_of_lines_that_are_read_once_the_total_is_not_known() -> None:
     shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
-        schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
-        print_lines(
-            iter(["G21", "M220 S50", "G90"]), printer.path, 250000, on_progress=shown.append, schedule=schedule, timing=PATIENT
-        )
-    assert shown[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
-    assert shown[-1].total is None
-
-
-def test_where_the_pace_is_not_known_the_one_so_far_holds() -> None:
-    schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=None)
-    assert schedule.left_s(2, 4, 10.0, 50.0) == pytest.approx(600.0 * 10.0 / 200.0)
-    assert schedule.left_s(2, 2, 10.0, 50.0) is None
+        print_lines(iter(["G21", "G90"]), printer.path, 250000, on_progress=shown.append, medium=PATIENT)
+    assert (shown[-1].acknowledged, shown[-1].total) == (2, None)
 
 
 @pytest.mark.parametrize("bad", ["G1 X1 ö", "G1 X5 (Y2", "M117 " + "x" * 90, "G1 X1*5", "M112", "M0 wait"])
 def test_a_line_that_cannot_be_sent_is_refused_before_anything_is_sent(bad: str) -> None:
     with SimulatedPrinter(MACHINE) as printer:
         with pytest.raises(LocalProtocolError, match="line 3"):
-            print_lines(["G28", "G1 X1", bad], printer.path, 250000, timing=PATIENT)
+            print_lines(["G28", "G1 X1", bad], printer.path, 250000, medium=PATIENT)
         assert printer.record.lines == 0
 
 
 def test_a_bad_line_of_a_stream_stops_the_print_with_heaters_off() -> None:
     with SimulatedPrinter(MACHINE) as printer:
         with pytest.raises(LocalProtocolError, match=r"line 4 .*; the printer reports its heaters off"):
-            print_lines(iter([*HEAT, "M98 Pö"]), printer.path, 250000, timing=PATIENT)
+            print_lines(iter([*HEAT, "M98 Pö"]), printer.path, 250000, medium=PATIENT)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
 
 
@@ -164,7 +158,7 @@ def test_a_stream_is_consumed_only_as_fast_as_it_is_printed() -> None:
                 stop.set()
 
     with SimulatedPrinter(MACHINE) as printer:
-        outcome = print_lines(lines(), printer.path, 250000, stop=stop, timing=PATIENT)
+        outcome = print_lines(lines(), printer.path, 250000, control=Control(stop), medium=PATIENT)
     assert outcome.cancelled
     assert ahead[0] < 20
     assert outcome.sent < 520
@@ -186,7 +180,12 @@ def test_stopping_leaves_heaters_off_and_moves_nothing_home(lines: list[str]) ->
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         outcome = print_lines(
-            ["M106 S255", *lines], printer.path, 250000, on_progress=_once_sent(2, stop.set), stop=stop, timing=PATIENT
+            ["M106 S255", *lines],
+            printer.path,
+            250000,
+            on_progress=_once_sent(2, stop.set),
+            control=Control(stop),
+            medium=PATIENT,
         )
         record = printer.record
     assert outcome.cancelled
@@ -200,7 +199,9 @@ def test_without_an_emergency_parser_stopping_still_switches_the_heaters_off() -
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0, build=BuildOptions(emergency_parser=False)) as printer:
         lines = ["M104 S200", *(["G1 X5 F3000", "G1 X0"] * 999)]
-        outcome = print_lines(lines, printer.path, 250000, on_progress=_once_sent(9, stop.set), stop=stop, timing=PATIENT)
+        outcome = print_lines(
+            lines, printer.path, 250000, on_progress=_once_sent(9, stop.set), control=Control(stop), medium=PATIENT
+        )
         assert outcome.heaters_off
         assert printer.record.nozzle_target_c == 0.0
 
@@ -209,7 +210,7 @@ def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         press = _once_sent(9, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT))
         with pytest.raises(KeyboardInterrupt):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=press, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=press, medium=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
         assert printer.record.happened("nozzle 200")
 
@@ -221,7 +222,7 @@ def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
 
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         with pytest.raises(ZeroDivisionError):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=burst, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=burst, medium=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
 
 
@@ -233,7 +234,7 @@ def test_random_faults_end_in_the_exact_moves_or_in_an_error(seed: int) -> None:
     build = BuildOptions(advanced_ok=seed % 2 == 0, emergency_parser=seed % 3 > 0, busy=seed % 5 > 0)
     with SimulatedPrinter(MACHINE, build=build, faults=random_script(seed, 8, range(3, 280), HEALED, 30)) as printer:
         try:
-            print_lines(PROGRAM, printer.path, 250000, timing=QUICK)
+            print_lines(PROGRAM, printer.path, 250000, medium=QUICK)
             whole = True
         except PrinterError:
             whole = False
@@ -245,7 +246,7 @@ def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
         intruder = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
         kill = _once_sent(9, lambda: os.write(intruder, b"\nM112\n"))
         with pytest.raises(FirmwareError, match="Printer halted"):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=kill, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=kill, medium=PATIENT)
         os.close(intruder)
         assert printer.record.nozzle_target_c == 0.0
 
@@ -253,9 +254,9 @@ def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
 def test_a_printer_that_never_answers_is_given_up() -> None:
     master, slave = pty.openpty()
     tty.setraw(slave)
-    hasty = Timing(stall_s=0.1, stall_mute_s=0.1, sync_s=0.1, drain_s=0.05)
+    hasty = replace(SERIAL, timing=Timing(stall_s=0.1, stall_mute_s=0.1, sync_s=0.1, drain_s=0.05))
     with pytest.raises(SilenceError, match="greetings"):
-        print_lines(["G28"], os.ttyname(slave), 250000, timing=hasty)
+        print_lines(["G28"], os.ttyname(slave), 250000, medium=hasty)
     os.close(master)
     os.close(slave)
 

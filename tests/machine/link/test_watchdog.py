@@ -5,9 +5,9 @@ from contextlib import nullcontext
 
 import pytest
 
-from machine.link.protocol.events import Echo, Temperature, read_event
+from machine.link.protocol.events import Event, Kind, Temperature, read_event
 from machine.link.stream import print_lines
-from machine.link.watchdog import PrinterReports, Watchdog
+from machine.link.watchdog import PrinterReports
 from machine.printing.serial_log import tap
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
@@ -19,11 +19,11 @@ PROFILE = load()
 LAST_S = 598.0  # of the reports that watched() gives
 
 
-def watched(nozzle: Callable[[float], float], target_c: float = 200.0, seconds: int = 600, every_s: int = 2) -> Watchdog:
+def watched(nozzle: Callable[[float], float], target_c: float = 200.0, seconds: int = 600, every_s: int = 2) -> PrinterReports:
     """A watchdog that has seen a nozzle with a course of its own, and a bed at rest."""
-    watchdog = Watchdog((300.0, 110.0))
+    watchdog = PrinterReports(0.0, (300.0, 110.0))
     for second in range(0, seconds, every_s):
-        watchdog.check(Temperature(nozzle(second), target_c, 60.0, 60.0), float(second))
+        watchdog.read(Event(Kind.TEMPERATURE, temperature=Temperature(nozzle(second), target_c, 60.0, 60.0)), float(second))
         watchdog.check_silence(float(second))
     return watchdog
 
@@ -36,7 +36,7 @@ def watched(nozzle: Callable[[float], float], target_c: float = 200.0, seconds: 
     lambda s: 150.0 if s % 100 < 50 else 200.0,  # a gust of air, and back in time
 ], ids=["steady", "slow", "swinging", "cooling", "gusts"])  # fmt: skip
 def test_a_heater_that_is_or_comes_near_its_target_is_left_alone(course: Callable[[float], float]) -> None:
-    assert watched(course).reported_s == LAST_S
+    assert watched(course).temperature_s == LAST_S
 
 
 @pytest.mark.parametrize(("course", "words"), [
@@ -54,17 +54,17 @@ def test_a_heater_that_is_off_may_have_any_temperature() -> None:
     def cooling(second: float) -> float:
         return 150.0 - 0.1 * second
 
-    assert watched(cooling, target_c=0.0).reported_s == LAST_S
+    assert watched(cooling, target_c=0.0).temperature_s == LAST_S
     with pytest.raises(PrinterError, match="nozzle has been at"):
         watched(cooling, target_c=200.0)
 
 
 def test_a_cold_bed_is_noticed_too() -> None:
-    watchdog = Watchdog()
+    watchdog = PrinterReports(0.0)
     for second in range(180):
-        watchdog.check(Temperature(200.0, 200.0, 20.0, 60.0), float(second))
+        watchdog.read(Event(Kind.TEMPERATURE, temperature=Temperature(200.0, 200.0, 20.0, 60.0)), float(second))
     with pytest.raises(PrinterError, match="the bed has been at 20 °C for 181 s although 60 is wanted"):
-        watchdog.check(Temperature(200.0, 200.0, 20.0, 60.0), 181.0)
+        watchdog.read(Event(Kind.TEMPERATURE, temperature=Temperature(200.0, 200.0, 20.0, 60.0)), 181.0)
 
 
 def test_silence_about_a_heater_that_is_on_ends_the_print() -> None:
@@ -76,9 +76,9 @@ def test_silence_about_a_heater_that_is_on_ends_the_print() -> None:
 
 @pytest.mark.parametrize(("target_c", "ends"), [(None, False), (0.0, False), (200.0, True)], ids=["no report", "cold", "hot"])
 def test_silence_is_judged_of_a_printer_that_reported_a_heater_on_alone(target_c: float | None, ends: bool) -> None:
-    watchdog = Watchdog()
+    watchdog = PrinterReports(0.0)
     if target_c is not None:
-        watchdog.check(Temperature(target_c, target_c), 0.0)
+        watchdog.read(Event(Kind.TEMPERATURE, temperature=Temperature(target_c, target_c)), 0.0)
     with pytest.raises(PrinterError) if ends else nullcontext() as error:
         watchdog.check_silence(1e6)
     assert (error is not None) == ends
@@ -121,9 +121,9 @@ def test_what_the_firmware_does_not_know_is_asked_once_and_left_out_then() -> No
 
 
 def test_what_matters_is_sent_although_the_firmware_does_not_know_it() -> None:
-    reports = PrinterReports(Watchdog(), 0.0)
+    reports = PrinterReports(0.0)
     for said in ('Unknown command: "M104 S200"', 'Unknown command: "M900 K0.1"'):
-        reports.read(Echo(said), 0.0)
+        reports.read(Event(Kind.ECHO, said), 0.0)
     assert not reports.leaves_out("M104 S210")
     assert reports.leaves_out("M900 K0.2")
 
@@ -132,7 +132,7 @@ def test_what_matters_is_sent_although_the_firmware_does_not_know_it() -> None:
     b'echo:Unknown command: "M900 K1"', b'// Unknown command:"M900"', b"Warning: M900: Command is not supported",
 ])  # fmt: skip
 def test_every_firmware_s_words_for_an_unknown_command_are_counted_as_one(said: bytes) -> None:
-    reports = PrinterReports(Watchdog(), 0.0)
+    reports = PrinterReports(0.0)
     for _ in range(19):
         reports.read(read_event(said), 0.0)
     assert reports.warnings == ["Unknown command: M900 (x 19)"]

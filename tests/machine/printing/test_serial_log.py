@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from machine.link.pending_commands import Control
 from machine.link.stream import print_lines
 from machine.printing.serial_log import KEPT, PIECES, PrinterMessages, SerialLog, new_log, piece_of, printer_message, tap
 from machine.simulator.simulator import SimulatedPrinter
@@ -89,7 +90,13 @@ def test_the_orders_of_a_safe_end_are_logged_too(tmp_path: Path) -> None:
     with SerialLog(tmp_path / "a.log", "") as log, SimulatedPrinter(load().machine, speed=20.0) as printer:
         lines = ["M104 S200", *["G1 X5 F60", "G1 X0"] * 99]
         medium = tap(log.note)
-        print_lines(lines, printer.path, on_progress=lambda progress: progress.sent > 5 and stop.set(), stop=stop, medium=medium)
+        print_lines(
+            lines,
+            printer.path,
+            on_progress=lambda progress: progress.sent > 5 and stop.set(),
+            control=Control(stop),
+            medium=medium,
+        )
     lines = logged(tmp_path / "a.log")
     assert any(line.startswith("> N") and "M104 S200" in line for line in lines)
     assert "> M104 S0" in lines

@@ -236,7 +236,7 @@ def _read_for_ever(port: Port) -> None:
 
 def test_a_cable_pulled_out_and_put_back_is_a_terminal_gone_and_back(tmp_path: Path) -> None:
     link = tmp_path / "printer"
-    with SimulatedPrinter(MACHINE, faults=[Fault("disconnect", 1, seconds=0.3)], link=link) as printer:
+    with SimulatedPrinter(MACHINE, faults=[Fault("disconnect", 1, seconds=0.3)], at=link) as printer:
         with open_port(printer.path, 115200) as port:
             port.write(b"G21\n")
             with pytest.raises(PortError, match="was lost"):
@@ -254,7 +254,7 @@ def test_a_cable_pulled_out_and_put_back_is_a_terminal_gone_and_back(tmp_path: P
 
 def test_what_is_no_link_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("x")
-    with pytest.raises(PortError, match="mine exists and is no link"), SimulatedPrinter(MACHINE, link=tmp_path / "mine"):
+    with pytest.raises(PortError, match="mine exists and is no link"), SimulatedPrinter(MACHINE, at=tmp_path / "mine"):
         pass
     assert (tmp_path / "mine").read_text() == "x"
 

@@ -2,16 +2,17 @@
 
 import pytest
 
-from machine.simulator.contact import ProbedTable, TrueBall
+from machine.simulator.contact import TrueBall
 from machine.simulator.firmware import SimulatedFirmware
 from tests.machine.setup.calibration.touches import machine_of
+from tests.machine.simulator.faulty_table import FaultyTable
 
 BALL = TrueBall(10.0, (20.0, 0.0, 45.0))
 
 
 def says(name: str, *lines: str, **table: float) -> list[str]:
     machine = machine_of(name)
-    firmware = SimulatedFirmware(machine, table=ProbedTable(machine, BALL, **table))  # type: ignore[arg-type]
+    firmware = SimulatedFirmware(machine, table=FaultyTable(machine, BALL, **table))
     firmware.receive("".join(f"{line}\n" for line in ("G28", "G90", "G1 X20 Y0 Z70 F3000", *lines)).encode())
     return firmware.advance().decode().splitlines()
 

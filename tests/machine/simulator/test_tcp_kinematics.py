@@ -10,17 +10,24 @@ from hypothesis import strategies as st
 from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import MoveKind
 from machine.gcode.writer import write_gcode
-from machine.kinematics.table import axis_positions
+from machine.kinematics.table import axis_positions, workpiece_path
 from machine.link.protocol.framing import command_of
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.motion import TcpKinematics
+from machine.simulator.record import Record
+from mdp.mesh import Floats
 from profiles.machine import Machine
 from tests.machine.firmware.test_dialects import profile
 from tests.machine.hand import printed
 
 CHOSEN = profile("marlin", "workpiece")
 CENTRED = {"point_mm": (100.0, 100.0, 0.0), "limits_deg": (-36000.0, 36000.0), "sign": 1}  # Rx(-A) Rz(-C)
+
+
+def paths(record: Record) -> Floats:
+    """(n, 2, 3) every move in the workpiece frame, mm; a move that turns the table is a curve there, these are its ends."""
+    return np.stack([workpiece_path(record.machine, points[:, :5]) for points in (record.start, record.end)], axis=1)
 
 
 def measured() -> Machine:
@@ -69,7 +76,7 @@ def test_a_turn_keeps_the_tip_on_the_workpiece_within_a_hair() -> None:
     firmware = SimulatedFirmware(measured(), BuildOptions(home_start=False))
     answer(firmware, "G43.4\nG0 X120 Y110 Z5\nM400\nG1 A20 C50 F3000\nM400\n")
     record = firmware.record()
-    turn = record.paths()[record.begin_s > record.begin_s[0]].reshape(-1, 3)
+    turn = paths(record)[record.begin_s > record.begin_s[0]].reshape(-1, 3)
     assert record.moves > 20
     assert np.abs(turn - turn[0]).max() < 1e-9
     assert record.end[-1, 3:5].tolist() == pytest.approx([20.0, 50.0])
@@ -79,8 +86,8 @@ def test_the_record_covers_every_move_in_the_workpiece_frame() -> None:
     firmware = SimulatedFirmware(CHOSEN.machine, BuildOptions(home_start=False))
     answer(firmware, "G0 X5 Y5\nG1 Z3\nG0 A10\nM302 P1\nM83\nG1 X7 E1\nG1 E-1\nM400\n")
     record = firmware.record()
-    assert record.paths().shape == (5, 2, 3) == (record.moves, 2, 3)
-    assert record.deposited()[0][0] == pytest.approx(record.paths()[3])
+    assert paths(record).shape == (5, 2, 3) == (record.moves, 2, 3)
+    assert record.deposited()[0][0] == pytest.approx(paths(record)[3])
 
 
 def test_a_whole_print_in_workpiece_coordinates_lays_what_the_reader_reads() -> None:

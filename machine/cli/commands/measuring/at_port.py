@@ -10,7 +10,7 @@ from machine.firmware import dialect_of
 from machine.firmware.firmware import ProbingRules
 from machine.gcode.pen import Pen
 from machine.link.medium import SERIAL, Medium, Wire
-from machine.link.protocol.events import Echo, Event, Unknown
+from machine.link.protocol.events import Event, Kind
 from machine.link.protocol.framing import LINE_LIMIT
 from machine.link.shutdown import lift_tip
 from machine.notices import say
@@ -98,7 +98,7 @@ class ProbingSession(CommandSession):
 
     def _heard(self, event: Event) -> None:
         super()._heard(event)
-        if isinstance(event, Echo | Unknown):
+        if event.kind in (Kind.ECHO, Kind.UNKNOWN):
             self.heard.append(event.text)
 
 
@@ -136,7 +136,7 @@ class PrinterProber(PrinterMover):
         position = self._session.exchange.ask_position()
         if position is None:
             raise PrinterError("the printer does not report where it has stopped: an answer to M114 is needed")
-        return dict(position.axes)["Z"]
+        return position["Z"]
 
     def _answered(self) -> float:
         """The tip's Z that the firmware has answered."""
@@ -157,8 +157,7 @@ def cold_session(
     with ExitStack() as stack:
         log = stack.enter_context(new_log("calibrate", f"calibrate at {at.name}", log_file))
         wire = stack.enter_context(open_line(at, machine, table))
-        if log.trouble:
-            say(f"the traffic is not logged: {log.file}: {log.trouble}")
+        log.say_trouble()
         stack.enter_context(interrupting())
         answer = identify_printer(wire, rate_of(at))
         say(describe_answer(answer, rate_of(at)))

@@ -120,7 +120,7 @@ def test_the_list_for_programs_always_has_the_same_keys() -> None:
 def test_a_running_simulator_is_a_port_as_long_as_it_runs(
     here: list[SerialDevice], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with SimulatedPrinter(MACHINE, link=tmp_path / "tty") as printer, announced("simulated printer (mine)", printer.path):
+    with SimulatedPrinter(MACHINE, at=tmp_path / "tty") as printer, announced("simulated printer (mine)", printer.path):
         assert main(["ports"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         f"{tmp_path}/tty",
@@ -146,7 +146,7 @@ def test_a_simulator_that_was_killed_is_no_port(here: list[SerialDevice], capsys
 
 
 def test_a_simulator_that_another_program_talks_to_says_that_it_is_busy(capsys: pytest.CaptureFixture[str]) -> None:
-    with SimulatedPrinter(MACHINE, tcp=0) as printer, open_port(printer.path, 115200) as first:
+    with SimulatedPrinter(MACHINE, at=0) as printer, open_port(printer.path, 115200) as first:
         first.write(b"M115\n")
         assert main(["print", "demo:bracket", "--port", printer.path]) == 1
     assert "is busy (another program talks to this simulated printer)" in capsys.readouterr().err

@@ -67,16 +67,16 @@ def test_where_the_table_stands_in_the_way_up_the_tip_stays() -> None:
 def test_a_pause_before_the_place_is_known_moves_filament_only() -> None:
     modal = ModalState(axes_of(MACHINE))
     modal.take("M104 S200")
-    way = plan_park(modal, PROFILE, PrintedBounds(MACHINE))
-    assert way.park is None
-    assert not [line for line in (*way.away, *way.down) if re.match(r"G[01] .*[XYZ]", line)]
+    away, back, park = plan_park(modal, PROFILE, PrintedBounds(MACHINE))
+    assert park is None
+    assert not [line for line in (*away, *back) if re.match(r"G[01] .*[XYZ]", line)]
 
 
 def test_filament_that_the_program_has_pulled_back_already_is_not_pulled_again() -> None:
     modal = ModalState(axes_of(MACHINE))
     for command in ("M104 S200", "M83", "G92 E0", "G1 E5", f"G1 E-{PROFILE.material.retract_mm}"):
         modal.take(command)
-    assert not [line for line in plan_park(modal, PROFILE, None).away if "E" in line]
+    assert not [line for line in plan_park(modal, PROFILE, None)[0] if "E" in line]
 
 
 def test_a_lift_under_a_firmware_that_follows_the_table_goes_along_the_nozzle() -> None:
@@ -98,5 +98,5 @@ def test_a_material_may_want_the_nozzle_cooler_while_a_print_rests() -> None:
     for command in ("M109 S200", "M83", "G1 X1 Y1 Z1 A0 C0 E1"):
         modal.take(command)
     cool, hot = (load(settings=[f"material.standby_c={c}"]) for c in (150, 250))
-    ways = [plan_park(modal, profile, PrintedBounds(MACHINE)) for profile in (PROFILE, cool, hot)]
-    assert ["M104 S150" in way.away for way in ways] == [False, True, False]
+    ways = [plan_park(modal, profile, PrintedBounds(MACHINE))[0] for profile in (PROFILE, cool, hot)]
+    assert ["M104 S150" in away for away in ways] == [False, True, False]

@@ -2,12 +2,13 @@
 
 import pytest
 
+from machine.firmware.marlin import MARLIN
 from machine.link.protocol.answers import ASKED_LIMIT, NOISE_LIMIT, Acknowledgement, Resends
-from machine.link.protocol.events import Ok, Temperature
+from machine.link.protocol.events import Event, Kind, Temperature
 from machine.link.protocol.framing import frame
-from machine.link.protocol.window import Window
+from machine.link.protocol.window import CLEAN_LINES, Window
 
-WARM = Ok(temperature=Temperature(20.0, 0.0))
+OK, WARM = Event(Kind.OK), Event(Kind.OK, temperature=Temperature(20.0, 0.0))
 
 
 def window(*commands: str) -> Window:
@@ -19,33 +20,33 @@ def window(*commands: str) -> Window:
 
 
 @pytest.mark.parametrize(("ok", "numbered", "line"), [
-    (Ok(), False, 1),
-    (Ok(2), True, 2),
-    (Ok(), True, None),
+    (OK, False, 1),
+    (Event(Kind.OK, line=2), True, 2),
+    (OK, True, None),
     (WARM, False, 2),
     (WARM, True, 2),
 ], ids=["oldest", "named", "not named", "first question", "first question of a printer that names its lines"])  # fmt: skip
-def test_an_ok_answers_the_line_it_names_or_the_oldest_one(ok: Ok, numbered: bool, line: int | None) -> None:
+def test_an_ok_answers_the_line_it_names_or_the_oldest_one(ok: Event, numbered: bool, line: int | None) -> None:
     assert Acknowledgement().line(ok, window("G1 X1", "M105", "G1 X2"), numbered, 0.0) == line
 
 
 def test_the_ok_that_belongs_to_a_resend_answers_nothing_once() -> None:
     oks, lines = Acknowledgement(), window("G1 X1")
     oks.expect_resend_ok(until_s=1.0)
-    assert [oks.line(Ok(), lines, False, 0.5) for _ in range(2)] == [None, 1]
+    assert [oks.line(OK, lines, False, 0.5) for _ in range(2)] == [None, 1]
 
 
 def test_the_ok_of_a_resend_is_not_waited_for_long() -> None:
     oks = Acknowledgement()
     oks.expect_resend_ok(until_s=1.0)
-    assert oks.line(Ok(), window("G1 X1"), False, 1.5) == 1
+    assert oks.line(OK, window("G1 X1"), False, 1.5) == 1
 
 
 def test_a_plain_ok_is_no_answer_to_a_question_once_one_was_answered_with_a_temperature() -> None:
     oks, lines = Acknowledgement(), window("M105")
-    assert oks.line(Ok(), lines, False, 0.0) == 1
+    assert oks.line(OK, lines, False, 0.0) == 1
     oks.line(WARM, lines, False, 0.0)
-    assert oks.line(Ok(), lines, False, 0.0) is None
+    assert oks.line(OK, lines, False, 0.0) is None
 
 
 def test_lines_are_repeated_in_order_up_to_the_last_one_sent() -> None:
@@ -72,3 +73,21 @@ def test_too_many_of_the_last_lines_are_too_much_noise() -> None:
     assert [resends.request(5 * k) for k in range(1, NOISE_LIMIT + 1)] == [""] * NOISE_LIMIT
     assert resends.request(5 * (NOISE_LIMIT + 1)) == "20 of the last 200 lines"
     assert resends.request(10_000) == ""
+
+
+def test_after_a_refused_line_the_next_go_one_by_one_and_after_another_for_longer() -> None:
+    lines = Window()
+
+    def take(count: int) -> int:
+        for _ in range(count):
+            lines.acknowledge(lines.sent if lines.send("G1 X1") else 0)
+        return lines.places(MARLIN.line, emergency_parser=True)
+
+    lines.learn(3)
+    assert [take(CLEAN_LINES - 1), take(1), take(100)] == [1, 4, 4]
+    lines.back_off()
+    assert [take(0), take(4 * CLEAN_LINES - 1), take(1)] == [1, 1, 4]
+    lines.slow_down()
+    assert [take(0), take(4 * CLEAN_LINES)] == [1, 4]
+    lines.back_off()
+    assert [take(16 * CLEAN_LINES - 1), take(1)] == [1, 4]

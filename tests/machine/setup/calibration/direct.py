@@ -9,6 +9,7 @@ from machine.simulator.contact import ProbedTable, TrueBall
 from mdp.pose import Pose
 from profiles.machine import Machine
 from tests.machine.setup.calibration.misaligned import misaligned
+from tests.machine.simulator.faulty_table import FaultyTable
 
 RADIUS_MM, HEIGHT_MM = 10.0, 45.0
 PLACED_MM = 2.0  # by which a person puts the ball elsewhere
@@ -59,6 +60,6 @@ def probed(machine: Machine, seed: int, noise_mm: float = 0.0, **table: object) 
     real, ball = misaligned(machine, random), usual_ball(machine)
     x, y = (float(value) for value in ball.centre_mm[:2] + random.uniform(-PLACED_MM, PLACED_MM, 2))
     placed = TrueBall(RADIUS_MM, (x, y, HEIGHT_MM))
-    prober = DirectProber(ProbedTable(real, placed, noise_mm=noise_mm, seed=seed, **table), machine.z.limits_mm[1])  # type: ignore[arg-type]
+    prober = DirectProber(FaultyTable(real, placed, noise_mm=noise_mm, seed=seed, **table), machine.z.limits_mm[1])
     probe = Probe(prober.table.offset_mm, 0.0)
     return Measuring(machine, ball, prober, probe), prober

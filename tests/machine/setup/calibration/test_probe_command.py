@@ -11,13 +11,14 @@ from machine.cli.cli import main
 from machine.cli.commands.measuring.at_port import PrinterProber
 from machine.firmware import firmware_of
 from machine.setup.calibration.program import calibration_pen
-from machine.simulator.contact import ProbedTable, TrueBall
+from machine.simulator.contact import TrueBall
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, PrinterError
 from profiles.places import own_folder
 from profiles.profile import load
 from tests.machine.setup.calibration.misaligned import misaligned
 from tests.machine.setup.calibration.touches import machine_of
+from tests.machine.simulator.faulty_table import FaultyTable
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +31,7 @@ def printer(name: str, **fault: float) -> SimulatedPrinter:
     machine = machine_of(name)
     radius = min(0.6 * machine.table.radius_mm, 45.0)
     real = misaligned(machine, np.random.default_rng(7))
-    table = ProbedTable(real, TrueBall(10.0, (radius + 1.0, -1.0, 45.0)), noise_mm=0.005, flat_mm=0.5, **fault)  # type: ignore[arg-type]
+    table = FaultyTable(real, TrueBall(10.0, (radius + 1.0, -1.0, 45.0)), noise_mm=0.005, flat_mm=0.5, **fault)
     return SimulatedPrinter(machine, inf, table=table)
 
 
