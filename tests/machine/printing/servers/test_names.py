@@ -40,12 +40,24 @@ def test_an_address_names_kind_host_and_port(text: str, url: str) -> None:
 
 
 @pytest.mark.parametrize(("text", "kind"), [
-    ("sim", Simulated), ("/dev/ttyACM0", SerialPort), ("socket://host:1", SerialPort), ("Duet:printer", Server),
+    ("sim", Simulated), ("/dev/serial/by-path/pci-0000:00:14.0", SerialPort), ("COM3", SerialPort), ("/dev/ttyACM0", SerialPort), ("socket://host:1", SerialPort), ("Duet:printer", Server),
 ])  # fmt: skip
 def test_a_destination_is_read_once_and_keeps_its_name(text: str, kind: type) -> None:
     destination = parse_destination(text, 250000, 2.0)
     assert isinstance(destination, kind)
     assert destination.name == text
+
+
+@pytest.mark.parametrize("text", ["SIM", "Sim"])
+def test_the_simulator_is_meant_in_capitals_too(text: str) -> None:
+    assert isinstance(parse_destination(text), Simulated)
+
+
+@pytest.mark.parametrize("text", ["junk:", "junk://host", "octopi:host", "", " ", " sim", "tty\0", "octopi:me:secret@host"])
+def test_a_name_that_no_device_has_is_refused(text: str) -> None:
+    with pytest.raises(PrinterError, match="cannot be one: a device, sim, socket://HOST:PORT") as refused:
+        parse_destination(text)
+    assert "secret" not in str(refused.value)
 
 
 @pytest.mark.parametrize(("given", "sentence"), [
@@ -72,9 +84,16 @@ def test_a_port_is_no_server(text: str) -> None:
         ("prusalink:host", "octoprint:HOST, moonraker:HOST or duet:HOST"),
         ("octoprint:", "names no host"),
         ("octoprint:ftp://host", "http:// or https:// is expected"),
-        ("octoprint:host:99999", "port out of range"),
+        ("octoprint:host:99999", "port 99999 is none"),
         ("octoprint:host:0", "port 0 is none"),
+        ("octoprint:host:", "port  is none"),
+        ("octoprint:http://http://host", "port  is none"),
         ("octoprint:host?apikey=1", "nothing may follow the path"),
+        ("octoprint:host?", "nothing may follow the path"),
+        ("octoprint:host%00", "names no host"),
+        ("octoprint:[::1", "names no host"),
+        ("octoprint:[fe80::g]", "names no host"),
+        ("octoprint:[::1]x", "nothing may follow the path"),
         ("octoprint:a b", "names no host"),
         ("octoprint:ho\x1bst", "names no host"),
         ("octoprint:a..b", "names no host"),
