@@ -12,7 +12,7 @@ from machine.firmware import dialect_of, dialects, firmware_of, identify
 from machine.firmware.klipper import stepper_name
 from machine.gcode.commands import command_named
 from machine.gcode.line_text import macro_name
-from machine.link.identification import Answer, Kind
+from machine.link.identification import Answer
 from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import say
 from machine.pipeline.embedded_profile import read_embedded_profile
@@ -104,14 +104,14 @@ def with_starvation(destination: Destination, program: Program, profile: Profile
 def server_machine_sentences(server: Server, greeting: ServerIdentity, machine: Machine) -> Iterator[str]:
     """Reasons against a machine behind a print server. Raises PrinterError for a dialect that the server does not read."""
     check_destination(server, machine)
-    yield from machine_sentences(printer_of(greeting), machine)
+    yield from machine_sentences(greeting.printer, machine)
     yield lacking_steppers(greeting, machine)
     yield _unknown_macros(lacking_macros(greeting, _block_lines(machine)), machine.name)
 
 
 def server_program_sentences(greeting: ServerIdentity, loaded: LoadedProgram) -> Iterator[str]:
     """Reasons against a program behind a print server, missing Klipper macros included."""
-    yield from program_sentences(printer_of(greeting), loaded)
+    yield from program_sentences(greeting.printer, loaded)
     lacking = lacking_macros(greeting, _block_lines(loaded.profile.machine))
     unknown = [name for name in lacking_macros(greeting, loaded.program.lines) if name not in lacking]
     yield _unknown_macros(unknown, loaded.name)
@@ -224,10 +224,3 @@ def _unknown_macros(names: list[str], caller: str) -> str:
         return ""
     sections = " and ".join(f"[gcode_macro {name}]" for name in names)
     return f"{caller} calls {' and '.join(names)}, which this Klipper does not know and would pass over: it needs {sections}"
-
-
-def printer_of(greeting: ServerIdentity) -> Answer | None:
-    """The printer behind a server, described as a printer at a port would answer."""
-    if not greeting.firmware:
-        return None
-    return Answer(Kind.PRINTER, f"FIRMWARE_NAME:{greeting.firmware}", greeting.letters, greeting.limits)

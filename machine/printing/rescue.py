@@ -4,6 +4,7 @@ A print server goes on printing by itself: it is only asked what it does, unless
 """
 
 from machine.link.medium import SERIAL
+from machine.link.pending_commands import Command
 from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from machine.printing.destination import Destination, Server, Simulated
@@ -42,7 +43,7 @@ def rescue(at: Destination, emergency: bool) -> str:
 def _stop_server(at: Server) -> str:
     try:
         with open_server(at) as server:
-            server.emergency_stop()
+            server.order(Command.EMERGENCY_STOP)
     except UserError as error:
         return UNCONFIRMED.format(server=at.name, error=error)
     return STOPPED.format(server=at.name)
@@ -66,7 +67,7 @@ def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
             raise ServerError(f"{at.name} prints {printed} now, not {file}")
         if status.elapsed_s + ROUNDED_S < away_s:  # begun after the one that was left was last seen
             raise ServerError(f"{at.name} may have begun to print {file} again since: {CANCEL_THERE}")
-        server.cancel()
+        server.order(Command.CANCEL)
         return True
 
 

@@ -27,8 +27,7 @@ from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, 
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog, new_log
 from machine.printing.servers.follow import OnStatus, follow_print
-from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import PrintServer, ServerIdentity
+from machine.printing.servers.server import GcodeUpload, PrintServer, ServerIdentity
 from machine.printing.servers.servers import open_server
 from machine.program import Program
 from machine.quantities import duration

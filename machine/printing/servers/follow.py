@@ -195,7 +195,7 @@ class _Follower:
         while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
                 try:
-                    self.server.emergency_stop()
+                    self.server.order(Command.EMERGENCY_STOP)
                 except ServerError as error:
                     raise ServerError(UNCONFIRMED.format(server=self.server.name, error=error)) from None
                 return True
@@ -204,19 +204,19 @@ class _Follower:
         return False
 
     def _order(self, request: PendingCommand) -> Callable[[], None] | None:
-        server, value = self.server, request.value
-        if request.command in (Command.FEED, Command.FLOW):
-            limits = FEED_PERCENT if request.command is Command.FEED else FLOW_PERCENT
-            self._message = percent_refusal(value, limits) or ""
-            return None if self._message else partial(self._set_percent, request.command, value)
-        orders = {Command.PAUSE: server.pause, Command.RESUME: server.resume, Command.CANCEL: self._cancel}
-        return orders.get(request.command)
+        command, value = request.command, request.value
+        if command in (Command.FEED, Command.FLOW):
+            self._message = percent_refusal(value, FEED_PERCENT if command is Command.FEED else FLOW_PERCENT) or ""
+            return None if self._message else partial(self._set_percent, command, value)
+        if command is Command.CANCEL:
+            return self._cancel
+        return partial(self.server.order, command) if command in (Command.PAUSE, Command.RESUME) else None
 
     def _cancel(self) -> None:
         """What ends from now on was cancelled here, unless the order was refused."""
         self._cancels = True
         try:
-            self.server.cancel()
+            self.server.order(Command.CANCEL)
         except NoAnswerError:
             raise
         except ServerError:

@@ -12,7 +12,7 @@ from machine.link.print_state import PrintState, follows
 from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.rescue import cancel_on_server, rescue
-from machine.printing.servers.gcode_upload import server_name
+from machine.printing.servers.server import server_name
 from machine.workbench.printing.at_page import BEGIN, LEAVE
 from machine.workbench.printing.job_state import JobState, first_state
 from machine.workbench.work.heard import heard

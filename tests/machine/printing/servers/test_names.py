@@ -18,9 +18,9 @@ from machine.printing.destination import (
     parse_printer,
     parse_server_address,
 )
-from machine.printing.servers.credentials import VARIABLE, Credentials, read_credentials, servers_file
-from machine.printing.servers.gcode_upload import GcodeUpload, server_name
-from machine.printing.servers.http import HttpSession, fetch_picture, picture_address
+from machine.printing.servers.http import VARIABLE, HttpSession, fetch_picture, picture_address, servers_file
+from machine.printing.servers.server import GcodeUpload, server_name
+from machine.printing.servers.servers import read_credentials
 from profiles.errors import PrinterError, ServerError
 
 
@@ -40,7 +40,8 @@ def test_an_address_names_kind_host_and_port(text: str, url: str) -> None:
 
 
 @pytest.mark.parametrize(("text", "kind"), [
-    ("sim", Simulated), ("/dev/serial/by-path/pci-0000:00:14.0", SerialPort), ("COM3", SerialPort), ("/dev/ttyACM0", SerialPort), ("socket://host:1", SerialPort), ("Duet:printer", Server),
+    ("sim", Simulated), ("/dev/serial/by-path/pci-0000:00:14.0", SerialPort), ("COM3", SerialPort),
+    ("/dev/ttyACM0", SerialPort), ("socket://host:1", SerialPort), ("Duet:printer", Server),
 ])  # fmt: skip
 def test_a_destination_is_read_once_and_keeps_its_name(text: str, kind: type) -> None:
     destination = parse_destination(text, 250000, 2.0)
@@ -116,7 +117,7 @@ def test_a_password_in_an_address_is_refused_and_not_repeated(text: str) -> None
 @pytest.mark.parametrize("host", ["999.999.999.999", "\ufb01x", "xn--zz"])
 def test_a_host_that_cannot_be_is_refused_in_a_sentence(host: str) -> None:
     with pytest.raises(ServerError, match="names no host"):
-        HttpSession(parse_server_address(f"octoprint:{host}"), Credentials()).get("/")
+        HttpSession(parse_server_address(f"octoprint:{host}")).get("/")
 
 
 @pytest.mark.parametrize(
@@ -159,23 +160,22 @@ def _own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_key_is_found_by_host_and_port_before_the_host_alone() -> None:
     file = write_servers('[servers."octopi"]\nkey = "one"\nca_file = "ca.pem"\n[servers."octopi:5000"]\nkey = "two"\n')
-    assert read_credentials(parse_server_address("octoprint:octopi")).key == "one"
-    assert read_credentials(parse_server_address("octoprint:octopi")).ca_file == file.parent / "ca.pem"
-    assert read_credentials(parse_server_address("octoprint:octopi:5000")).key == "two"
-    assert read_credentials(parse_server_address("octoprint:other")).key == ""
+    assert read_credentials(parse_server_address("octoprint:octopi")) == ("one", file.parent / "ca.pem")
+    assert read_credentials(parse_server_address("octoprint:octopi:5000")) == ("two", None)
+    assert read_credentials(parse_server_address("octoprint:other")) == ("", None)
 
 
 def test_a_host_is_the_same_in_capitals() -> None:
     write_servers('[servers."OctoPi.local"]\nkey = "one"\n')
-    assert read_credentials(parse_server_address("octoprint:octopi.LOCAL")).key == "one"
+    assert read_credentials(parse_server_address("octoprint:octopi.LOCAL")) == ("one", None)
 
 
 def test_the_variable_goes_before_the_file_and_no_key_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     write_servers('[servers."octopi"]\nkey = "one"\n')
     monkeypatch.setenv(VARIABLE, "other")
-    credentials = read_credentials(parse_server_address("octoprint:octopi"))
-    assert credentials.key == "other"
-    assert "other" not in repr(credentials)
+    key, _ = read_credentials(parse_server_address("octoprint:octopi"))
+    assert key == "other"
+    assert "other" not in repr(HttpSession(parse_server_address("octoprint:octopi"), key))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows keeps a user's folders to the user")

@@ -18,10 +18,9 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.destination import parse_server_address
 from machine.printing.rescue import cancel_on_server, rescue
 from machine.printing.servers import duet, follow, http
-from machine.printing.servers.credentials import VARIABLE, servers_file
 from machine.printing.servers.follow import follow_print
-from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import PrintServer
+from machine.printing.servers.http import VARIABLE, servers_file
+from machine.printing.servers.server import GcodeUpload, PrintServer
 from machine.printing.servers.servers import KINDS
 from profiles.errors import NoAnswerError, ServerError
 from tests.machine.printing.servers.stand_ins import KEY, STAND_INS, Job, session_with, stand_in
@@ -471,7 +470,12 @@ def test_whatever_a_server_answers_there_is_a_sentence_or_a_value(kind: str) -> 
     with stand_in(kind, handler=AnyAnswer) as (_, address):
         for _ in range(60):
             with session_with(address) as server:
-                calls: list[Callable[[], object]] = [server.greet, server.status, lambda: server.has("box.gcode"), server.pause]
+                calls: list[Callable[[], object]] = [
+                    server.greet,
+                    server.status,
+                    lambda: server.has("box.gcode"),
+                    lambda: server.order(Command.PAUSE),
+                ]
                 for call in [*calls, lambda: server.upload(UPLOAD, unheard), lambda: server.command("M220 S90")]:
                     with contextlib.suppress(ServerError):
                         call()
