@@ -19,7 +19,7 @@ from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.programs import LoadedProgram, count_of_errors, refuse_errors
 from machine.pipeline.requests import FORCE_GOES_ON
 from machine.printing.destination import Destination, SerialPort, Server
-from machine.printing.servers.server import ServerIdentity
+from machine.printing.servers.server import Identity
 from machine.printing.servers.servers import dialect_mismatch
 from machine.program import Program
 from profiles.errors import PrinterError, ServerError
@@ -44,11 +44,11 @@ def check(sentences: Iterable[str], force: bool) -> bool:
     return not found
 
 
-def check_machine(answer: Answer | None, machine: Machine) -> None:
-    """Refuse a machine whose firmware takes no lines, or is not that of the printer; None: nothing is known of it."""
+def check_machine(answer: Answer | None, machine: Machine, force: bool = False) -> bool:
+    """Refuse a machine whose firmware takes no lines, or is not that of the printer at a port; True when nothing speaks against
+    it. answer: None: nothing is known of the printer. Raises PrinterError."""
     check_dialect(machine)
-    if answer is not None and (sentence := firmware_mismatch(answer, machine)):
-        raise PrinterError(f"{sentence} ({FORCE_GOES_ON})", forcible=True)
+    return check([firmware_mismatch(answer, machine)], force)
 
 
 def check_destination(destination: Destination, machine: Machine) -> None:
@@ -68,53 +68,37 @@ def check_dialect(machine: Machine) -> None:
         )
 
 
-def machine_sentences(answer: Answer | None, machine: Machine) -> Iterator[str]:
-    """Reasons against a machine at a printer with this answer; None: the printer is not known."""
-    if answer is not None:
-        yield firmware_mismatch(answer, machine)
+def machine_sentences(identity: Identity, machine: Machine) -> Iterator[str]:
+    """Reasons against a machine at a printer."""
+    yield firmware_mismatch(identity.printer, machine)
+    yield lacking_steppers(identity, machine)
+    yield _unknown_macros(lacking_macros(identity, _block_lines(machine)), machine.name)
 
 
-def program_sentences(answer: Answer | None, loaded: LoadedProgram) -> Iterator[str]:
-    """Reasons against a program: it was made for another machine, or leaves the limits that the firmware reports."""
-    program, profile = loaded.program, loaded.profile
-    own, sections = read_embedded_profile(program.lines, profile, frozenset())
+def program_sentences(identity: Identity, loaded: LoadedProgram, force: bool) -> Iterator[str]:
+    """Reasons against a program: it was made for another machine, leaves the limits that the firmware reports, calls macros that
+    a Klipper lacks, or its dry run has errors, for which MoveError is raised without force."""
+    program, machine = loaded.program, loaded.profile.machine
+    recorded, sections = read_embedded_profile(program.lines, loaded.profile, frozenset())
     if "machine" in sections:
-        yield machine_mismatch(own.machine, profile.machine, loaded.name)
-    if answer is not None:
-        machine, reached = profile.machine, {letter: reach for letter, reach in summary(program.run)["axes"].items() if reach}
+        yield machine_mismatch(recorded.machine, machine, loaded.name)
+    if identity.printer is not None:
         rotary = (machine.tilt.letter, machine.turn.letter)
-        followed = machine.coordinates == "workpiece"  # X Y Z of such a file are no places of the axes
-        yield exceeded_limit(answer, {key: reach for key, reach in reached.items() if key in rotary or not followed})
-
-
-def error_sentences(loaded: LoadedProgram, force: bool) -> Iterator[str]:
-    """The errors of the dry run, last of all. Raises MoveError for them without force."""
+        letters = rotary if machine.coordinates == "workpiece" else None  # X Y Z of such a file are no places of the axes
+        reached = {axis: reach for axis, reach in summary(program.run)["axes"].items() if reach}
+        yield exceeded_limit(identity.printer, {axis: reached[axis] for axis in reached if letters is None or axis in letters})
+    lacking = lacking_macros(identity, _block_lines(machine))
+    yield _unknown_macros([name for name in lacking_macros(identity, program.lines) if name not in lacking], loaded.name)
     if not force:
-        refuse_errors(loaded.program.run.errors, force=False)
-    yield count_of_errors(loaded.program.run.errors)
+        refuse_errors(program.run.errors, force=False)
+    yield count_of_errors(program.run.errors)
 
 
 def with_starvation(destination: Destination, program: Program, profile: Profile) -> Program:
-    """The program with what the dry run finds of the line's rate."""
+    """The program with the places where a serial line is too slow for it."""
     if not isinstance(destination, SerialPort) or not destination.is_rate_limited:
         return program
     return replace(program, run=find_starvation(program.run, program.lines, profile.machine, destination.baud))
-
-
-def server_machine_sentences(server: Server, greeting: ServerIdentity, machine: Machine) -> Iterator[str]:
-    """Reasons against a machine behind a print server. Raises PrinterError for a dialect that the server does not read."""
-    check_destination(server, machine)
-    yield from machine_sentences(greeting.printer, machine)
-    yield lacking_steppers(greeting, machine)
-    yield _unknown_macros(lacking_macros(greeting, _block_lines(machine)), machine.name)
-
-
-def server_program_sentences(greeting: ServerIdentity, loaded: LoadedProgram) -> Iterator[str]:
-    """Reasons against a program behind a print server, missing Klipper macros included."""
-    yield from program_sentences(greeting.printer, loaded)
-    lacking = lacking_macros(greeting, _block_lines(loaded.profile.machine))
-    unknown = [name for name in lacking_macros(greeting, loaded.program.lines) if name not in lacking]
-    yield _unknown_macros(unknown, loaded.name)
 
 
 def check_free(server: str, status: PrintStatus) -> None:
@@ -134,8 +118,10 @@ def check_idle(server: str, status: PrintStatus) -> None:
         raise ServerError(f"{server} cannot tell its settings now: {status.message or 'its printer is not connected'}")
 
 
-def firmware_mismatch(answer: Answer, machine: Machine) -> str:
+def firmware_mismatch(answer: Answer | None, machine: Machine) -> str:
     """Why this firmware cannot print for a machine, as a sentence; "" when it can, or does not tell enough to say."""
+    if answer is None:
+        return ""
     firmware = identify(answer.words)
     dialects = tuple(firmware.dialects) if firmware is not None else ()  # none: what it understands is not known
     if dialects and machine.dialect not in dialects:
@@ -190,27 +176,27 @@ def _text(value: object) -> str:
     return ", ".join(f"{x:g}" for x in value) if isinstance(value, tuple) else str(value)
 
 
-def lacking_steppers(greeting: ServerIdentity, machine: Machine) -> str:
+def lacking_steppers(identity: Identity, machine: Machine) -> str:
     """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or does not tell."""
-    if greeting.steppers is None or not machine.tilts:
+    if identity.steppers is None or not machine.tilts:
         return ""
     wanted = [stepper_name(axis) for axis in (machine.tilt, machine.turn)]
-    lacking = [name for name in wanted if name not in greeting.steppers]
+    lacking = [name for name in wanted if name not in identity.steppers]
     if not lacking:
         return ""
-    there = ", ".join(sorted(greeting.steppers)) or "none"
+    there = ", ".join(sorted(identity.steppers)) or "none"
     sections = " and ".join(f"[manual_stepper {name}]" for name in lacking)
     return (
         f"{machine.name} turns its table by {sections}, which this Klipper lacks; it has {there}: machine.tilt.stepper names it"
     )
 
 
-def lacking_macros(greeting: ServerIdentity, lines: Iterable[str]) -> list[str]:
+def lacking_macros(identity: Identity, lines: Iterable[str]) -> list[str]:
     """The macros that lines call and a Klipper does not have; [] when it has all or does not tell."""
-    if greeting.commands is None:
+    if identity.commands is None:
         return []
     called = dict.fromkeys(name for line in lines if (name := macro_name(line)))
-    return [name for name in called if name not in greeting.commands and not command_named(name).shows]
+    return [name for name in called if name not in identity.commands and not command_named(name).shows]
 
 
 def _block_lines(machine: Machine) -> list[str]:

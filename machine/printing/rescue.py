@@ -7,7 +7,7 @@ from machine.link.medium import SERIAL
 from machine.link.pending_commands import Command
 from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
-from machine.printing.destination import Destination, Server, Simulated
+from machine.printing.destination import SerialPort, Server
 from machine.printing.servers.follow import UNCONFIRMED
 from machine.printing.servers.servers import open_server
 from profiles.errors import PortError, ServerError, UserError
@@ -17,15 +17,13 @@ ROUNDED_S = 1.0  # servers tell whole seconds
 STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 
-def rescue(at: Destination, emergency: bool) -> str:
+def rescue(at: SerialPort | Server, emergency: bool) -> str:
     """Open the port anew and give the orders; what became of them as a sentence. emergency: by M112.
 
     Homing that is under way is cut short, whereupon Marlin halts: its heaters are off then, too.
     """
     if isinstance(at, Server):
         return _stop_server(at) if emergency else _look_at_server(at)
-    if isinstance(at, Simulated):
-        return "the simulated printer has ended with it"
     try:
         with open_port(at.name, at.baud) as wire:
             if not emergency:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from time import monotonic
 
@@ -14,22 +13,14 @@ from machine.link.print_state import PrintState, PrintStatus, last_known
 from machine.link.progress import ProgramPosition
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
-from machine.printing.checks import (
-    CLEAN,
-    check,
-    check_free,
-    error_sentences,
-    server_machine_sentences,
-    server_program_sentences,
-)
+from machine.printing.checks import check_free
 from machine.printing.destination import Server
 from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog, new_log
 from machine.printing.servers.follow import OnStatus, follow_print
-from machine.printing.servers.server import GcodeUpload, PrintServer, ServerIdentity
+from machine.printing.servers.server import GcodeUpload, Identity, PrintServer
 from machine.printing.servers.servers import open_server
-from machine.program import Program
 from machine.quantities import duration
 from profiles.errors import FirmwareError, NoAnswerError, ServerError
 from profiles.machine import Machine
@@ -51,44 +42,29 @@ def server_session(server: Server, title: str, kind: str, file: Path | None = No
 
 
 class ServerPrinter:
-    """The `Printer` behind a print server, which prints without this program: a person may leave it printing."""
+    """The printer of a job behind a print server, which prints without this program: a person may leave it printing."""
 
-    def __init__(self, job: PrintJob, at: Server, server: PrintServer, log: SerialLog, person: Person) -> None:
-        self.server = server
-        self._job, self._at, self._log, self._person = job, at, log, person
-        self._greeting = ServerIdentity("")
+    def __init__(self, job: PrintJob, server: PrintServer, log: SerialLog, person: Person) -> None:
+        self.server, self.person = server, person
+        self.identity = Identity("")
+        self._job, self._log = job, log
 
     def greet(self) -> None:
         """Ask the server who it is, and whether it is free where something is to be printed."""
-        self._greeting = self.server.greet()
-        say(f"{self._greeting.text} answers at {self.server.name}")
+        self.identity = self.server.greet()
+        say(f"{self.identity.text} answers at {self.server.name}")
         if self._job.starts and self._job.does is Does.PRINT:
             check_free(self.server.name, self.server.status())
 
-    def fit(self, machine: Machine) -> None:
-        """Refuse a machine whose dialect the server's firmware does not read, whose axes or macros it lacks."""
+    def fits(self, machine: Machine) -> str:
+        """That the printer is one for a machine, as a sentence."""
         free = ", is free," if self._job.starts else ""
-        passed = f"{self._greeting.text} answers at {self.server.name}{free} and prints for {machine.name}"
-        sentences = server_machine_sentences(self._at, self._greeting, machine)
-        if check(sentences, self._job.force):
-            self._person.passed(passed)
-
-    def ready(self, loaded: LoadedProgram) -> Program:
-        """Refuse a program made for another machine, outside the limits that the server tells, or with macros it lacks."""
-        force = self._job.force
-        sentences = chain(server_program_sentences(self._greeting, loaded), error_sentences(loaded, force))
-        if check(sentences, force):
-            self._person.passed(CLEAN)
-        if self._job.starts:
-            self._person.passed(LIMITS)
-        return loaded.program
+        return f"{self.identity.text} answers at {self.server.name}{free} and prints for {machine.name}"
 
     def send(self, loaded: LoadedProgram) -> End:
         """Hand it over, and have it printed where the job says so, without following it."""
         try:
-            file = hand_over(
-                self.server, GcodeUpload(loaded.name, loaded.program.lines), loaded.name, self._scene(), self._person
-            )
+            file = hand_over(self.server, GcodeUpload(loaded.name, loaded.program.lines), loaded.name, self._scene(), self.person)
         except CancelledError:
             return NOT_BEGUN
         if self._job.starts:
@@ -112,7 +88,7 @@ class ServerPrinter:
 
         Raises ServerError, FirmwareError after an emergency stop.
         """
-        person, server, upload = self._person, self.server, GcodeUpload(loaded.name, loaded.program.lines)
+        person, server, upload = self.person, self.server, GcodeUpload(loaded.name, loaded.program.lines)
         try:
             file = hand_over(server, upload, loaded.name, self._scene(), person)
             check_free(server.name, server.status())  # somebody else may have begun while the program was made
@@ -133,7 +109,7 @@ class ServerPrinter:
 
         Raises ServerError, FirmwareError after an emergency stop.
         """
-        person, server, reported = self._person, self.server, ReportedProgress()
+        person, server, reported = self.person, self.server, ReportedProgress()
         scene = replace(self._scene(), beginning="a file that is not known here")
         with _shown(person, scene, reported) as on_status:
             state = follow_print(server, now.file, 0, on_status=on_status, control=person.commands, left=person.left, running=now)

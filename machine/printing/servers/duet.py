@@ -18,7 +18,7 @@ from machine.link.print_state import ACTIVE, PrintState, PrintStatus
 from machine.link.protocol.events import NAME
 from machine.printing.destination import Server
 from machine.printing.servers.http import Reply, Tell, entry, how_to_give_a_key, number, plain, table, temperature, whole
-from machine.printing.servers.server import GcodeUpload, PrintServer, Sent, ServerIdentity
+from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, Sent
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
@@ -53,7 +53,7 @@ class Duet(PrintServer):
         self._last: PrintState | None = None  # of the print, for idle says nothing of how it ended
         self._up_s = 0.0  # since the board was reset
 
-    def greet(self) -> ServerIdentity:
+    def greet(self) -> Identity:
         """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
         self._connect()
         board = table(self._model("boards[0]"))
@@ -65,7 +65,7 @@ class Duet(PrintServer):
         bed = whole(entry(table(self._model("heat")).get("bedHeaters"), 0))
         self._nozzle, self._bed = self._nozzle if nozzle is None else nozzle, -1 if bed is None else bed
         text = f"{name} {version}".strip()
-        return ServerIdentity(text, Answer(Kind.PRINTER, f"{NAME}{text}", "".join(limits), known))
+        return Identity(text, Answer(Kind.PRINTER, f"{NAME}{text}", "".join(limits), known))
 
     def _connect(self) -> None:
         password = self.key or DEFAULT_PASSWORD

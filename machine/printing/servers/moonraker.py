@@ -14,7 +14,7 @@ from machine.link.pending_commands import Command
 from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.events import NAME
 from machine.printing.servers.http import entry, number, picture_address, table, temperature, whole
-from machine.printing.servers.server import GcodeUpload, PrintServer, Sent, ServerIdentity
+from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, Sent
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
@@ -44,14 +44,14 @@ class Moonraker(PrintServer):
     key_refused = (401,)
     tells_percents = True
 
-    def greet(self) -> ServerIdentity:
+    def greet(self) -> Identity:
         """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
         server = table(self._get("/server/info"))
         if "klippy_state" not in server:
             raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
         text = f"Moonraker {server.get('moonraker_version') or ''}".strip()
         if server["klippy_state"] != "ready":
-            return ServerIdentity(text, Answer(Kind.PRINTER, f"{NAME}Klipper"))
+            return Identity(text, Answer(Kind.PRINTER, f"{NAME}Klipper"))
         version = str(table(self._get("/printer/info")).get("software_version") or "")
         objects = table(self._get("/printer/objects/list")).get("objects")
         names = frozenset(name for name in objects if isinstance(name, str)) if isinstance(objects, list) else frozenset()
@@ -60,7 +60,7 @@ class Moonraker(PrintServer):
         commands = self._commands() if "gcode" in names else None
         klipper = f"Klipper {version}".strip()
         printer = Answer(Kind.PRINTER, f"{NAME}{klipper}", "XYZ", limits)
-        return ServerIdentity(f"{text}, {klipper}", printer, steppers, commands)
+        return Identity(f"{text}, {klipper}", printer, steppers, commands)
 
     def _commands(self) -> frozenset[str] | None:
         """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""

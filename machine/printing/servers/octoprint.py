@@ -10,7 +10,7 @@ from typing import Any
 from machine.link.pending_commands import Command
 from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.servers.http import number, picture_address, table, temperature, whole
-from machine.printing.servers.server import GcodeUpload, PrintServer, Sent, ServerIdentity
+from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, Sent
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers
@@ -36,7 +36,7 @@ class OctoPrint(PrintServer):
 
     key_header = "X-Api-Key"
 
-    def greet(self) -> ServerIdentity:
+    def greet(self) -> Identity:
         """Its version; what it drives is not told by the API."""
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
@@ -44,7 +44,7 @@ class OctoPrint(PrintServer):
             raise ServerError(f"{self.name} is no OctoPrint: it does not answer /api/version as one")
         if "moonraker" in text.lower():
             raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
-        return ServerIdentity(text)
+        return Identity(text)
 
     def webcam(self) -> str:
         reply = self.get("/api/settings")  # some keys may not read them

@@ -84,9 +84,9 @@ def server_name(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class ServerIdentity:
-    """Who answers. text: server, version and what it drives; printer: that printer as it would answer at a port, None where the
-    server does not tell.
+class Identity:
+    """Who answers. text: a server with its version and what it drives, "" of a printer at a port; printer: its answer, or what
+    it would answer at a port, None where that is not known.
 
     steppers: names of the [manual_stepper] sections, commands: names of all commands and macros, in capitals; None where there
     is no such thing.
@@ -104,7 +104,7 @@ class PrintServer(HttpSession, ABC):
     tells_percents = False  # whether status() tells feed and flow
 
     @abstractmethod
-    def greet(self) -> ServerIdentity:
+    def greet(self) -> Identity:
         """Make sure that it is such a server, that the key is good, and learn what it drives."""
 
     @abstractmethod
