@@ -27,8 +27,9 @@ from machine.setup.detect.found import (
     ConfigText,
     Found,
     Reading,
+    axis_readings,
     has_box,
-    limits,
+    reading,
 )
 from profiles.errors import ProfileError
 
@@ -53,7 +54,6 @@ MINUTE_S = 60.0
 RATES = {"M201": (ACCELERATION, 1.0, ""), "M203": (SPEED, MINUTE_S, "SI")}
 JERKS = {"M205": 1.0, "M566": MINUTE_S}  # command -> the seconds of its unit
 HEATERS = {"M140": "bed", "M563": "nozzle"}  # command -> the field that H of the bed, of the first tool, sets
-FIELDS = {"speed": (SPEED, MINUTE_S), "acceleration": (ACCELERATION, 1.0)}  # of an axis in the object model
 
 Parameters = dict[str, list[float]]  # letter -> its numbers, several with colons between
 Ends = dict[str, list[float | None]]  # letter -> least and greatest
@@ -137,14 +137,11 @@ def _read_model(config: ConfigText) -> Found:
     for axis in _tables(model.get("move.axes")):
         letter = str(axis.get("letter") or "")
         source = f"move.axes, {letter}"
-        board.axes[letter] = _drive(axis, source)
-        low, high, jerk = (number(axis.get(key)) for key in ("min", "max", "jerk"))
-        if low is not None and high is not None:
-            board.axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, source)
-        if jerk is not None:
+        board.axes[letter] = _drive(axis, f"{config.name}: axis {letter}", source)
+        if (jerk := number(axis.get("jerk"))) is not None:
             board.jerks_mm_s[letter] = jerk / MINUTE_S
     for extruder in _tables(model.get("move.extruders"))[:1]:
-        board.axes["E"] = _drive(extruder, "move.extruders")
+        board.axes["E"] = _drive(extruder, "", "move.extruders")
     _take_heat(board, table(model.get("heat")), _tables(model.get("tools")))
     probes = _tables(model.get("sensors.probes"))
     board.probe = int(number(probes[0].get("type")) or 0) if probes else 0
@@ -180,9 +177,10 @@ def _model(config: ConfigText) -> dict[str, Any]:
     return model
 
 
-def _drive(drive: Table, source: str) -> AxisReadings:
-    told = ((key, number(drive.get(field)), unit_s) for field, (key, unit_s) in FIELDS.items())
-    return {key: Reading(value / unit_s, source) for key, value, unit_s in told if value is not None}
+def _drive(drive: Table, name: str, source: str) -> AxisReadings:
+    speed, acceleration, low, high = (number(drive.get(field)) for field in ("speed", "acceleration", "min", "max"))
+    told = reading(speed, source, 1.0 / MINUTE_S), reading(acceleration, source)
+    return axis_readings(name, *told, low, high, source)
 
 
 def _tables(value: Any) -> list[Table]:
@@ -201,7 +199,8 @@ def _read_commands(config: ConfigText) -> Found:
         _take(board, ends, command, parameters)
     for letter, (low, high) in ends.items():
         if letter != "S" and low is not None and high is not None:
-            board.axes.setdefault(letter, {})[LIMITS] = limits(f"{config.name}: axis {letter}", low, high, "M208")
+            reach = axis_readings(f"{config.name}: axis {letter}", None, None, low, high, "M208")
+            board.axes[letter] = board.axes.get(letter, {}) | reach
     if board.turns is not None:  # the firmware ignores settings of axes that M584 does not make
         made = [letter for letter in (*PRINTING, "E", *board.turns) if letter in board.axes or letter in board.turns]
         board.axes = {letter: board.axes.get(letter, {}) for letter in made}
