@@ -9,6 +9,7 @@ the directions of the axes: two small angles of the tilt axis, and the turn axis
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import acos, atan2, cos, degrees, radians, sin
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from profiles.machine import UPRIGHT, Machine
 TURN_POINT = tuple(f"turn.point_mm {letter}" for letter in "xyz")
 UNKNOWN = (*TURN_POINT, "tilt.point_mm", "tilt.point_mm", "tilt.zero_deg", "the mark's x", "the mark's y")
 DIRECTIONS = ("tilt.axis", "tilt.axis", "turn.axis")  # angles in degrees from where the profile has the axes
+DIGITS = {"axis": 6}  # a millionth of a unit vector is a tenth of a micrometre at 100 mm; of other numbers four digits are kept
+KEYS = (*(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "point_mm")), "machine.tilt.zero_deg")
+TURN_ZERO, AXES = ("machine.turn.zero_deg",), ("machine.tilt.axis", "machine.turn.axis")
 SIGNS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 UPSIDE_DOWN_DEG = 90.0
 STARTS_DEG = (0.0, 25.0, -25.0)
@@ -296,3 +300,25 @@ def _told(touches: Sequence[Touch]) -> np.ndarray:
 def _positions(touches: Sequence[Touch]) -> Floats:
     """(n, 5) X Y Z tilt turn of the touches."""
     return np.array([[*touch.at_mm, touch.pose.tilt_deg, touch.pose.turn_deg] for touch in touches])
+
+
+def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
+    """The tables of the calibrated profile: numbers, sources, and what is left uncalibrated.
+
+    zero_of_turn: the mark's direction was told, so that the turn's zero is found, too.
+    """
+    keys = (*KEYS, *(TURN_ZERO if zero_of_turn else ()), *(AXES if calibration.directions else ()))
+    source = f"tiltprint calibrate, {len(calibration.residuals_mm)} touches, {calibration.rms_mm:.3f} mm off"
+    return found_tables(before, calibration.machine, keys, source)
+
+
+def found_tables(before: Machine, after: Machine, keys: Sequence[str], source: str) -> dict[str, Any]:
+    """The tables of a profile in which these keys of the rotary axes are found: numbers, sources, what is left uncalibrated."""
+    axes: dict[str, dict[str, Any]] = {"tilt": {}, "turn": {}}
+    for key in keys:
+        _, axis, name = key.split(".")
+        value = getattr(getattr(after, axis), name)
+        digits = DIGITS.get(name, 4)
+        axes[axis][name] = [round(x, digits) for x in value] if isinstance(value, tuple) else round(value, digits)
+    left = [key for key in before.uncalibrated if key not in keys]
+    return {"machine": {"uncalibrated": left, **axes, "sources": dict.fromkeys(keys, source)}}

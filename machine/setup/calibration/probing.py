@@ -14,7 +14,7 @@ import numpy as np
 
 from machine.kinematics.table import machine_points, workpiece_points
 from machine.setup.calibration.fit import Touch, estimate
-from machine.setup.calibration.program import TILTS_DEG, clipped_head, safe_z_mm, turns_deg
+from machine.setup.calibration.program import TILTS_DEG, clipped_head, safe_z_mm, steepest_tilts, turns_deg
 from mdp.clearance import find_obstacle
 from mdp.head import Ring, bodies, directions
 from mdp.mesh import Floats
@@ -231,9 +231,10 @@ class Measuring:
 
     def _tilts(self) -> list[float]:
         """The steepest tilts that can be measured, one to each side where that is possible, gentler ones before them."""
-        zero = self.machine.tilt.zero_deg
-        steepest = [next((side * t for t in TILTS_DEG if self._reachable(zero + side * t)), None) for side in (1.0, -1.0)]
-        able = [zero + tilt for tilt in steepest if tilt is not None]
+        zero, turns = self.machine.tilt.zero_deg, turns_deg(self.machine)
+        able = steepest_tilts(
+            self.machine, lambda tilt: not any(self._find_in_the_way(self.machine, Pose(tilt, turn)) for turn in turns)
+        )
         if not able:
             raise MoveError(
                 f"no tilt of {TILTS_DEG[-1]:g} deg or more can be measured on {self.machine.name} with a ball whose centre is "
@@ -247,9 +248,6 @@ class Measuring:
         zero, turns = self.machine.tilt.zero_deg, turns_deg(self.machine)
         found = [self._find_in_the_way(self.machine, Pose(zero + s * tilt_deg, turn)) for s in (1.0, -1.0) for turn in turns]
         return next(obstacle for obstacle in found if obstacle)
-
-    def _reachable(self, tilt_deg: float) -> bool:
-        return not any(self._find_in_the_way(self.machine, Pose(tilt_deg, turn)) for turn in turns_deg(self.machine))
 
     def _find_in_the_way(self, machine: Machine, pose: Pose) -> str | None:
         """What keeps the ball from being measured at a pose by a machine; None: nothing does."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from machine.setup.calibration.fit import Touch
 from machine.setup.calibration.program import TouchPlan
-from machine.setup.sheet_file import check_row, number, quoted, read_document, rows_of
+from machine.setup.files import check_row, number, quoted, read_document, rows_of
 from mdp.pose import Pose
 from profiles.errors import ProfileError, reason
 from profiles.machine import Machine
