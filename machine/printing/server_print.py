@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
-from machine.dryrun.timeline import Timeline, UnknownTimeline
+from machine.dryrun.timeline import Timeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.print_state import PrintState, PrintStatus, last_known
@@ -18,7 +18,7 @@ from machine.printing.destination import Server
 from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog, new_log
-from machine.printing.servers.follow import OnStatus, follow_print
+from machine.printing.servers.follow import follow_print
 from machine.printing.servers.server import GcodeUpload, Identity, PrintServer
 from machine.printing.servers.servers import open_server
 from machine.quantities import duration
@@ -97,23 +97,48 @@ class ServerPrinter:
         except CancelledError:
             return NOT_BEGUN
         say(LIMITS)
-        known = ReportedProgress(upload, loaded)
-        with _shown(person, self._scene(), known) as on_status:
-            state = follow_print(
-                server, file, len(upload.content), on_status=on_status, control=person.commands, left=person.left
-            )
-        return _report_end(state, file, loaded.name, server.name, known)
+        return self._follow(file, loaded.name, ReportedProgress(upload, loaded), self._scene())
 
     def follow(self, now: PrintStatus) -> End:
         """Show a print that the server is at already until it ends or the person leaves. now: of running_print().
 
         Raises ServerError, FirmwareError after an emergency stop.
         """
-        person, server, reported = self.person, self.server, ReportedProgress()
         scene = replace(self._scene(), beginning="a file that is not known here")
-        with _shown(person, scene, reported) as on_status:
-            state = follow_print(server, now.file, 0, on_status=on_status, control=person.commands, left=person.left, running=now)
-        return _report_end(state, file_name(now), file_name(now), server.name, reported)
+        return self._follow(now.file, file_name(now), ReportedProgress(), scene, now)
+
+    def _follow(
+        self, file: str, name: str, progress: "ReportedProgress", scene: Scene, running: PrintStatus | None = None
+    ) -> End:
+        """Have a file printed, or follow a print that is running, and tell how it ended. name: for a person."""
+        server, person = self.server, self.person
+        with person.show(scene) as tell:
+            tell(None)
+            try:
+                state = follow_print(
+                    server,
+                    file,
+                    progress.size,
+                    on_status=lambda status, message: tell(progress.at(status, message)),
+                    control=person.commands,
+                    left=person.left,
+                    running=running,
+                )
+            except KeyboardInterrupt:
+                say("ended at once: whether the print has been cancelled is not known, look at the printer")
+                raise
+        file = file or name
+        if state is PrintState.FAILED:
+            raise FirmwareError(f"{STOPPED.format(server=server.name)}{progress.last_known}")
+        if state is PrintState.DONE:
+            show(f"printed {file} on {server.name} in {duration(progress.elapsed_s)}\n")
+            return DONE
+        if state is PrintState.LEFT:
+            say(f"tiltprint: interrupted; {file} goes on printing on {server.name}")
+            return End(state, f"{name} goes on printing on {server.name}: this page follows it no more")
+        after = f" after {progress.line} lines" if progress.line else ""
+        say(f"tiltprint: interrupted; the print was cancelled on {server.name}{after}")
+        return CANCELLED
 
     def _scene(self) -> Scene:
         return Scene(self._log.title, self._log, server=self.server.name)
@@ -161,41 +186,16 @@ def file_name(status: PrintStatus) -> str:
     return status.file or "its file"
 
 
-@contextmanager
-def _shown(person: Person, scene: Scene, progress: "ReportedProgress") -> Iterator[OnStatus]:
-    """Takes what the server tells, and shows it."""
-    with person.show(scene) as tell:
-        tell(None)
-        try:
-            yield lambda status, message: tell(progress.at(status, message))
-        except KeyboardInterrupt:
-            say("ended at once: whether the print has been cancelled is not known, look at the printer")
-            raise
-
-
-def _report_end(state: PrintState, file: str, name: str, server: str, progress: "ReportedProgress") -> End:
-    if state is PrintState.FAILED:
-        raise FirmwareError(f"{STOPPED.format(server=server)}{progress.last_known}")
-    if state is PrintState.DONE:
-        show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
-        return DONE
-    if state is PrintState.LEFT:
-        say(f"tiltprint: interrupted; {file} goes on printing on {server}")
-        return End(state, f"{name} goes on printing on {server}: this page follows it no more")
-    after = f" after {progress.line} lines" if progress.line else ""
-    say(f"tiltprint: interrupted; the print was cancelled on {server}{after}")
-    return CANCELLED
-
-
 class ReportedProgress:
     """Progress of a print on a server. Where the program is known here, part and layer follow from the position up to which the
-    server has read the file."""
+    server has read the file. size: of that file, bytes, 0: not known."""
 
     def __init__(self, upload: GcodeUpload | None = None, loaded: LoadedProgram | None = None) -> None:
         self.line, self.elapsed_s = 0, 0.0
+        self.size = 0 if upload is None else len(upload.content)
         self._upload, self._position = upload, ProgramPosition()
         self._lines: Sequence[str] = () if loaded is None else loaded.program.lines
-        self._timeline = UnknownTimeline() if loaded is None else Timeline(loaded.program.run)
+        self._timeline = None if loaded is None else Timeline(loaded.program.run)
         self._last_status: PrintStatus | None = None
         self._last_status_s = monotonic()
 
@@ -212,10 +212,10 @@ class ReportedProgress:
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s)
         heat_age_s = monotonic() - self._last_status_s
         status = replace(status, elapsed_s=self.elapsed_s, heat_age_s=heat_age_s, message=message or status.message)
-        if self._upload is None:
+        position, timeline = self._position, self._timeline
+        if self._upload is None or timeline is None:
             return status
         self._read_to(self._upload.line_at(status.bytes_read or 0))
-        position, timeline = self._position, self._timeline
         return replace(
             status,
             sent=self.line,

@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
@@ -27,15 +27,6 @@ LOST_S = 120.0  # without an answer for so long the person is told the truth: no
 UNKNOWN = "whether the print goes on there is not known"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
 OnStatus = Callable[[PrintStatus, str], None]  # with a message to the person, "" when there is none
-
-
-@dataclass
-class _Heard:
-    """What the polling thread has heard last, and how long it has heard nothing."""
-
-    status: PrintStatus | None = None
-    error: ServerError | None = None
-    answered_s: float = field(default_factory=time.monotonic)
 
 
 def follow_print(
@@ -68,7 +59,9 @@ class _Follower:
     running: PrintStatus | None
 
     def __post_init__(self) -> None:
-        self._heard, self._over = _Heard(), threading.Event()
+        # Status, error of a later answer, and when the newest answer came: the polling thread replaces them together.
+        self._heard: tuple[PrintStatus | None, ServerError | None, float] = (None, None, time.monotonic())
+        self._over = threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
         self._last_active: PrintState | None = self.running.state if self.running else None
@@ -123,20 +116,20 @@ class _Follower:
         """Tell the newest status; how the print has ended, None while it goes on."""
         if self._failed is not None:
             raise self._failed
-        heard = self._heard
-        silent_s = time.monotonic() - heard.answered_s
+        status, error, answered_s = self._heard
+        silent_s = time.monotonic() - answered_s
         if silent_s > LOST_S:
-            where = heard.error or self.server.name
+            where = error or self.server.name
             heat = last_known(self._heat, silent_s)
             raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer{heat}")
-        if heard.status is None:
+        if status is None:
             return None
-        quiet = heard.error is not None or silent_s > QUIET_S
+        quiet = error is not None or silent_s > QUIET_S
         message = self._message or (f"no answer for {silent_s:.0f} s: {UNKNOWN}" if quiet else "")
-        if heard.status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
-            self._shown, self._shown_s = (heard.status, message), time.monotonic()
-            self.on_status(heard.status, message)
-        return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
+        if status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
+            self._shown, self._shown_s = (status, message), time.monotonic()
+            self.on_status(status, message)
+        return None if quiet else self._end_of(status)  # what was told last may be true no more
 
     def _end_of(self, status: PrintStatus) -> PrintState | None:
         if self._began_s is None:
@@ -183,11 +176,11 @@ class _Follower:
 
     def _poll(self) -> None:
         while not self._over.is_set():
-            before = self._heard
+            status, _, answered_s = self._heard
             try:
-                self._heard = _Heard(self._with_percents(self.server.status()))
+                self._heard = (self._with_percents(self.server.status()), None, time.monotonic())
             except ServerError as error:
-                self._heard = _Heard(before.status, error, before.answered_s)
+                self._heard = (status, error, answered_s)
             self._over.wait(POLL_S)
 
     def _take_requests(self) -> bool:
