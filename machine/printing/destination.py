@@ -36,11 +36,6 @@ class Simulated:
     speed: float = 0.0
     name: ClassVar[str] = SIMULATED
 
-    @property
-    def title(self) -> str:
-        """The name in a title."""
-        return "the simulated printer"
-
 
 @dataclass(frozen=True)
 class SerialPort:
@@ -48,11 +43,6 @@ class SerialPort:
 
     name: str
     baud: int = BAUD
-
-    @property
-    def title(self) -> str:
-        """The name in a title."""
-        return self.name
 
     @property
     def is_rate_limited(self) -> bool:
@@ -83,11 +73,6 @@ class Server:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}{self.path}"
 
-    @property
-    def hosts(self) -> tuple[str, str]:
-        """Names in the user's file of servers: host and port, or the host alone."""
-        return f"{self.host}:{self.port}", self.host
-
 
 Destination = Simulated | SerialPort | Server
 AtPrinter = Simulated | SerialPort  # a line to the printer itself
@@ -99,7 +84,8 @@ def parse_destination(port: str, baud: int = BAUD, speed: float = 0.0) -> Destin
     if is_server_address(port):
         return parse_server_address(port)
     check_baud(baud)
-    check_speed(speed)
+    if not (isfinite(speed) and speed >= 0):
+        raise PrinterError(f"--sim-speed is {speed:g}: it must be 0 (as fast as possible) or a number above")
     if port.lower() == SIMULATED:
         return Simulated(speed)
     if not DEVICE.fullmatch(port) or not port.isprintable() or port != port.strip():
@@ -121,12 +107,6 @@ def at_printer(destination: Destination) -> AtPrinter:
             "a printer's port is expected"
         )
     return destination
-
-
-def check_speed(speed: float) -> None:
-    """Refuse a speed at which no simulated printer can run. Raises PrinterError."""
-    if not (isfinite(speed) and speed >= 0):
-        raise PrinterError(f"--sim-speed is {speed:g}: it must be 0 (as fast as possible) or a number above")
 
 
 def is_server_address(text: str) -> bool:

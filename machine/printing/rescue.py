@@ -23,7 +23,7 @@ def rescue(at: SerialPort | Server, emergency: bool) -> str:
     Homing that is under way is cut short, whereupon Marlin halts: its heaters are off then, too.
     """
     if isinstance(at, Server):
-        return _stop_server(at) if emergency else _look_at_server(at)
+        return _rescue_server(at, emergency)
     try:
         with open_port(at.name, at.baud) as wire:
             if not emergency:
@@ -36,15 +36,6 @@ def rescue(at: SerialPort | Server, emergency: bool) -> str:
     return (
         "emergency stop: the printer has halted" if halted else "emergency stop: the printer did not confirm M112: cut the power"
     )
-
-
-def _stop_server(at: Server) -> str:
-    try:
-        with open_server(at) as server:
-            server.order(Command.EMERGENCY_STOP)
-    except UserError as error:
-        return UNCONFIRMED.format(server=at.name, error=error)
-    return STOPPED.format(server=at.name)
 
 
 def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
@@ -69,12 +60,17 @@ def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
         return True
 
 
-def _look_at_server(at: Server) -> str:
+def _rescue_server(at: Server, emergency: bool) -> str:
     try:
         with open_server(at) as server:
+            if emergency:
+                server.order(Command.EMERGENCY_STOP)
+                return STOPPED.format(server=at.name)
             server.greet()
             status = server.status()
     except UserError as error:
+        if emergency:
+            return UNCONFIRMED.format(server=at.name, error=error)
         return f"{error}; what {at.name} prints goes on without this program: look at the printer"
     if status.state.is_printing:
         now = f"{at.name} is {status.state} {status.file or 'a file'}"

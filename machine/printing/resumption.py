@@ -48,6 +48,9 @@ from machine.program import Program
 from profiles.errors import JournalError, ProfileError
 from profiles.profile import Profile, profile_of_tables
 
+HEIGHT_QUESTION = (  # else all that follows would lie too high or too low
+    "the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
+)
 RESTARTED = (
     "this computer may have restarted since the print began, so the newest records may be missing: see that the print is no "
     "higher than this, and that tip and table stand as told here, before you go on"
@@ -128,7 +131,8 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
             point = cut_off.point
             if is_in_doubt(way, point, cut_off.profile):
                 heights = heights_mm(point)
-                chosen = person.ask(_height_question(point), tuple(f"Z {z:.2f}" for z in heights))
+                choices = tuple(f"Z {z:.2f}" for z in heights)
+                chosen = person.ask(HEIGHT_QUESTION.format(heights=" or ".join(choices)), choices)
                 if chosen is None:
                     raise CancelledError
                 point = replace(point, stood_mm=heights[chosen])
@@ -209,12 +213,6 @@ def _program(journal: Path, story: JournalContents) -> GcodeFile:
     if program.sha256() != story.heading.sha256:
         raise JournalError(f"journal {journal} is of another program: {program.path} has changed since it was printed")
     return program
-
-
-def _height_question(point: InterruptedPrint) -> str:
-    """At which height the tip stands; Z is not homed, so that all that follows lies by as much too high or too low."""
-    heights = " or ".join(f"Z {z:.2f}" for z in heights_mm(point))
-    return f"the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
 
 
 def _question(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> str:

@@ -57,7 +57,7 @@ class SerialPrinter:
         """Stream it and say how it ended, with a log and a journal."""
         simulated = isinstance(self._at, Simulated)
         journalled = self._journal(loaded) if not simulated or self._job.journal is not None else nullcontext()
-        title = f"{loaded.name} to {self._at.title}"
+        title = f"{loaded.name} to {'the simulated printer' if simulated else self._at.name}"
         with new_log("print", title, self._job.log) as log, _pointing_to(log), journalled as journal:
             if isinstance(self._at, Simulated):
                 return _print_simulated(loaded, self._at, Scene(title, log, journal), self.person)

@@ -82,7 +82,7 @@ class Duet(PrintServer):
         self._connected = True
         key = whole(value.get("sessionKey"))
         if key:  # firmware from 3.5 on; before that, and from DuetSoftwareFramework, a session is this computer's address
-            self.set_header("X-Session-Key", str(key))
+            self.client.headers["X-Session-Key"] = str(key)
 
     def status(self) -> PrintStatus:
         """From what the object model calls frequently changing, and what the firmware has said since."""

@@ -89,7 +89,7 @@ class HttpSession:
         self._httpx = httpx
         headers = {"User-Agent": "tiltprint", "Accept": "application/json"}
         try:
-            self._client = httpx.Client(
+            self.client = httpx.Client(
                 base_url=address.url,
                 verify=_certificates(address, ca_file),
                 trust_env=False,
@@ -102,11 +102,7 @@ class HttpSession:
 
     def close(self) -> None:
         """End all connections."""
-        self._client.close()
-
-    def set_header(self, name: str, value: str) -> None:
-        """Send a header with every further request."""
-        self._client.headers[name] = value
+        self.client.close()
 
     def get(self, path: str, params: Mapping[str, str] | None = None, secret: bool = False) -> Reply:
         """GET. secret: the parameters are not logged."""
@@ -134,7 +130,7 @@ class HttpSession:
         self._log(">", f"{method} {note}")
         given = {key: value for key, value in request.items() if value is not None}
         try:
-            with self._client.stream(method, path, **given) as answer:
+            with self.client.stream(method, path, **given) as answer:
                 body = self._body(answer)
         except self._httpx.TransportError as error:
             sentence = _transport_sentence(error, self.address, self._httpx)
@@ -146,7 +142,7 @@ class HttpSession:
         except (self._httpx.InvalidURL, self._httpx.DecodingError) as error:
             raise ServerError(f"what answers at {self.address.url} speaks no proper HTTP: {plain(str(error))}") from None
         except RuntimeError:
-            if not self._client.is_closed:
+            if not self.client.is_closed:
                 raise
             raise ServerError(f"{self.name}: the session is over") from None
         reply = Reply(answer.status_code, body, path, answer.headers.get("location", ""))

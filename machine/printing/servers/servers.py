@@ -87,5 +87,5 @@ def _table(file: Path, address: Server) -> dict[str, str]:
             raise ServerError(f'{file}: [servers."{name}"] has {key!r}: {" and ".join(KEYS)} are known')
         if not isinstance(value, str):
             raise ServerError(f'{file}: {key} of [servers."{name}"] must be a text in quotes')
-    known = {name.lower(): table for name, table in servers.items()}  # as the address has its host
-    return next((known[name] for name in address.hosts if name in known), {})
+    known: dict[str, dict[str, str]] = {name.lower(): table for name, table in servers.items()}  # as the address has its host
+    return known.get(f"{address.host}:{address.port}", known.get(address.host, {}))

@@ -90,15 +90,11 @@ def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
     heading = [np.degrees(np.arctan2(pad.ways[2, 1], pad.ways[2, 0])) for pad in pads]
     quarters = np.diff(heading) % 360.0
     level = float(rotation(machine, poses[1])[2] @ UP)
-    if level < np.cos(np.radians(EVEN_DEG)) or (np.abs(quarters - 90.0) > EVEN_DEG).any() or not _alike(pads):
+    leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
+    alike = leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG
+    if level < np.cos(np.radians(EVEN_DEG)) or (np.abs(quarters - 90.0) > EVEN_DEG).any() or not alike:
         raise ProfileError(f"{name} is no program of demo:calibration: its parts lie otherwise")
     return Piece(machine, poses[1], pads)
-
-
-def _alike(pads: Sequence[Pad]) -> bool:
-    """Whether all pads lean by the same, enough to be those of a piece."""
-    leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
-    return bool(leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG)
 
 
 def _laid(program: ParsedProgram, machine: Machine) -> tuple[dict[int, Pose], dict[int, Floats]]:

@@ -170,7 +170,8 @@ class Measuring:
     def run(self) -> list[Touch]:
         """All touches. Raises MoveError where no pose can be measured, PrinterError where probing has failed."""
         home, turns = level(self.machine), turns_deg(self.machine)
-        self._first(home)
+        self._check(home, (self.machine,))
+        self._add(home, self._visit(home, self._expected(home), NEAR))  # where the ball really stands
         self._tell_sign("turn", self._small_turn(home), np.array(self.touches[0].at_mm))
         across = Pose(home.tilt_deg, self._across_tilt(home))
         before = next((touch for touch in self.touches if touch.pose == across), None) or self._touch(across)
@@ -188,11 +189,6 @@ class Measuring:
         self._rise(home)
         self.prober.turn(home)
         return self.touches
-
-    def _first(self, home: Pose) -> None:
-        """The level table: where the ball really stands."""
-        self._check(home, (self.machine,))
-        self._add(home, self._visit(home, self._expected(home), NEAR))
 
     def _tell_sign(self, axis: str, pose: Pose, before: Floats) -> None:
         """A small step of one axis from where the ball was before, and the sign that explains it."""

@@ -19,7 +19,6 @@ from machine.kinematics.table import machine_points, workpiece_points
 from machine.planning.limits import turn_speed
 from mdp.clearance import find_obstacle, least_tip_height_mm
 from mdp.head import corners
-from mdp.mesh import Floats
 from mdp.pose import UP, Pose, level
 from profiles.errors import MoveError
 from profiles.machine import Box, Machine
@@ -213,12 +212,8 @@ def safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: floa
     steps = np.append(np.arange(-tilt_deg, tilt_deg, 2.0), tilt_deg)
     zero = machine.turn.zero_deg
     points = np.vstack(solid)
-    heights = [_highest(machine, Pose(machine.tilt.zero_deg + step, zero), points) for step in steps.tolist()]
-    return max(heights) + MARGIN_MM
-
-
-def _highest(machine: Machine, pose: Pose, points: Floats) -> float:
-    return float(machine_points(machine, pose, points)[:, 2].max())
+    swept = [machine_points(machine, Pose(machine.tilt.zero_deg + step, zero), points) for step in steps.tolist()]
+    return float(np.max([points[:, 2].max() for points in swept])) + MARGIN_MM
 
 
 @dataclass(frozen=True)

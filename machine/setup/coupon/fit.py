@@ -140,28 +140,22 @@ def outcome_text(outcome: Outcome) -> str:
 
 def report_lines(sheet: Sheet, outcome: Outcome, version: str) -> list[str]:
     """The Markdown page: what was printed and broken how, strengths, effects, every bar."""
-    lines = [f"# Joints: {sheet.material} on {sheet.machine}", ""]
-    how = [
-        ("machine", sheet.machine),
-        ("material", sheet.material),
-        ("process", sheet.process),
-        ("bars", bars_in_words(sheet.shape)),
-    ]
-    how += [("loads", str(outcome.loads)), ("scatter", f"{100 * outcome.scatter:.1f} %"), ("tiltprint", version)]
-    lines += _table(["what", "value"], how)
-    lines += [
-        "",
-        *_table(
-            ["strength", "MPa", "of one piece upright"], [(n, f"{m:.1f}", s.strip(" ,") or "") for n, m, s in _strengths(outcome)]
-        ),
-    ]
-    effects = [(_setting(e), f"{100 * (e.ratio - 1.0):+.0f} %", _chance(e), _verdict(e)) for e in outcome.effects]
+    how = {"machine": sheet.machine, "material": sheet.material, "process": sheet.process, "bars": bars_in_words(sheet.shape)}
+    how |= {"loads": str(outcome.loads), "scatter": f"{100 * outcome.scatter:.1f} %", "tiltprint": version}
+    strengths = [(name, f"{mpa:.1f}", share.strip(" ,")) for name, mpa, share in _strengths(outcome)]
+    lines = [f"# Joints: {sheet.material} on {sheet.machine}", "", *_table(["what", "value"], list(how.items()))]
+    lines += ["", *_table(["strength", "MPa", "of one piece upright"], strengths)]
+    effects = []
+    for effect in outcome.effects:
+        chance = f"{effect.by_chance:.3f}" if effect.by_chance >= 0.001 else "< 0.001"
+        effects.append((_setting(effect), f"{100 * (effect.ratio - 1.0):+.0f} %", chance, _verdict(effect)))
     lines += ["", *_table(["setting", "effect", "by chance", "so"], effects), ""]
     bars = []
     for bar, loads in enumerate(sheet.loads_n, start=1):
         known = [load for load in loads if not isnan(load)]
-        strengths = ", ".join(f"{sheet.shape.strength_mpa(load):.1f}" for load in known)
-        bars.append((str(bar), settings_in_words(sheet, bar), ", ".join(f"{load:g}" for load in known), strengths))
+        loads_n = ", ".join(f"{load:g}" for load in known)
+        mpa = ", ".join(f"{sheet.shape.strength_mpa(load):.1f}" for load in known)
+        bars.append((str(bar), settings_in_words(sheet, bar), loads_n, mpa))
     return [*lines, *_table(["bar", "printed", "broke at N", "MPa"], bars)]
 
 
@@ -187,10 +181,6 @@ def _strengths(outcome: Outcome) -> list[tuple[str, float, str]]:
     if outcome.lying_mpa is not None:
         rows.append(("in one piece, lying", outcome.lying_mpa, share(outcome.lying_mpa)))
     return rows
-
-
-def _chance(effect: Effect) -> str:
-    return f"{effect.by_chance:.3f}" if effect.by_chance >= 0.001 else "< 0.001"
 
 
 def _setting(effect: Effect) -> str:

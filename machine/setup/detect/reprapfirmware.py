@@ -142,7 +142,12 @@ def _read_model(config: ConfigText) -> Found:
             board.jerks_mm_s[letter] = jerk / MINUTE_S
     for extruder in _tables(model.get("move.extruders"))[:1]:
         board.axes["E"] = _drive(extruder, "", "move.extruders")
-    _take_heat(board, table(model.get("heat")), _tables(model.get("tools")))
+    heat, tools = table(model.get("heat")), _tables(model.get("tools"))
+    heaters = heat.get("heaters")
+    limits_c = [number(table(heater).get("max")) for heater in (heaters if isinstance(heaters, list) else [])]  # some are null
+    board.heaters_c = {index: limit for index, limit in enumerate(limits_c) if limit is not None}
+    board.bed = _first(heat.get("bedHeaters"), -1)
+    board.nozzle = _first(tools[0].get("heaters") if tools else None, board.nozzle)
     probes = _tables(model.get("sensors.probes"))
     board.probe = int(number(probes[0].get("type")) or 0) if probes else 0
     main, network = table(model.get("boards[0]")), table(model.get("network"))
@@ -151,14 +156,6 @@ def _read_model(config: ConfigText) -> Found:
     board.kinematics = str(kinematics).lower().replace(" ", "")
     board.firmware = f"{main.get('firmwareName') or board.firmware} {main.get('firmwareVersion') or ''}".strip()
     return board.found(config.name, "move.kinematics", "move.axes, jerk", "heat.heaters, max")
-
-
-def _take_heat(board: DuetBoard, heat: Table, tools: list[Table]) -> None:
-    heaters = heat.get("heaters")
-    limits_c = [number(table(heater).get("max")) for heater in (heaters if isinstance(heaters, list) else [])]  # some are null
-    board.heaters_c = {index: limit for index, limit in enumerate(limits_c) if limit is not None}
-    board.bed = _first(heat.get("bedHeaters"), -1)
-    board.nozzle = _first(tools[0].get("heaters") if tools else None, board.nozzle)
 
 
 def _model(config: ConfigText) -> dict[str, Any]:
