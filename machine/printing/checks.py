@@ -5,6 +5,7 @@ A reason against a job is a sentence: it is raised, or reported when --force is 
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import find_starvation
@@ -29,8 +30,8 @@ from profiles.profile import Profile
 CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
 SLACK = 0.01  # mm or deg: what the firmware and the program round
 # What a program depends on: made for one such machine it is wrong on another. Speeds and accelerations are not among it.
-SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
-AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
+OF_AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
+SHAPING = ("shape", "dialect", "coordinates", "tool_mm", *(f"{axis}.{key}" for axis in ("tilt", "turn") for key in OF_AXIS))
 
 
 def check(sentences: Iterable[str], force: bool) -> bool:
@@ -159,17 +160,10 @@ def machine_mismatch(recorded: Machine, chosen: Machine, file: str) -> str:
     if recorded.name != chosen.name:
         return f"{file} was made for the machine {recorded.name}, not for {chosen.name}"
     for key in SHAPING:
-        if (then := getattr(recorded, key)) != (now := getattr(chosen, key)):
-            return _changed(file, chosen, key, then, now)
-    for axis in ("tilt", "turn"):
-        for key in AXIS:
-            if (then := getattr(getattr(recorded, axis), key)) != (now := getattr(getattr(chosen, axis), key)):
-                return _changed(file, chosen, f"{axis}.{key}", then, now)
+        then, now = (attrgetter(key)(machine) for machine in (recorded, chosen))
+        if then != now:
+            return f"{file} was made when machine.{key} of {chosen.name} was {_text(then)}, but it is {_text(now)}"
     return ""
-
-
-def _changed(file: str, machine: Machine, key: str, then: object, now: object) -> str:
-    return f"{file} was made when machine.{key} of {machine.name} was {_text(then)}, but it is {_text(now)}"
 
 
 def _text(value: object) -> str:

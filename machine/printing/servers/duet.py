@@ -8,6 +8,7 @@ is recognised as its characters come in, whatever waits. A print can only be can
 
 import json
 import time
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -128,7 +129,8 @@ class Duet(PrintServer):
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         self._connect()  # the one before may have ended while the program was made
-        params = {"name": FOLDER + upload.name, "crc32": upload.crc32}
+        crc32 = f"{zlib.crc32(upload.content):08x}"  # eight digits: DuetSoftwareFramework compares them as text
+        params = {"name": FOLDER + upload.name, "crc32": crc32}
         reply = self.post_file("/rr_upload", params, upload.read_by(sent), WRITTEN_S)
         if table(self.check(reply, "the file")).get("err") != 0:
             said = plain(self._get("/rr_reply").body.decode("utf-8", "replace"))

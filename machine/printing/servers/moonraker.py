@@ -5,6 +5,7 @@ cancellation waits for the command under way, a heating included, and is answere
 emergency stop is not.
 """
 
+import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -118,7 +119,7 @@ class Moonraker(PrintServer):
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
-        fields = {"root": "gcodes", "checksum": upload.sha256}
+        fields = {"root": "gcodes", "checksum": hashlib.sha256(upload.content).hexdigest()}
         reply = self.post_file("/server/files/upload", fields, upload.read_by(sent), READ_S, upload.name)
         sentences = {
             400: f"{self.name} does not take the file: {{words}}; it takes files up to max_upload_size of its [server]",

@@ -1,9 +1,7 @@
 """Server: a G-code file as a print server takes it, and what every kind of server can be asked for."""
 
-import hashlib
 import re
 import unicodedata
-import zlib
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
@@ -42,16 +40,6 @@ class GcodeUpload:
     def line_at(self, position: int) -> int:
         """How many whole lines of the file lie before a byte position."""
         return bisect_right(self._ends, position)
-
-    @property
-    def sha256(self) -> str:
-        """The digest of the content, hexadecimal."""
-        return hashlib.sha256(self.content).hexdigest()
-
-    @property
-    def crc32(self) -> str:
-        """The checksum of the content, eight hexadecimal digits: DuetSoftwareFramework compares them as text."""
-        return f"{zlib.crc32(self.content):08x}"
 
     def read_by(self, sent: Sent) -> BinaryIO:
         """The content as a file; calls sent() with the bytes read so far, before each piece and at the end."""

@@ -135,10 +135,13 @@ def parse_readings(text: str) -> Floats:
 
 def parse_pad(text: str, number: int) -> list[float]:
     """The three readings of a pad in mm, nan for what was not read. Raises ProfileError naming the pad."""
-    words = text.replace(",", " ").split()
-    if len(words) not in (2, 3):
+    try:
+        values = [float("nan") if word == NOT_READ else float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        values = []
+    if len(values) not in (2, 3):
         raise ProfileError(f"pad {number}: {text!r} cannot be read: {EXPECTED}")
-    values = [_number(word, text, number) for word in words] + [float("nan")] * (3 - len(words))
+    values += [float("nan")] * (3 - len(values))
     for way, value, most in zip(WAYS, values, (MOST_MARKS, MOST_MARKS, MOST_HEIGHT_MM), strict=True):
         least = 0.0 if way == "height" else -most
         if not isnan(value) and not least <= value <= most:
@@ -151,13 +154,6 @@ def readings_text(readings_mm: Floats) -> str:
     told = (readings_mm + np.array([0.0, 0.0, HEIGHT_MM])) / np.array([MARK_MM, MARK_MM, 1.0])
     words = [[NOT_READ if isnan(value) else f"{round(value, 3) + 0.0:g}" for value in pad] for pad in told.tolist()]
     return " ".join(map(",".join, words))
-
-
-def _number(word: str, text: str, number: int) -> float:
-    try:
-        return float("nan") if word == NOT_READ else float(word)
-    except ValueError:
-        raise ProfileError(f"pad {number}: {text!r} cannot be read: {EXPECTED}") from None
 
 
 @dataclass(frozen=True, eq=False)
