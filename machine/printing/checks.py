@@ -120,7 +120,7 @@ def check_idle(server: str, status: PrintStatus) -> None:
 
 
 def firmware_mismatch(answer: Answer | None, machine: Machine) -> str:
-    """Why this firmware cannot print for a machine, as a sentence; "" when it can, or does not tell enough to say."""
+    """Why this firmware cannot print for a machine, as a sentence; "" when it can, or when its answer does not decide that."""
     if answer is None:
         return ""
     firmware = identify(answer.words)
@@ -141,7 +141,7 @@ def firmware_mismatch(answer: Answer | None, machine: Machine) -> str:
 
 
 def exceeded_limit(answer: Answer, reached: Mapping[str, Sequence[float]]) -> str:
-    """Which axis of a program leaves the limits that the firmware tells, as a sentence; "" when none does.
+    """Which axis of a program leaves the limits that the firmware reports, as a sentence; "" when none does.
 
     reached: letter -> least and greatest value of the program, mm or deg. Firmwares clip such a move without a word.
     """
@@ -171,7 +171,7 @@ def _text(value: object) -> str:
 
 
 def lacking_steppers(identity: Identity, machine: Machine) -> str:
-    """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or does not tell."""
+    """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or reports none."""
     if identity.steppers is None or not machine.tilts:
         return ""
     wanted = [stepper_name(axis) for axis in (machine.tilt, machine.turn)]
@@ -186,7 +186,7 @@ def lacking_steppers(identity: Identity, machine: Machine) -> str:
 
 
 def lacking_macros(identity: Identity, lines: Iterable[str]) -> list[str]:
-    """The macros that lines call and a Klipper does not have; [] when it has all or does not tell."""
+    """The macros that lines call and a Klipper does not have; [] when it has all, or does not report them."""
     if identity.commands is None:
         return []
     called = dict.fromkeys(name for line in lines if (name := macro_name(line)))

@@ -33,7 +33,7 @@ class Does(StrEnum):
 class PrintJob:
     """A job: its printer, its program and how it is recorded.
 
-    load: makes the program; profile: what is known of the machine before that, None: the program itself tells. starts: False: a
+    load: makes the program; profile: what is known of the machine before that, None: the program itself says it. starts: False: a
     print server only gets the file and keeps it. force: go past what --force goes past. cut_off: the journal of the print whose
     rest it is. log: file for what is sent and received, journal: for what a resume needs; None: a new one in the state folder.
     key: of the slices that are printed.

@@ -1,6 +1,7 @@
-"""Resumption: a print that was cut off, read from its journal, and its rest: what is told, what is asked, what is refused.
+"""Resumption: a print that was cut off is read from its journal, and its rest is printed when printer and person agree.
 
-The person is asked only when the printer itself has told where it stands: until the answer is yes, nothing of it moves or heats.
+The person is asked only when the printer itself has reported where it stands: until the answer is yes,
+nothing moves or heats.
 """
 
 from collections.abc import Iterator, Sequence
@@ -59,7 +60,7 @@ RESTARTED = (
 
 @dataclass(frozen=True, eq=False)
 class Resumption:
-    """A print that can be gone on with, as its journal and its program tell; journal: its file, at: where its printer is."""
+    """A print that can be resumed, by its journal and its program. journal: its file; at: the port of its printer."""
 
     at: SerialPort
     journal: Path
@@ -92,7 +93,7 @@ class Resumption:
 
 
 def read_resumption(job: PrintJob) -> Resumption:
-    """What the journal of a job tells. The job's profile is the one whose machine the user has named.
+    """Read the journal of a job. The job's profile is the one whose machine the user has named.
 
     Raises JournalError and other UserErrors for what cannot be resumed at this printer.
     """
@@ -153,7 +154,7 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
 
 @contextmanager
 def _further_journal(cut_off: Resumption, job: PrintJob) -> Iterator[Journal]:
-    """The journal of the rest; one that tells nothing is not left, for it would let the whole program begin anew."""
+    """The journal of the rest; one without a record is removed, for it would let the whole program begin anew."""
     with continue_journal(cut_off.text, cut_off.profile, cut_off.name, job.journal) as further:
         try:
             yield further

@@ -142,7 +142,7 @@ class TappedWire:
 
 
 def tap(tell: Traffic, medium: Medium = SERIAL) -> Medium:
-    """A medium whose wires tell what goes over them."""
+    """A medium whose wires report all bytes that go over them."""
     return replace(medium, open=lambda name, baud: TappedWire(medium.open(name, baud), tell))
 
 
@@ -188,7 +188,7 @@ def _thin(folder: Path, kind: str) -> None:
 
 
 class PrinterMessages:
-    """The last things a printer has said that are no mere answers; hear() takes chunks of bytes in the thread of the port."""
+    """The newest words of a printer beside its answers; hear() takes chunks of bytes in the thread of the port."""
 
     def __init__(self, most: int = WORDS_KEPT) -> None:
         self.last: deque[str] = deque(maxlen=most)
@@ -222,7 +222,7 @@ class PrinterMessages:
 
 
 def printer_message(line: bytes) -> str:
-    """What a line tells a person, "" for reports and answers."""
+    """The words of a line for a person; "" for reports and answers."""
     event = read_event(line)
     if isinstance(event, Start):
         return "the printer has started"

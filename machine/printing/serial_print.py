@@ -48,7 +48,7 @@ class SerialPrinter:
         self._job, self._at = job, at
 
     def greet(self) -> None:
-        """Ask who answers at the port. Raises PrinterError."""
+        """Identify what answers at the port. Raises PrinterError."""
         if isinstance(self._at, SerialPort):
             with open_port(self._at.name, self._at.baud) as wire:
                 self.identity = Identity("", identify_printer(wire, self._at.baud))
@@ -65,7 +65,7 @@ class SerialPrinter:
             return report_end(outcome, log, journal)
 
     def _journal(self, loaded: LoadedProgram) -> AbstractContextManager[Journal | None]:
-        """The journal; a print that was not told where to keep it goes on without one where none can be written."""
+        """The journal. A print whose journal has no file of its own goes on without one where none can be written."""
         file = self._job.journal
         try:
             return new_journal(loaded.program.lines, loaded.profile, loaded.name, loaded.source, file)
@@ -86,7 +86,7 @@ class SerialPrinter:
 
 
 def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person: Person) -> End:
-    """Stream to the simulated printer and tell what it has done."""
+    """Stream to the simulated printer and report what it has done."""
     machine = loaded.profile.machine
     usb = loaded.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
     speed = at.speed or inf
@@ -179,7 +179,7 @@ def _point_to(log: SerialLog) -> None:
 
 
 def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal | None = None) -> End:
-    """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one, or
+    """Report how the print ended, where its log is when the printer had something to say, and how to resume a stopped one, or
     that this is not possible. Closes the journal first: only what is on the disk is promised."""
     if journal is not None:
         journal.close()

@@ -110,7 +110,7 @@ class ServerPrinter:
     def _follow(
         self, file: str, name: str, progress: "ReportedProgress", scene: Scene, running: PrintStatus | None = None
     ) -> End:
-        """Have a file printed, or follow a print that is running, and tell how it ended. name: for a person."""
+        """Have a file printed, or follow a print that is running, and report how it ended. name: for a person."""
         server, person = self.server, self.person
         with person.show(scene) as tell:
             tell(None)
@@ -174,7 +174,7 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, scene: Scene
 
 
 def running_print(server: PrintServer) -> PrintStatus:
-    """Where the print stands that a server is at. Raises ServerError when there is none."""
+    """The state of the print that a server is at. Raises ServerError when there is none."""
     status = server.status()
     if not status.state.is_printing:
         raise ServerError(f"{server.name} prints nothing now ({status.message or status.state}): there is nothing to follow")
@@ -201,12 +201,11 @@ class ReportedProgress:
 
     @property
     def last_known(self) -> str:
-        """The temperatures that were told last, behind the last words of a print."""
+        """The newest temperatures, as words behind the last ones of a print."""
         return "" if self._last_status is None else last_known(self._last_status.temperature, monotonic() - self._last_status_s)
 
     def at(self, status: PrintStatus, message: str) -> PrintStatus:
-        """The status with how old it is, and what the program tells of the line that it has reached. message: goes before the
-        server's own."""
+        """The status with its age, and with part and layer of the line it has reached. message: replaces the server's own."""
         if status is not self._last_status:  # a server that does not answer leaves what it told last
             self._last_status, self._last_status_s = status, monotonic()
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s)

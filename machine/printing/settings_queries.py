@@ -1,4 +1,4 @@
-"""Settings queries: what a printer at a port or behind a print server tells of its settings, as the text that is read from.
+"""Settings queries: the settings that a printer at a port or behind a print server reports, as text for detection.
 
 Only questions are asked: nothing moves, nothing heats. A printer that prints is left alone.
 """

@@ -227,7 +227,7 @@ class _Follower:
         return replace(status, feed_percent=feed, flow_percent=flow)
 
     def _carry_out(self) -> None:
-        """The start, then orders one after the other; what a server refuses of these is told, and following goes on.
+        """The start, then orders one after the other; a refusal becomes a message, and following goes on.
 
         A start without an answer may have been taken: whether it was is seen by the status.
         """

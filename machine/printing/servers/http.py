@@ -203,8 +203,8 @@ class HttpSession:
 
 
 def picture_address(told: object, server: Server) -> str:
-    """The URL of a picture at the server's own host; "" where there is none, or it lies with somebody else: what a server tells
-    must not have this computer ask others.
+    """The URL of a picture at the server's own host; "" where there is none, or it is on another host: a server's answer
+    must not make this computer ask others.
 
     >>> from machine.printing.destination import parse_server_address
     >>> picture_address("/webcam/?action=snapshot", parse_server_address("moonraker:printer.local"))
@@ -226,7 +226,7 @@ def picture_address(told: object, server: Server) -> str:
 
 
 def fetch_picture(url: str) -> tuple[bytes, str]:
-    """A picture and its type. Raises ServerError where nothing, or no picture, is there."""
+    """A picture and its media type. Raises ServerError where nothing, or no picture, is found."""
     import httpx
 
     try:
@@ -293,7 +293,7 @@ def _reason(error: Exception) -> str:
 
 
 def temperature(nozzle: Any, bed: Any, now: str, target: str) -> Temperature:
-    """What two JSON objects tell of nozzle and bed under these keys."""
+    """Temperatures of nozzle and bed in two JSON objects, under these keys."""
     return Temperature(*(number(table(heater).get(key)) for heater in (nozzle, bed) for key in (now, target)))
 
 

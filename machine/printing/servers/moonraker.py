@@ -64,7 +64,7 @@ class Moonraker(PrintServer):
         return Identity(f"{text}, {klipper}", printer, steppers, commands)
 
     def _commands(self) -> frozenset[str] | None:
-        """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""
+        """All commands that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to report them."""
         commands = table(self._query(("gcode",)).get("gcode")).get("commands")
         return frozenset(name.upper() for name in commands) if isinstance(commands, dict) else None
 

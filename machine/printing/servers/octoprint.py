@@ -37,7 +37,7 @@ class OctoPrint(PrintServer):
     key_header = "X-Api-Key"
 
     def greet(self) -> Identity:
-        """Its version; what it drives is not told by the API."""
+        """Its version; the API does not report what it drives."""
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
         if not isinstance(text, str) or not text.startswith("OctoPrint"):

@@ -100,11 +100,11 @@ class PrintServer(HttpSession, ABC):
         """The state of its print now."""
 
     def webcam(self) -> str:
-        """The address of its camera's picture; "": it has none, or does not tell."""
+        """The address of its camera's picture; "" where it has none, or does not report it."""
         return ""
 
     def file_in_print(self) -> str:
-        """The file that it prints now, by the name that upload() returns; "" where it does not tell."""
+        """The file that it prints now, by the name that upload() returns; "" where it does not report it."""
         return self.status().file
 
     @abstractmethod
@@ -128,5 +128,5 @@ class PrintServer(HttpSession, ABC):
         """Have a line of G-code executed."""
 
     def settings(self) -> str:
-        """What its firmware tells of its settings, as JSON, a line for each answer."""
+        """The settings of its firmware as JSON, a line for each answer."""
         raise ServerError(f"{self.name} does not know its firmware's settings: ask the printer at its own port")

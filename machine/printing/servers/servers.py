@@ -46,7 +46,7 @@ def dialect_mismatch(address: Server, machine: str, dialect: str) -> str:
 
 @contextmanager
 def open_server(address: Server, tell: Tell | None = None) -> Iterator[PrintServer]:
-    """A session with a server. tell: what goes over the line, for a log, without keys. Raises ServerError, ProfileError."""
+    """A session with a server. tell: called with what goes over the line, without keys. Raises ServerError, ProfileError."""
     server = KINDS[address.kind](address, *read_credentials(address), tell)
     try:
         yield server

@@ -88,7 +88,7 @@ def least_squares(residuals: Callable[[Floats], Floats], numbers: Floats, pull: 
     """(k,) numbers near to given ones at which the sum of squares of (n,) residuals is least, and the residuals there.
 
     By Levenberg's damped least squares. pull: how strongly the numbers are drawn to where they begin, as a share of a residual's
-    own weight: what the residuals do not tell stays there.
+    own weight: what the residuals do not determine stays there.
     """
     usual, damping, count = numbers, 1e-3, len(numbers)
     here = np.append(residuals(numbers), np.zeros(count))
@@ -116,7 +116,7 @@ def slope_of(function: Callable[[Floats], Floats], numbers: Floats) -> Floats:
 
 
 def numbers_of(machine: Machine) -> Floats:
-    """(6,) those of UNKNOWN that are a machine's own. The point of the tilt axis is told across that alone."""
+    """(6,) those of UNKNOWN that are a machine's own. The point of the tilt axis is given across that axis."""
     across = frame_across(unit(machine.tilt.axis))
     return np.array([*machine.turn.point_mm, *across @ np.array(machine.tilt.point_mm), machine.tilt.zero_deg])
 
@@ -183,7 +183,7 @@ def calibrate(
 def estimate(
     machine: Machine, touches: Sequence[Touch], mark_mm: tuple[float, float, float]
 ) -> tuple[Machine, tuple[float, float, float]]:
-    """The machine and the mark as far as a few touches tell them: what they do not tell, and both signs, stay as given."""
+    """The machine and the mark as far as a few touches determine them: the rest, and both signs, stay as given."""
     begin = np.append(numbers_of(machine), [*mark_mm[:2], *np.zeros(len(DIRECTIONS))])
     numbers, _ = least_squares(_residuals(machine, touches, mark_mm[2]), begin, PULL)
     return machine_with(machine, numbers), (float(numbers[6]), float(numbers[7]), mark_mm[2])
@@ -237,7 +237,7 @@ def _start(machine: Machine, touches: Sequence[Touch], zero_add_deg: float) -> F
 
 
 def _sigma(residuals: Callable[[Floats], Floats], numbers: Floats) -> dict[str, float]:
-    """How sure each number is; raises ProfileError for those that the touches do not tell."""
+    """How sure each number is; raises ProfileError for those that the touches do not determine."""
     sought = (*UNKNOWN, *DIRECTIONS)[: len(numbers)]
     _, sizes, directions = np.linalg.svd(slope_of(residuals, numbers), full_matrices=False)
     if len(sizes) < len(numbers) or sizes[-1] < LEAST_SHARE * sizes[0]:
@@ -293,7 +293,7 @@ def _set_turn_zero(
 
 
 def _told(touches: Sequence[Touch]) -> np.ndarray:
-    """(n, 3) which of x y z each touch tells."""
+    """(n, 3) which of x y z each touch measures."""
     return np.array([[not touch.on_plate, not touch.on_plate, True] for touch in touches])
 
 
@@ -305,7 +305,7 @@ def _positions(touches: Sequence[Touch]) -> Floats:
 def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
     """The tables of the calibrated profile: numbers, sources, and what is left uncalibrated.
 
-    zero_of_turn: the mark's direction was told, so that the turn's zero is found, too.
+    zero_of_turn: the mark's direction is known, so that the turn's zero is found, too.
     """
     keys = (*KEYS, *(TURN_ZERO if zero_of_turn else ()), *(AXES if calibration.directions else ()))
     source = f"tiltprint calibrate, {len(calibration.residuals_mm)} touches, {calibration.rms_mm:.3f} mm off"

@@ -1,12 +1,12 @@
 """The calibration piece: what a print of `demo:calibration` shows of where the rotary axes are.
 
-Its pads lie on its roofs, each laid there at a pose of its own. How a pad lies tells how far the axes are from where the program
+Its pads lie on its roofs, each laid there at a pose of its own. How a pad lies shows how far the axes are from where the program
 took them to be: it should be laid at a place of the workpiece, and was laid where the true machine had its tip then. The roof
 below it was laid at the level pose.
 
-Few readings cannot tell all numbers alike: what they do not tell stays where the profile has it. The least sum of squares of
-readings and of changes, each as a share of how far it is usually off (a maximum a posteriori estimate with independent normal
-errors).
+Few readings do not determine all numbers equally well: what they do not determine stays where the profile has it. The numbers
+are those of the least sum of squares of readings and of changes, each as a share of how far it is usually off (a maximum a
+posteriori estimate with independent normal errors).
 """
 
 import json

@@ -151,7 +151,7 @@ class Probe:
 
 @dataclass
 class Measuring:
-    """One measurement. machine: as far as it is known; touches: of the ball's centre so far; tell: is told what is done next."""
+    """One measurement. machine: as far as it is known; touches: of the ball's centre so far; tell: takes a line on each step."""
 
     machine: Machine
     ball: Ball

@@ -21,7 +21,7 @@ WHERE = ("mark", "plate")
 
 @dataclass(frozen=True)
 class Sheet:
-    """The touches that have been filled in, how high the mark is, and where it is seen from the middle, if that is told."""
+    """The touches that have been filled in, how high the mark is, and its direction from the middle, if that is known."""
 
     touches: tuple[Touch, ...]
     mark_height_mm: float

@@ -113,7 +113,7 @@ def settings_of_bars(chosen: Sequence[Factor]) -> list[dict[str, Any]]:
 @dataclass(frozen=True)
 class Sheet:
     """A coupon's shape, the profiles it was printed with, the factors of its jointed bars, and by number the loads in N at which
-    each bar broke: one for each time that the plate was printed, nan where it is not told.
+    each bar broke: one for each time that the plate was printed, nan where it is not known.
     """
 
     shape: Shape

@@ -48,7 +48,7 @@ class Effect:
 @dataclass(frozen=True)
 class Outcome:
     """Strengths in MPa, of the whole section: of joints as the process makes them and with what won, of bars in one piece upright
-    and lying (None: no load is told); scatter: standard deviation of a bar's strength, share of it; how many loads tell it."""
+    and lying (None: no load is known); scatter: standard deviation of a bar's strength, as a share of it; loads: their number."""
 
     effects: tuple[Effect, ...]
     joint_mpa: float

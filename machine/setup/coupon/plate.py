@@ -145,8 +145,8 @@ def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
 
 
 def _halves(shape: Shape, lean_rad: float, height_mm: float) -> Halves:
-    """Of a bar whose joint stands over the plate's middle and that leans along x: the corners (n, 3) above its joint, those below
-    it, and the outline of the lower half with a gap around it."""
+    """Both halves of a bar whose joint stands over the plate's middle and that leans along x: the corners (n, 3) above and below
+    the joint, and the outline of the lower half with a gap around it."""
     base = Plane(np.array([sin(lean_rad), 0.0, cos(lean_rad)]), height_mm * cos(lean_rad))
     top, stub = cut(stand(bar(shape, lean_rad, height_mm), shape, 0.0, 0.0), base)
     return mesh_of(top).vertices, mesh_of(stub).vertices, _around(stub)

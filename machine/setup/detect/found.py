@@ -1,4 +1,4 @@
-"""Found: what a firmware says of its machine, each value with the words it was read from; configurations of [name] and
+"""Found: the values that a firmware reports of its machine, each with the words it was read from; configurations of [name] and
 key = value, as Klipper and LinuxCNC write them.
 """
 

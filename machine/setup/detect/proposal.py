@@ -172,7 +172,7 @@ def _why_fixed(found: Found, base: str) -> str:
 
 
 def _sought(tilts: bool) -> list[str]:
-    """Every key that at least one firmware tells."""
+    """Every key that at least one firmware reports."""
     linear = [f"machine.{axis}.{key}" for axis in "xyz" for key in LINEAR.values()]
     rotary = [f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("letter", *ROTARY.values())]
     return [*linear, *(rotary if tilts else ()), *(f"machine.{key}" for key in SETTINGS)]
