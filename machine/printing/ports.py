@@ -147,7 +147,7 @@ def known_ports() -> tuple[SerialDevice, ...]:
 
 
 def ask_ports(devices: Sequence[SerialDevice], baud: int, over: Event, in_use: Iterable[str] = ()) -> list[PortReport]:
-    """What answers at each port. over: ends the asking once it is set; in_use: ports where this program prints, which stay closed."""
+    """What answers at each port. over: ends the asking once it is set; in_use: ports where this program prints stay closed."""
     names = frozenset(in_use)
 
     def ask(device: SerialDevice) -> PortReport:

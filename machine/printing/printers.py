@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
+from machine.notices import say
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import (
     CLEAN,
@@ -18,8 +19,10 @@ from machine.printing.checks import (
 )
 from machine.printing.destination import Server
 from machine.printing.job import Does, Person, PrintJob
+from machine.printing.serial_log import new_log
 from machine.printing.serial_print import SerialPrinter
-from machine.printing.server_print import LIMITS, ServerPrinter, server_session
+from machine.printing.server_print import LIMITS, ServerPrinter
+from machine.printing.servers.servers import open_server
 from profiles.machine import Machine
 
 Printer = SerialPrinter | ServerPrinter
@@ -39,8 +42,11 @@ def open_printer(job: PrintJob, person: Person) -> Iterator[Printer]:
 def open_server_printer(job: PrintJob, at: Server, person: Person) -> Iterator[ServerPrinter]:
     """The printer behind a print server, for as long as the session with it lasts. Raises ServerError, ProfileError."""
     title = f"what {at.name} prints" if job.does is Does.FOLLOW else f"{job.name} to {at.name}"
-    with server_session(at, title, "print" if job.starts else "send", job.log) as (server, log):
-        yield ServerPrinter(job, server, log, person)
+    with new_log("print" if job.starts else "send", title, job.log) as log:
+        if log.trouble:
+            say(f"what is asked and answered is not logged: {log.file}: {log.trouble}")
+        with open_server(at, log.note) as server:
+            yield ServerPrinter(job, server, log, person)
 
 
 def check_print(job: PrintJob, printer: Printer, tell: Callable[[LoadedProgram], object] | None = None) -> LoadedProgram:

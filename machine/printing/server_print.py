@@ -1,9 +1,7 @@
 """Server print: a program handed over to a print server, started there and followed to its end; one that runs there followed."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from time import monotonic
 
 from machine.dryrun.timeline import Timeline
@@ -14,13 +12,11 @@ from machine.link.progress import ProgramPosition
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_free
-from machine.printing.destination import Server
 from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
-from machine.printing.serial_log import SerialLog, new_log
+from machine.printing.serial_log import SerialLog
 from machine.printing.servers.follow import follow_print
 from machine.printing.servers.server import GcodeUpload, Identity, PrintServer
-from machine.printing.servers.servers import open_server
 from machine.quantities import duration
 from profiles.errors import FirmwareError, NoAnswerError, ServerError
 from profiles.machine import Machine
@@ -29,16 +25,6 @@ LIMITS = (
     "the server prints its own copy: this computer may go, but there is no journal to resume from after a power cut, "
     "and pausing and cancelling do what the server's own macros say"
 )
-
-
-@contextmanager
-def server_session(server: Server, title: str, kind: str, file: Path | None = None) -> Iterator[tuple[PrintServer, SerialLog]]:
-    """A session with a server and the log of it, without keys. kind, file: of the log. Raises ServerError, ProfileError."""
-    with new_log(kind, title, file) as record:
-        if record.trouble:
-            say(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
-        with open_server(server, record.note) as session:
-            yield session, record
 
 
 class ServerPrinter:
