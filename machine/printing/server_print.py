@@ -15,7 +15,7 @@ from machine.printing.checks import check_free
 from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog
-from machine.printing.servers.follow import follow_print
+from machine.printing.servers.follow import Follower
 from machine.printing.servers.server import GcodeUpload, Identity, PrintServer
 from machine.quantities import duration
 from profiles.errors import FirmwareError, NoAnswerError, ServerError
@@ -101,7 +101,7 @@ class ServerPrinter:
         with person.show(scene) as tell:
             tell(None)
             try:
-                state = follow_print(
+                state = Follower(
                     server,
                     file,
                     progress.size,
@@ -109,7 +109,7 @@ class ServerPrinter:
                     control=person.commands,
                     left=person.left,
                     running=running,
-                )
+                ).run()
             except KeyboardInterrupt:
                 say("ended at once: whether the print has been cancelled is not known, look at the printer")
                 raise

@@ -29,34 +29,21 @@ UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({erro
 OnStatus = Callable[[PrintStatus, str], None]  # with a message to the person, "" when there is none
 
 
-def follow_print(
-    server: PrintServer,
-    file: str,
-    size: int,
-    *,
-    on_status: OnStatus,
-    control: Control,
-    left: Callable[[], bool],
-    running: PrintStatus | None = None,
-) -> PrintState:
-    """Have a file printed that a server holds, and follow that to its end.
+@dataclass(eq=False)
+class Follower:
+    """Has a file printed that a server holds, and follows that to its end: run() once.
 
     size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
-    the server is at already, which is not to be started. Raises ServerError when it is refused, fails or is lost, or when the
-    server no longer prints it and nobody here has cancelled it. Returns DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
+    the server is at already, which is not to be started.
     """
-    return _Follower(server, file, size, on_status, control, left, running).run()
 
-
-@dataclass
-class _Follower:
     server: PrintServer
     file: str
     size: int
     on_status: OnStatus
     control: Control
     left: Callable[[], bool]
-    running: PrintStatus | None
+    running: PrintStatus | None = None
 
     def __post_init__(self) -> None:
         # Status, error of a later answer, and when the newest answer came: the polling thread replaces them together.
@@ -74,7 +61,11 @@ class _Follower:
         self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
     def run(self) -> PrintState:
-        """A stop asked for before the start prevents it; one that comes as the following ends is still given."""
+        """DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
+
+        A stop asked for before the start prevents it; one that comes as the following ends is still given. Raises ServerError
+        when the print is refused, fails or is lost, or when the server no longer prints it and nobody here has cancelled it.
+        """
         if self._take_requests():
             return PrintState.FAILED
         try:
