@@ -1,4 +1,4 @@
-"""Program: the G-code of a print with its dry run, and the parts it was made of; what ways to print a model come to."""
+"""Program: the G-code of a print with its dry run and its parts, and the alternative ways to print a model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,7 +33,7 @@ class Program:
 
 
 def joints_of_print(program: Program, profile: Profile) -> "tuple[Joint, ...]":
-    """The joints of a print, with what its dry run tells of the first layers on them; none where its model is not known."""
+    """The joints of a print, with the contact of the first layers on them by its dry run; none where its model is not known."""
     if program.decomposition is None:
         return ()
     from mdp.joint import joints_of  # a G-code file has none

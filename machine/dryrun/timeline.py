@@ -37,13 +37,3 @@ class Timeline:
     def layers(self, part: int | None) -> int | None:
         """Layers of a part."""
         return None if part is None else self._layers.get(part)
-
-
-class UnknownTimeline(Timeline):
-    """The timeline of a program that is not here: nothing is known of it."""
-
-    beginning = "a file that is not known here"
-
-    def __init__(self) -> None:
-        self.letters, self._waits, self._layers = (), [], {}
-        self._line, self._ends, self._done_s = np.zeros(0, dtype=np.int64), np.zeros((0, 5)), np.zeros(1)

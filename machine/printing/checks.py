@@ -5,6 +5,7 @@ A reason against a job is a sentence: it is raised, or reported when --force is 
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import find_starvation
@@ -12,14 +13,14 @@ from machine.firmware import dialect_of, dialects, firmware_of, identify
 from machine.firmware.klipper import stepper_name
 from machine.gcode.commands import command_named
 from machine.gcode.line_text import macro_name
-from machine.link.identification import Answer, Kind
+from machine.link.identification import Answer
 from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import say
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.programs import LoadedProgram, count_of_errors, refuse_errors
 from machine.pipeline.requests import FORCE_GOES_ON
 from machine.printing.destination import Destination, SerialPort, Server
-from machine.printing.servers.server import ServerIdentity
+from machine.printing.servers.server import Identity
 from machine.printing.servers.servers import dialect_mismatch
 from machine.program import Program
 from profiles.errors import PrinterError, ServerError
@@ -30,8 +31,8 @@ from profiles.profile import Profile
 CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
 SLACK = 0.01  # mm or deg: what the firmware and the program round
 # What a program depends on: made for one such machine it is wrong on another. Speeds and accelerations are not among it.
-SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
-AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
+OF_AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
+SHAPING = ("shape", "dialect", "coordinates", "tool_mm", *(f"{axis}.{key}" for axis in ("tilt", "turn") for key in OF_AXIS))
 
 
 def check(sentences: Iterable[str], force: bool) -> bool:
@@ -45,11 +46,11 @@ def check(sentences: Iterable[str], force: bool) -> bool:
     return not found
 
 
-def check_machine(answer: Answer | None, machine: Machine) -> None:
-    """Refuse a machine whose firmware takes no lines, or is not that of the printer; None: nothing is known of it."""
+def check_machine(answer: Answer | None, machine: Machine, force: bool = False) -> bool:
+    """Refuse a machine whose firmware takes no lines, or is not that of the printer at a port; True when nothing speaks against
+    it. answer: None: nothing is known of the printer. Raises PrinterError."""
     check_dialect(machine)
-    if answer is not None and (sentence := firmware_mismatch(answer, machine)):
-        raise PrinterError(f"{sentence} ({FORCE_GOES_ON})", forcible=True)
+    return check([firmware_mismatch(answer, machine)], force)
 
 
 def check_destination(destination: Destination, machine: Machine) -> None:
@@ -69,53 +70,37 @@ def check_dialect(machine: Machine) -> None:
         )
 
 
-def machine_sentences(answer: Answer | None, machine: Machine) -> Iterator[str]:
-    """Reasons against a machine at a printer with this answer; None: the printer is not known."""
-    if answer is not None:
-        yield firmware_mismatch(answer, machine)
+def machine_sentences(identity: Identity, machine: Machine) -> Iterator[str]:
+    """Reasons against a machine at a printer."""
+    yield firmware_mismatch(identity.printer, machine)
+    yield lacking_steppers(identity, machine)
+    yield _unknown_macros(lacking_macros(identity, _block_lines(machine)), machine.name)
 
 
-def program_sentences(answer: Answer | None, loaded: LoadedProgram) -> Iterator[str]:
-    """Reasons against a program: it was made for another machine, or leaves the limits that the firmware reports."""
-    program, profile = loaded.program, loaded.profile
-    own, sections = read_embedded_profile(program.lines, profile, frozenset())
+def program_sentences(identity: Identity, loaded: LoadedProgram, force: bool) -> Iterator[str]:
+    """Reasons against a program: it was made for another machine, leaves the limits that the firmware reports, calls macros that
+    a Klipper lacks, or its dry run has errors, for which MoveError is raised without force."""
+    program, machine = loaded.program, loaded.profile.machine
+    recorded, sections = read_embedded_profile(program.lines, loaded.profile, frozenset())
     if "machine" in sections:
-        yield machine_mismatch(own.machine, profile.machine, loaded.name)
-    if answer is not None:
-        machine, reached = profile.machine, {letter: reach for letter, reach in summary(program.run)["axes"].items() if reach}
+        yield machine_mismatch(recorded.machine, machine, loaded.name)
+    if identity.printer is not None:
         rotary = (machine.tilt.letter, machine.turn.letter)
-        followed = machine.coordinates == "workpiece"  # X Y Z of such a file are no places of the axes
-        yield exceeded_limit(answer, {key: reach for key, reach in reached.items() if key in rotary or not followed})
-
-
-def error_sentences(loaded: LoadedProgram, force: bool) -> Iterator[str]:
-    """The errors of the dry run, last of all. Raises MoveError for them without force."""
+        letters = rotary if machine.coordinates == "workpiece" else None  # X Y Z of such a file are no places of the axes
+        reached = {axis: reach for axis, reach in summary(program.run)["axes"].items() if reach}
+        yield exceeded_limit(identity.printer, {axis: reached[axis] for axis in reached if letters is None or axis in letters})
+    lacking = lacking_macros(identity, _block_lines(machine))
+    yield _unknown_macros([name for name in lacking_macros(identity, program.lines) if name not in lacking], loaded.name)
     if not force:
-        refuse_errors(loaded.program.run.errors, force=False)
-    yield count_of_errors(loaded.program.run.errors)
+        refuse_errors(program.run.errors, force=False)
+    yield count_of_errors(program.run.errors)
 
 
 def with_starvation(destination: Destination, program: Program, profile: Profile) -> Program:
-    """The program with what the dry run finds of the line's rate."""
+    """The program with the places where a serial line is too slow for it."""
     if not isinstance(destination, SerialPort) or not destination.is_rate_limited:
         return program
     return replace(program, run=find_starvation(program.run, program.lines, profile.machine, destination.baud))
-
-
-def server_machine_sentences(server: Server, greeting: ServerIdentity, machine: Machine) -> Iterator[str]:
-    """Reasons against a machine behind a print server. Raises PrinterError for a dialect that the server does not read."""
-    check_destination(server, machine)
-    yield from machine_sentences(printer_of(greeting), machine)
-    yield lacking_steppers(greeting, machine)
-    yield _unknown_macros(lacking_macros(greeting, _block_lines(machine)), machine.name)
-
-
-def server_program_sentences(greeting: ServerIdentity, loaded: LoadedProgram) -> Iterator[str]:
-    """Reasons against a program behind a print server, missing Klipper macros included."""
-    yield from program_sentences(printer_of(greeting), loaded)
-    lacking = lacking_macros(greeting, _block_lines(loaded.profile.machine))
-    unknown = [name for name in lacking_macros(greeting, loaded.program.lines) if name not in lacking]
-    yield _unknown_macros(unknown, loaded.name)
 
 
 def check_free(server: str, status: PrintStatus) -> None:
@@ -137,8 +122,10 @@ def check_idle(server: str, status: PrintStatus) -> None:
         raise ServerError(f"{server} cannot tell its settings now: {status.message or 'its printer is not connected'}")
 
 
-def firmware_mismatch(answer: Answer, machine: Machine) -> str:
-    """Why this firmware cannot print for a machine, as a sentence; "" when it can, or does not tell enough to say."""
+def firmware_mismatch(answer: Answer | None, machine: Machine) -> str:
+    """Why this firmware cannot print for a machine, as a sentence; "" when it can, or when its answer does not decide that."""
+    if answer is None:
+        return ""
     firmware = identify(answer.words)
     dialects = tuple(firmware.dialects) if firmware is not None else ()  # none: what it understands is not known
     if dialects and machine.dialect not in dialects:
@@ -157,7 +144,7 @@ def firmware_mismatch(answer: Answer, machine: Machine) -> str:
 
 
 def exceeded_limit(answer: Answer, reached: Mapping[str, Sequence[float]]) -> str:
-    """Which axis of a program leaves the limits that the firmware tells, as a sentence; "" when none does.
+    """Which axis of a program leaves the limits that the firmware reports, as a sentence; "" when none does.
 
     reached: letter -> least and greatest value of the program, mm or deg. Firmwares clip such a move without a word.
     """
@@ -176,32 +163,25 @@ def machine_mismatch(recorded: Machine, chosen: Machine, file: str) -> str:
     if recorded.name != chosen.name:
         return f"{file} was made for the machine {recorded.name}, not for {chosen.name}"
     for key in SHAPING:
-        if (then := getattr(recorded, key)) != (now := getattr(chosen, key)):
-            return _changed(file, chosen, key, then, now)
-    for axis in ("tilt", "turn"):
-        for key in AXIS:
-            if (then := getattr(getattr(recorded, axis), key)) != (now := getattr(getattr(chosen, axis), key)):
-                return _changed(file, chosen, f"{axis}.{key}", then, now)
+        then, now = (attrgetter(key)(machine) for machine in (recorded, chosen))
+        if then != now:
+            return f"{file} was made when {key_name(f'machine.{key}')} of {chosen.name} was {_text(then)}, but it is {_text(now)}"
     return ""
-
-
-def _changed(file: str, machine: Machine, key: str, then: object, now: object) -> str:
-    return f"{file} was made when {key_name(f'machine.{key}')} of {machine.name} was {_text(then)}, but it is {_text(now)}"
 
 
 def _text(value: object) -> str:
     return ", ".join(f"{x:g}" for x in value) if isinstance(value, tuple) else str(value)
 
 
-def lacking_steppers(greeting: ServerIdentity, machine: Machine) -> str:
-    """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or does not tell."""
-    if greeting.steppers is None or not machine.tilts:
+def lacking_steppers(identity: Identity, machine: Machine) -> str:
+    """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or reports none."""
+    if identity.steppers is None or not machine.tilts:
         return ""
     wanted = [stepper_name(axis) for axis in (machine.tilt, machine.turn)]
-    lacking = [name for name in wanted if name not in greeting.steppers]
+    lacking = [name for name in wanted if name not in identity.steppers]
     if not lacking:
         return ""
-    there = ", ".join(sorted(greeting.steppers)) or "none"
+    there = ", ".join(sorted(identity.steppers)) or "none"
     sections = " and ".join(f"[manual_stepper {name}]" for name in lacking)
     return (
         f"{machine.name} turns its table by {sections}, which this Klipper lacks; it has {there}: "
@@ -209,12 +189,12 @@ def lacking_steppers(greeting: ServerIdentity, machine: Machine) -> str:
     )
 
 
-def lacking_macros(greeting: ServerIdentity, lines: Iterable[str]) -> list[str]:
-    """The macros that lines call and a Klipper does not have; [] when it has all or does not tell."""
-    if greeting.commands is None:
+def lacking_macros(identity: Identity, lines: Iterable[str]) -> list[str]:
+    """The macros that lines call and a Klipper does not have; [] when it has all, or does not report them."""
+    if identity.commands is None:
         return []
     called = dict.fromkeys(name for line in lines if (name := macro_name(line)))
-    return [name for name in called if name not in greeting.commands and not command_named(name).shows]
+    return [name for name in called if name not in identity.commands and not command_named(name).shows]
 
 
 def _block_lines(machine: Machine) -> list[str]:
@@ -228,10 +208,3 @@ def _unknown_macros(names: list[str], caller: str) -> str:
         return ""
     sections = " and ".join(f"[gcode_macro {name}]" for name in names)
     return f"{caller} calls {' and '.join(names)}, which this Klipper does not know and would pass over: it needs {sections}"
-
-
-def printer_of(greeting: ServerIdentity) -> Answer | None:
-    """The printer behind a server, described as a printer at a port would answer."""
-    if not greeting.firmware:
-        return None
-    return Answer(Kind.PRINTER, f"FIRMWARE_NAME:{greeting.firmware}", greeting.letters, greeting.limits)

@@ -26,7 +26,7 @@ class StopError(Exception):
 class CommandSession:
     """`with session:` greet(), then command() after command. One thread at a time; order() may be called from any other.
 
-    However the block is left, the heaters go off: see HeaterGuard, which also says what an error is told. At a normal end
+    However the block is left, the heaters go off: see HeaterGuard, which also adds words to an error. At a normal end
     PrinterError is raised where the printer does not confirm that, and nothing is done when keep_heat is set. StopError becomes
     the emergency stop. Before the greeting nothing was sent that heats.
     unknown: commands that the printer did not know; heat, position: what it reported last.

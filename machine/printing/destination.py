@@ -3,11 +3,12 @@
 What a person names as a port is read here, once; everything behind that asks the value.
 """
 
+import re
 from dataclasses import dataclass
+from ipaddress import IPv6Address
 from math import isfinite
 from pathlib import Path
 from typing import ClassVar
-from urllib.parse import SplitResult, urlsplit
 
 from machine.firmware.firmware import check_baud
 from machine.pipeline.requests import BAUD, SIMULATED
@@ -18,8 +19,15 @@ from profiles.messages import option
 PORTS = {"octoprint": 80, "moonraker": 7125, "duet": 80}
 NAMES = {"octoprint": "OctoPrint", "moonraker": "Moonraker", "duet": "a Duet"}
 TLS_PORT = 443
-SCHEMES = ("http", "https")
-EXPECTED = "octoprint:HOST, moonraker:HOST or duet:HOST, HOST being a name, an IP address or http(s)://HOST:PORT, is expected"
+SERVERS = "octoprint:HOST, moonraker:HOST or duet:HOST"
+EXPECTED = f"{SERVERS}, HOST being a name, an IP address or http(s)://HOST:PORT, is expected"
+LINES = ("socket", "rfc2217")
+ADDRESSES = ", ".join(f"{line}://HOST:PORT" for line in LINES)
+ADDRESS = re.compile(r"(?:([^:/?#]*)://)?(\[[^\]/?#]*\]|[^:/?#]*)(:[^/?#]*)?(/[^?#]*)?(.*)", re.DOTALL)
+# Paths may have colons, as those of /dev/serial/by-path; a word with one that is no line known here is a mistake.
+DEVICE = re.compile(rf"(?:(?:{'|'.join(LINES)})://|[^:]*[/\\]).*|[^:]+")
+NUMBER = re.compile(r":0*[1-9]\d{0,4}", re.ASCII)
+LABEL = re.compile(r"[\w-]{1,63}")  # of a host's name, in any script
 
 
 @dataclass(frozen=True)
@@ -29,11 +37,6 @@ class Simulated:
     speed: float = 0.0
     name: ClassVar[str] = SIMULATED
 
-    @property
-    def title(self) -> str:
-        """The name in a title."""
-        return "the simulated printer"
-
 
 @dataclass(frozen=True)
 class SerialPort:
@@ -41,11 +44,6 @@ class SerialPort:
 
     name: str
     baud: int = BAUD
-
-    @property
-    def title(self) -> str:
-        """The name in a title."""
-        return self.name
 
     @property
     def is_rate_limited(self) -> bool:
@@ -76,23 +74,25 @@ class Server:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}{self.path}"
 
-    @property
-    def hosts(self) -> tuple[str, str]:
-        """Names in the user's file of servers: host and port, or the host alone."""
-        return f"{self.host}:{self.port}", self.host
-
 
 Destination = Simulated | SerialPort | Server
 AtPrinter = Simulated | SerialPort  # a line to the printer itself
 
 
 def parse_destination(port: str, baud: int = BAUD, speed: float = 0.0) -> Destination:
-    """The destination that --port, --baud and --sim-speed name. Raises ServerError, PrinterError for what is not possible."""
+    """The destination that a port's name, a baud rate and a speed of the simulation mean. Raises ServerError, PrinterError for
+    what is not possible, a name that no device can have included."""
     if is_server_address(port):
         return parse_server_address(port)
     check_baud(baud)
-    check_speed(speed)
-    return Simulated(speed) if port == SIMULATED else SerialPort(port, baud)
+    if not (isfinite(speed) and speed >= 0):
+        raise PrinterError(f"{option('sim-speed')} is {speed:g}: it must be 0 (as fast as possible) or a number above")
+    if port.lower() == SIMULATED:
+        return Simulated(speed)
+    if not DEVICE.fullmatch(port) or not port.isprintable() or port != port.strip():
+        shown = f"...@{port.rpartition('@')[2]}" if "@" in port else port  # what stands before it may be a password
+        raise PrinterError(f"port {_plain(shown)!r} cannot be one: a device, {SIMULATED}, {ADDRESSES}, {SERVERS} is expected")
+    return SerialPort(port, baud)
 
 
 def parse_printer(port: str, baud: int = BAUD, speed: float = 0.0) -> AtPrinter:
@@ -110,12 +110,6 @@ def at_printer(destination: Destination) -> AtPrinter:
     return destination
 
 
-def check_speed(speed: float) -> None:
-    """Refuse a speed at which no simulated printer can run. Raises PrinterError."""
-    if not (isfinite(speed) and speed >= 0):
-        raise PrinterError(f"{option('sim-speed')} is {speed:g}: it must be 0 (as fast as possible) or a number above")
-
-
 def is_server_address(text: str) -> bool:
     """Whether what a person names as a port is a print server."""
     return text.partition(":")[0].lower() in PORTS and ":" in text
@@ -123,36 +117,35 @@ def is_server_address(text: str) -> bool:
 
 def parse_server_address(text: str) -> Server:
     """The server that is meant. Raises ServerError."""
-    kind, colon, rest = text.partition(":")
+    kind, _, address = text.partition(":")
     kind = kind.lower()
-    if "@" in rest:  # never repeated: what stands before it may be a password
+    if "@" in address:  # never repeated: what stands before it may be a password
         raise ServerError("server address: names and passwords do not belong into it: keys have a file of their own")
-    if not colon or kind not in PORTS:
+    parts = ADDRESS.fullmatch(address)
+    if not is_server_address(text) or parts is None:
         raise ServerError(f"server address {_plain(text)!r}: {EXPECTED}")
-    has_scheme = "://" in rest
-    try:
-        parts = urlsplit(rest if has_scheme else f"//{rest}")
-        port = parts.port
-    except ValueError as error:
-        raise ServerError(f"server address {_plain(text)!r}: {str(error).lower()}: {EXPECTED}") from None
-    if port == 0:
-        raise ServerError(f"server address {_plain(text)!r}: port 0 is none: {EXPECTED}")
-    _check(parts, text, has_scheme)
-    scheme = parts.scheme or "http"
-    usual = TLS_PORT if scheme == "https" else PORTS[kind]
-    return Server(kind, scheme, parts.hostname or "", port or usual, parts.path.rstrip("/"), text)
-
-
-def _check(parts: SplitResult, text: str, has_scheme: bool) -> None:
-    if has_scheme and parts.scheme not in SCHEMES:
-        raise ServerError(f"server address {_plain(text)!r} begins with {parts.scheme}://: http:// or https:// is expected")
-    host = parts.hostname or ""
-    if not all(c.isalnum() or c in ".-_:%" for c in host) or not all(
-        0 < len(label) < 64 for label in host.rstrip(".").split(".")
-    ):
+    scheme, host, port, path, rest = parts.groups("")
+    if scheme.lower() not in ("", "http", "https"):
+        raise ServerError(f"server address {_plain(text)!r} begins with {_plain(scheme)}://: http:// or https:// is expected")
+    if not _is_host(host):
         raise ServerError(f"server address {_plain(text)!r} names no host: {EXPECTED}")
-    if parts.query or parts.fragment:
+    if port and not (NUMBER.fullmatch(port) and int(port[1:]) < 65536):
+        raise ServerError(f"server address {_plain(text)!r}: port {_plain(port[1:])} is none: {EXPECTED}")
+    if rest or not path.isprintable():
         raise ServerError(f"server address {_plain(text)!r}: nothing may follow the path: {EXPECTED}")
+    usual = TLS_PORT if scheme.lower() == "https" else PORTS[kind]
+    return Server(kind, scheme.lower() or "http", host.strip("[]").lower(), int(port[1:] or usual), path.rstrip("/"), text)
+
+
+def _is_host(host: str) -> bool:
+    """Whether a text is an IPv6 address in brackets, or can be a computer's name or IPv4 address."""
+    if host.startswith("["):
+        try:
+            IPv6Address(host[1:-1])
+        except ValueError:
+            return False
+        return True
+    return all(LABEL.fullmatch(label) for label in host.removesuffix(".").split("."))
 
 
 def _plain(text: str) -> str:

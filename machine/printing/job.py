@@ -1,7 +1,6 @@
 """Print job: what is to be done at which printer, the person who attends it, and how it ended.
 
-The terminal and a page of the workbench are two persons; a printer at a port and a print server are two printers. What prints is
-written once, against `Person` and `Printer`.
+The terminal and a page of the workbench are two persons; what prints is written once, against `Person`.
 """
 
 from collections.abc import Callable
@@ -18,8 +17,6 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import Destination
 from machine.printing.serial_log import PrinterMessages, SerialLog
-from machine.program import Program
-from profiles.machine import Machine
 from profiles.profile import Profile
 
 
@@ -36,7 +33,7 @@ class Does(StrEnum):
 class PrintJob:
     """A job: its printer, its program and how it is recorded.
 
-    load: makes the program; profile: what is known of the machine before that, None: the program itself tells. starts: False: a
+    load: makes the program; profile: what is known of the machine before that, None: the program itself says it. starts: False: a
     print server only gets the file and keeps it. force: go past what --force goes past. cut_off: the journal of the print whose
     rest it is. log: file for what is sent and received, journal: for what a resume needs; None: a new one in the state folder.
     key: of the slices that are printed.
@@ -113,19 +110,3 @@ class Person(Protocol):
 
     def gives_up(self) -> bool:
         """Whether there is to be no print on a server, as long as none has begun."""
-
-
-class Printer(Protocol):
-    """The machine that carries out a job: a printer at a port, or behind a print server. All methods raise UserError."""
-
-    def greet(self) -> None:
-        """Ask who is there."""
-
-    def fit(self, machine: Machine) -> None:
-        """Refuse a machine that is not the printer's."""
-
-    def ready(self, loaded: LoadedProgram) -> Program:
-        """Refuse a program that cannot be printed there; the program with what is found of it there."""
-
-    def print(self, loaded: LoadedProgram) -> End:
-        """Print it and say how it ended."""

@@ -1,6 +1,6 @@
-"""Ports: a line to the printer at a port, who answers there, and what answers at each port of this computer.
+"""Ports: the line to a printer at a port, and what answers at each port of this computer.
 
-A simulated printer that runs keeps a file in the state folder with its path and a word on what it is, locked as long as it runs:
+A simulated printer that runs keeps a file in the state folder with its path and a description, locked as long as it runs:
 another terminal may get the path of one that was killed, and must not be written to.
 """
 
@@ -149,7 +149,7 @@ def known_ports() -> tuple[SerialDevice, ...]:
 
 
 def ask_ports(devices: Sequence[SerialDevice], baud: int, over: Event, in_use: Iterable[str] = ()) -> list[PortReport]:
-    """Ask at each port who answers; a set `over` ends the asking. in_use: ports where this program prints, which stay closed."""
+    """What answers at each port. over: ends the asking once it is set; in_use: ports where this program prints stay closed."""
     names = frozenset(in_use)
 
     def ask(device: SerialDevice) -> PortReport:

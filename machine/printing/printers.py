@@ -8,10 +8,23 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from machine.pipeline.programs import LoadedProgram
+from machine.printing.checks import (
+    CLEAN,
+    check,
+    check_destination,
+    machine_sentences,
+    program_sentences,
+    with_starvation,
+)
 from machine.printing.destination import Server
-from machine.printing.job import Does, Person, Printer, PrintJob
+from machine.printing.job import Does, Person, PrintJob
+from machine.printing.serial_log import new_log
 from machine.printing.serial_print import SerialPrinter
-from machine.printing.server_print import ServerPrinter, server_session
+from machine.printing.server_print import LIMITS, ServerPrinter
+from machine.printing.servers.servers import open_server
+from profiles.machine import Machine
+
+Printer = SerialPrinter | ServerPrinter
 
 
 @contextmanager
@@ -28,24 +41,37 @@ def open_printer(job: PrintJob, person: Person) -> Iterator[Printer]:
 def open_server_printer(job: PrintJob, at: Server, person: Person) -> Iterator[ServerPrinter]:
     """The printer behind a print server, for as long as the session with it lasts. Raises ServerError, ProfileError."""
     title = f"what {at.name} prints" if job.does is Does.FOLLOW else f"{job.name} to {at.name}"
-    with server_session(at, title, "print" if job.starts else "send", job.log) as (server, log):
-        yield ServerPrinter(job, at, server, log, person)
+    with new_log("print" if job.starts else "send", title, job.log) as log:
+        log.say_trouble("what is asked and answered")
+        with open_server(at, log.note) as server:
+            yield ServerPrinter(job, server, log, person)
 
 
 def check_print(job: PrintJob, printer: Printer, tell: Callable[[LoadedProgram], object] | None = None) -> LoadedProgram:
     """The program of a job, when nothing speaks against printing it there. The printer is asked before any work is done.
 
-    tell: told the program as soon as it is there, and again with what is found of it. Raises UserError.
+    tell: called with the program as soon as it is there, and again with what is found of it. Raises UserError.
     """
     assert job.load is not None
-    tell = tell or (lambda loaded: None)
     printer.greet()
     if job.profile is not None:
-        printer.fit(job.profile.machine)
+        _check_machine(job, printer, job.profile.machine)
     loaded = job.load()
-    tell(loaded)
+    if tell is not None:
+        tell(loaded)
     if job.profile is None:
-        printer.fit(loaded.profile.machine)
-    loaded = replace(loaded, program=printer.ready(loaded))
-    tell(loaded)
+        _check_machine(job, printer, loaded.profile.machine)
+    if check(program_sentences(printer.identity, loaded, job.force), job.force):
+        printer.person.passed(CLEAN)
+    if isinstance(job.destination, Server) and job.starts:
+        printer.person.passed(LIMITS)
+    loaded = replace(loaded, program=with_starvation(job.destination, loaded.program, loaded.profile))
+    if tell is not None:
+        tell(loaded)
     return loaded
+
+
+def _check_machine(job: PrintJob, printer: Printer, machine: Machine) -> None:
+    check_destination(job.destination, machine)
+    if check(machine_sentences(printer.identity, machine), job.force):
+        printer.person.passed(printer.fits(machine))

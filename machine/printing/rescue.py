@@ -4,9 +4,10 @@ A print server goes on printing by itself: it is only asked what it does, unless
 """
 
 from machine.link.medium import SERIAL
+from machine.link.pending_commands import Command
 from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
-from machine.printing.destination import Destination, Server, Simulated
+from machine.printing.destination import SerialPort, Server
 from machine.printing.servers.follow import UNCONFIRMED
 from machine.printing.servers.servers import open_server
 from profiles.errors import PortError, ServerError, UserError
@@ -16,15 +17,13 @@ ROUNDED_S = 1.0  # servers tell whole seconds
 STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 
-def rescue(at: Destination, emergency: bool) -> str:
+def rescue(at: SerialPort | Server, emergency: bool) -> str:
     """Open the port anew and give the orders; what became of them as a sentence. emergency: by M112.
 
     Homing that is under way is cut short, whereupon Marlin halts: its heaters are off then, too.
     """
     if isinstance(at, Server):
-        return _stop_server(at) if emergency else _look_at_server(at)
-    if isinstance(at, Simulated):
-        return "the simulated printer has ended with it"
+        return _rescue_server(at, emergency)
     try:
         with open_port(at.name, at.baud) as wire:
             if not emergency:
@@ -37,15 +36,6 @@ def rescue(at: Destination, emergency: bool) -> str:
     return (
         "emergency stop: the printer has halted" if halted else "emergency stop: the printer did not confirm M112: cut the power"
     )
-
-
-def _stop_server(at: Server) -> str:
-    try:
-        with open_server(at) as server:
-            server.emergency_stop()
-    except UserError as error:
-        return UNCONFIRMED.format(server=at.name, error=error)
-    return STOPPED.format(server=at.name)
 
 
 def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
@@ -66,16 +56,21 @@ def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
             raise ServerError(f"{at.name} prints {printed} now, not {file}")
         if status.elapsed_s + ROUNDED_S < away_s:  # begun after the one that was left was last seen
             raise ServerError(f"{at.name} may have begun to print {file} again since: {CANCEL_THERE}")
-        server.cancel()
+        server.order(Command.CANCEL)
         return True
 
 
-def _look_at_server(at: Server) -> str:
+def _rescue_server(at: Server, emergency: bool) -> str:
     try:
         with open_server(at) as server:
+            if emergency:
+                server.order(Command.EMERGENCY_STOP)
+                return STOPPED.format(server=at.name)
             server.greet()
             status = server.status()
     except UserError as error:
+        if emergency:
+            return UNCONFIRMED.format(server=at.name, error=error)
         return f"{error}; what {at.name} prints goes on without this program: look at the printer"
     if status.state.is_printing:
         now = f"{at.name} is {status.state} {status.file or 'a file'}"

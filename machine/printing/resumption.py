@@ -1,6 +1,7 @@
-"""Resumption: a print that was cut off, read from its journal, and its rest: what is told, what is asked, what is refused.
+"""Resumption: a print that was cut off is read from its journal, and its rest is printed when printer and person agree.
 
-The person is asked only when the printer itself has told where it stands: until the answer is yes, nothing of it moves or heats.
+The person is asked only when the printer itself has reported where it stands: until the answer is yes,
+nothing moves or heats.
 """
 
 from collections.abc import Iterator, Sequence
@@ -48,6 +49,9 @@ from profiles.errors import JournalError, ProfileError
 from profiles.messages import key_name, phrase
 from profiles.profile import Profile, profile_of_tables
 
+HEIGHT_QUESTION = (  # else all that follows would lie too high or too low
+    "the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
+)
 RESTARTED = (
     "this computer may have restarted since the print began, so the newest records may be missing: see that the print is no "
     "higher than this, and that tip and table stand as told here, before you go on"
@@ -56,7 +60,7 @@ RESTARTED = (
 
 @dataclass(frozen=True, eq=False)
 class Resumption:
-    """A print that can be gone on with, as its journal and its program tell; journal: its file, at: where its printer is."""
+    """A print that can be resumed, by its journal and its program. journal: its file; at: the port of its printer."""
 
     at: SerialPort
     journal: Path
@@ -89,7 +93,7 @@ class Resumption:
 
 
 def read_resumption(job: PrintJob) -> Resumption:
-    """What the journal of a job tells. The job's profile is the one whose machine the user has named.
+    """Read the journal of a job. The job's profile is the one whose machine the user has named.
 
     Raises JournalError and other UserErrors for what cannot be resumed at this printer.
     """
@@ -130,7 +134,8 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
             point = cut_off.point
             if is_in_doubt(way, point, cut_off.profile):
                 heights = heights_mm(point)
-                chosen = person.ask(_height_question(point), tuple(f"Z {z:.2f}" for z in heights))
+                choices = tuple(f"Z {z:.2f}" for z in heights)
+                chosen = person.ask(HEIGHT_QUESTION.format(heights=" or ".join(choices)), choices)
                 if chosen is None:
                     raise CancelledError
                 point = replace(point, stood_mm=heights[chosen])
@@ -151,7 +156,7 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
 
 @contextmanager
 def _further_journal(cut_off: Resumption, job: PrintJob) -> Iterator[Journal]:
-    """The journal of the rest; one that tells nothing is not left, for it would let the whole program begin anew."""
+    """The journal of the rest; one without a record is removed, for it would let the whole program begin anew."""
     with continue_journal(cut_off.text, cut_off.profile, cut_off.name, job.journal) as further:
         try:
             yield further
@@ -212,12 +217,6 @@ def _program(journal: Path, story: JournalContents) -> GcodeFile:
     if program.sha256() != story.heading.sha256:
         raise JournalError(f"journal {journal} is of another program: {program.path} has changed since it was printed")
     return program
-
-
-def _height_question(point: InterruptedPrint) -> str:
-    """At which height the tip stands; Z is not homed, so that all that follows lies by as much too high or too low."""
-    heights = " or ".join(f"Z {z:.2f}" for z in heights_mm(point))
-    return f"the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
 
 
 def _question(way: ResumePoint, point: InterruptedPrint, profile: Profile) -> str:

@@ -22,8 +22,7 @@ LIMIT_BYTES = 64_000_000  # of one log: about 600,000 lines with their answers
 PIECES = 4  # the first one is kept for the beginning, the others are the newest
 WORDS_KEPT = 50  # of a printer
 LONGEST_BYTES = 4096  # of a line that is not ended yet
-UNWRITTEN = 512  # chunks between writes: writing each by itself would cost as much as sending it
-UNWRITTEN_S = 1.0  # at most that much is missing after a crash
+UNWRITTEN_S = 1.0  # at most that much is missing after a crash: to write each chunk by itself would cost as much as sending it
 
 
 class SerialLog:
@@ -36,21 +35,24 @@ class SerialLog:
     def __init__(self, file: Path, title: str, limit_bytes: int = LIMIT_BYTES) -> None:
         self.file, self.title = file, title
         self.trouble = ""
-        self._unwritten: list[tuple[float, str, bytes]] = []
-        self._due_s = 0.0
-        self._torn = {">": b"", "<": b""}
+        self._torn: dict[str, bytes] = {}  # what is behind the last line's end, by direction
+        self._flushed_s = 0.0
         self._second, self._clock = -1, ""
         self._piece_bytes, self._written, self._piece = limit_bytes // PIECES, 0, 0
         self._out = self._open(file)
-        self._write(f"# tiltprint, {datetime.now():%Y-%m-%d %H:%M:%S}, {title}\n")
+        self._write(f"# tiltprint, {datetime.now():%Y-%m-%d %H:%M:%S}, {title}\n", flush=True)
 
     def note(self, direction: str, data: bytes) -> None:
         """Take a chunk of bytes; "#" is a remark of this program."""
         now_s = time.time()
-        self._unwritten.append((now_s, direction, data))
-        if len(self._unwritten) >= UNWRITTEN or now_s > self._due_s:
-            self._due_s = now_s + UNWRITTEN_S
-            self._flush()
+        data = self._torn.get(direction, b"") + data
+        end = data.rfind(b"\n") + 1
+        self._torn[direction] = data[end:]
+        flush = now_s > self._flushed_s + UNWRITTEN_S
+        if flush:
+            self._flushed_s = now_s
+        if end:
+            self._write(_stamped(data[: end - 1], f"{self._stamp(now_s)} {direction} "), flush)
 
     def say_trouble(self, what: str = "the traffic") -> None:
         """Tell the person when nothing can be logged. what: that would be."""
@@ -63,11 +65,10 @@ class SerialLog:
 
     def close(self) -> None:
         """Write what is held back, lines without an end too."""
-        self._flush()
         for direction, line in self._torn.items():
             if line:
                 self._write(f"{self._stamp(time.time())} {direction} {_readable(line)} (unfinished)\n")
-        self._torn = {">": b"", "<": b""}
+        self._torn = {}
         if self._out is not None:
             try:
                 self._out.close()
@@ -81,40 +82,28 @@ class SerialLog:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def _flush(self) -> None:
-        chunks, self._unwritten = self._unwritten, []
-        written = []
-        for now_s, direction, data in chunks:
-            if torn := self._torn.get(direction):
-                data = torn + data
-            end = data.rfind(b"\n") + 1
-            self._torn[direction] = data[end:]
-            if end:
-                written.append(_stamped(data[: end - 1], f"{self._stamp(now_s)} {direction} "))
-        if written:
-            self._write("".join(written))
-
     def _stamp(self, now_s: float) -> str:
         second = int(now_s)
         if second != self._second:
             self._second, self._clock = second, time.strftime("%H:%M:%S", time.localtime(second))
         return f"{self._clock}.{int(1000 * (now_s - second)):03d}"
 
-    def _write(self, text: str) -> None:
+    def _write(self, text: str, flush: bool = False) -> None:
         if self._out is None:
             return
         try:
             if self._written >= self._piece_bytes:
                 self._next_piece()
             self._written += self._out.write(text.encode("ascii", "backslashreplace"))
-            self._out.flush()
+            if flush:
+                self._out.flush()
         except OSError as error:
             self._fail(error)
 
     def _next_piece(self) -> None:
         """Go on in a new file; the beginning and the newest pieces stay, together never more than the limit."""
-        if self._out is not None:
-            self._out.close()
+        assert self._out is not None
+        self._out.close()
         self._piece, self._written = self._piece + 1, 0
         if self._piece >= PIECES:
             piece_of(self.file, self._piece - PIECES + 1).unlink(missing_ok=True)
@@ -161,7 +150,7 @@ class TappedWire:
 
 
 def tap(tell: Traffic, medium: Medium = SERIAL) -> Medium:
-    """A medium whose wires tell what goes over them."""
+    """A medium whose wires report all bytes that go over them."""
     return replace(medium, open=lambda name, baud: TappedWire(medium.open(name, baud), tell))
 
 
@@ -201,7 +190,7 @@ def new_log(kind: str, title: str, file: Path | None = None) -> SerialLog:
 
 
 class PrinterMessages:
-    """The last things a printer has said that are no mere answers; hear() takes chunks of bytes in the thread of the port."""
+    """The newest words of a printer beside its answers; hear() takes chunks of bytes in the thread of the port."""
 
     def __init__(self, most: int = WORDS_KEPT) -> None:
         self.last: deque[str] = deque(maxlen=most)
@@ -235,7 +224,7 @@ class PrinterMessages:
 
 
 def printer_message(line: bytes) -> str:
-    """What a line tells a person, "" for reports and answers."""
+    """The words of a line for a person; "" for reports and answers."""
     event = read_event(line)
     if event.kind is Kind.START:
         return "the printer has started"

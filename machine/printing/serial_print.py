@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
-from itertools import chain
 from math import inf, isfinite
 
 from machine.dryrun.timeline import Timeline
@@ -17,21 +16,12 @@ from machine.link.status import PrinterStatus
 from machine.link.stream import Outcome, print_lines
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
-from machine.printing.checks import (
-    CLEAN,
-    check,
-    check_dialect,
-    error_sentences,
-    machine_sentences,
-    program_sentences,
-    with_starvation,
-)
 from machine.printing.destination import AtPrinter, SerialPort, Simulated
 from machine.printing.job import CANCELLED, DONE, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import new_journal
 from machine.printing.ports import describe_answer, identify_printer
 from machine.printing.serial_log import SerialLog, new_log, tap
-from machine.program import Program
+from machine.printing.servers.server import Identity
 from machine.quantities import duration
 from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
@@ -48,44 +38,32 @@ Begin = Callable[[PrinterStatus], ResumePoint]  # of a resumed print: decides wh
 
 
 class SerialPrinter:
-    """The `Printer` at a port, or the simulated one."""
+    """The printer of a job at a port, or the simulated one, of which nothing is asked."""
 
     def __init__(self, job: PrintJob, at: AtPrinter, person: Person) -> None:
-        self._job, self._at, self._person = job, at, person
-        self._answer: Answer | None = None  # of the simulated one nothing is asked
+        self.person = person
+        self.identity = Identity("")
+        self._job, self._at = job, at
 
     def greet(self) -> None:
-        """Ask who answers at the port."""
+        """Identify what answers at the port. Raises PrinterError."""
         if isinstance(self._at, SerialPort):
             with open_port(self._at.name, self._at.baud) as wire:
-                self._answer = identify_printer(wire, self._at.baud)
-
-    def fit(self, machine: Machine) -> None:
-        """Refuse a machine whose firmware takes no lines, or is not that of the printer."""
-        check_dialect(machine)
-        if check(machine_sentences(self._answer, machine), self._job.force):
-            self._person.passed(self._who(machine))
-
-    def ready(self, loaded: LoadedProgram) -> Program:
-        """The program with what the dry run finds of this line's rate."""
-        sentences = chain(program_sentences(self._answer, loaded), error_sentences(loaded, self._job.force))
-        if check(sentences, self._job.force):
-            self._person.passed(CLEAN)
-        return with_starvation(self._at, loaded.program, loaded.profile)
+                self.identity = Identity("", identify_printer(wire, self._at.baud))
 
     def print(self, loaded: LoadedProgram) -> End:
         """Stream it and say how it ended, with a log and a journal."""
         simulated = isinstance(self._at, Simulated)
         journalled = self._journal(loaded) if not simulated or self._job.journal is not None else nullcontext()
-        title = f"{loaded.name} to {self._at.title}"
+        title = f"{loaded.name} to {'the simulated printer' if simulated else self._at.name}"
         with new_log("print", title, self._job.log) as log, _pointing_to(log), journalled as journal:
             if isinstance(self._at, Simulated):
-                return _print_simulated(loaded, self._at, Scene(title, log, journal), self._person)
-            outcome = stream_program(loaded, self._at, Scene(title, log, journal), self._person)
+                return _print_simulated(loaded, self._at, Scene(title, log, journal), self.person)
+            outcome = stream_program(loaded, self._at, Scene(title, log, journal), self.person)
             return report_end(outcome, log, journal)
 
     def _journal(self, loaded: LoadedProgram) -> AbstractContextManager[Journal | None]:
-        """The journal; a print that was not told where to keep it goes on without one where none can be written."""
+        """The journal. A print whose journal has no file of its own goes on without one where none can be written."""
         file = self._job.journal
         try:
             return new_journal(loaded.program.lines, loaded.profile, loaded.name, loaded.source, file)
@@ -95,18 +73,18 @@ class SerialPrinter:
             say(f"this print cannot be resumed when it is cut off: {error}")
             return nullcontext()
 
-    def _who(self, machine: Machine) -> str:
-        """Description of a printer that fits the machine."""
+    def fits(self, machine: Machine) -> str:
+        """That the printer is one for a machine, as a sentence."""
         if isinstance(self._at, Simulated):
             speed = f"{self._at.speed:g} times as fast as a real one" if self._at.speed else "as fast as it can"
             return f"a simulated {machine.name}, {speed}"
-        assert self._answer is not None
-        described = describe_answer(self._answer, self._at.baud)
+        assert self.identity.printer is not None
+        described = describe_answer(self.identity.printer, self._at.baud)
         return f"{described}, answers at {self._at.name} and is one for {machine.name}"
 
 
 def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person: Person) -> End:
-    """Stream to the simulated printer and tell what it has done."""
+    """Stream to the simulated printer and report what it has done."""
     machine = loaded.profile.machine
     usb = loaded.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
     speed = at.speed or inf
@@ -211,7 +189,7 @@ def _point_to(log: SerialLog) -> None:
 
 
 def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal | None = None) -> End:
-    """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one, or
+    """Report how the print ended, where its log is when the printer had something to say, and how to resume a stopped one, or
     that this is not possible. Closes the journal first: only what is on the disk is promised."""
     if journal is not None:
         journal.close()

@@ -1,4 +1,4 @@
-"""Settings queries: what a printer at a port or behind a print server tells of its settings, as the text that is read from.
+"""Settings queries: the settings that a printer at a port or behind a print server reports, as text for detection.
 
 Only questions are asked: nothing moves, nothing heats. A printer that prints is left alone.
 """
@@ -41,7 +41,10 @@ OTHERWISE = {
 def settings_text(at: Destination, simulated: Machine) -> ConfigText:
     """What answers there; simulated: the machine of the simulated printer. Raises PrinterError."""
     if isinstance(at, Server):
-        return _text_of_server(at)
+        with open_server(at) as server:
+            server.greet()
+            check_idle(server.name, server.status())
+            return ConfigText(at.name, server.settings())
     with open_line(at, simulated) as wire:
         return ConfigText(at.name, _conversation(wire, rate_of(at)))
 
@@ -95,10 +98,3 @@ def _ask(wire: Port, question: str) -> Iterator[str]:
             if text:
                 yield text
     raise SilenceError(f"the printer at {wire.name} does not answer {question} within {ANSWER_S:g} s: try it again")
-
-
-def _text_of_server(at: Server) -> ConfigText:
-    with open_server(at) as server:
-        server.greet()
-        check_idle(server.name, server.status())
-        return ConfigText(at.name, server.settings())

@@ -12,7 +12,7 @@ import pytest
 
 from machine.cli.cli import main
 from machine.link.journal import read_journal
-from machine.printing.servers.credentials import VARIABLE
+from machine.printing.servers.http import VARIABLE
 from machine.simulator.faults import Fault
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.save import stl

@@ -8,14 +8,18 @@ is recognised as its characters come in, whatever waits. A print can only be can
 
 import json
 import time
+import zlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from machine.link.identification import Answer, Kind
+from machine.link.pending_commands import Command
 from machine.link.print_state import ACTIVE, PrintState, PrintStatus
-from machine.printing.servers.credentials import how_to_give_a_key
-from machine.printing.servers.gcode_upload import GcodeUpload, Sent
-from machine.printing.servers.http import HttpSession, Reply, entry, number, plain, table, temperature, whole
-from machine.printing.servers.server import PrintServer, ServerIdentity
+from machine.link.protocol.events import NAME
+from machine.printing.destination import Server
+from machine.printing.servers.http import Reply, Tell, entry, how_to_give_a_key, number, plain, table, temperature, whole
+from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, Sent
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
@@ -37,18 +41,20 @@ STATES = {
     **dict.fromkeys(("halted", "off", "updating", "starting", "disconnected"), PrintState.OFFLINE),
 }
 
+ORDERS = {Command.PAUSE: "M25", Command.RESUME: "M24", Command.CANCEL: "M25", Command.EMERGENCY_STOP: "M112"}
+
 
 class Duet(PrintServer):
     """PrintServer of a Duet."""
 
-    def __init__(self, http: HttpSession) -> None:
-        super().__init__(http)
+    def __init__(self, address: Server, key: str = "", ca_file: Path | None = None, tell: Tell | None = None) -> None:
+        super().__init__(address, key, ca_file, tell)
         self._nozzle, self._bed = 1, 0  # heaters
         self._connected = False
         self._last: PrintState | None = None  # of the print, for idle says nothing of how it ended
         self._up_s = 0.0  # since the board was reset
 
-    def greet(self) -> ServerIdentity:
+    def greet(self) -> Identity:
         """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
         self._connect()
         board = table(self._model("boards[0]"))
@@ -59,16 +65,17 @@ class Duet(PrintServer):
         nozzle = whole(entry(table(entry(self._array("tools"), 0)).get("heaters"), 0))
         bed = whole(entry(table(self._model("heat")).get("bedHeaters"), 0))
         self._nozzle, self._bed = self._nozzle if nozzle is None else nozzle, -1 if bed is None else bed
-        return ServerIdentity(f"{name} {version}".strip(), f"{name} {version}".strip(), "".join(limits), known)
+        text = f"{name} {version}".strip()
+        return Identity(text, Answer(Kind.PRINTER, f"{NAME}{text}", "".join(limits), known))
 
     def _connect(self) -> None:
-        password = self._http.credentials.key or DEFAULT_PASSWORD
+        password = self.key or DEFAULT_PASSWORD
         now = time.strftime("%Y-%m-%dT%H:%M:%S")
-        reply = self._http.get("/rr_connect", {"password": password, "time": now, "sessionKey": "yes"}, secret=True)
-        value = table(self._http.check(reply, "a session"))
+        reply = self.get("/rr_connect", {"password": password, "time": now, "sessionKey": "yes"}, secret=True)
+        value = table(self.check(reply, "a session"))
         if value.get("err") == 1:
-            wrong = "refuses the password" if self._http.credentials.key else "wants a password"
-            raise ServerError(f"{self.name} {wrong}: {how_to_give_a_key(self._http.address)}")
+            wrong = "refuses the password" if self.key else "wants a password"
+            raise ServerError(f"{self.name} {wrong}: {how_to_give_a_key(self.address)}")
         if value.get("err") == 2:
             raise ServerError(f"{self.name} serves as many others as it can: close a web page or program that is connected to it")
         if value.get("err") != 0:
@@ -76,7 +83,7 @@ class Duet(PrintServer):
         self._connected = True
         key = whole(value.get("sessionKey"))
         if key:  # firmware from 3.5 on; before that, and from DuetSoftwareFramework, a session is this computer's address
-            self._http.set_header("X-Session-Key", str(key))
+            self.client.headers["X-Session-Key"] = str(key)
 
     def status(self) -> PrintStatus:
         """From what the object model calls frequently changing, and what the firmware has said since."""
@@ -122,9 +129,10 @@ class Duet(PrintServer):
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         self._connect()  # the one before may have ended while the program was made
-        params = {"name": FOLDER + upload.name, "crc32": upload.crc32}
-        reply = self._http.upload("/rr_upload", params, upload.read_by(sent), answer_s=WRITTEN_S)
-        if table(self._http.check(reply, "the file")).get("err") != 0:
+        crc32 = f"{zlib.crc32(upload.content):08x}"  # eight digits: DuetSoftwareFramework compares them as text
+        params = {"name": FOLDER + upload.name, "crc32": crc32}
+        reply = self.post_file("/rr_upload", params, upload.read_by(sent), WRITTEN_S)
+        if table(self.check(reply, "the file")).get("err") != 0:
             said = plain(self._get("/rr_reply").body.decode("utf-8", "replace"))
             raise ServerError(f"{self.name} has not kept the file ({said or 'no reason given'}): is the card full or damaged?")
         return upload.name
@@ -144,16 +152,11 @@ class Duet(PrintServer):
                 return
             time.sleep(LOOK_S)
 
-    def pause(self) -> None:
-        """Pause the print: the firmware runs pause.g."""
-        self.command("M25")
-
-    def resume(self) -> None:
-        self.command("M24")
-
-    def cancel(self) -> None:
-        """Pause, which the firmware insists on, then end: it runs cancel.g, or switches heaters off where there is none."""
-        self.command("M25")
+    def order(self, command: Command) -> None:
+        """A print is only cancelled while it is paused; then the firmware runs cancel.g, or switches heaters off without one."""
+        self.command(ORDERS[command])
+        if command is not Command.CANCEL:
+            return
         deadline_s = time.monotonic() + PAUSE_S
         while (phase := self.status().state) in (PrintState.PRINTING, PrintState.PAUSING, PrintState.RESUMING):
             if time.monotonic() > deadline_s:
@@ -173,15 +176,11 @@ class Duet(PrintServer):
         lines += [{"key": key, "result": self._model(key)} for key in SETTINGS_KEYS]
         return "\n".join(json.dumps(line) for line in lines)
 
-    def emergency_stop(self) -> None:
-        """M112: the board halts until it is reset."""
-        self.command("M112")
-
     def close(self) -> None:
         """End the session, so that others find room, and leave."""
         try:
             if self._connected:
-                self._http.get("/rr_disconnect")
+                self.get("/rr_disconnect")
         except ServerError:
             pass
         finally:
@@ -205,12 +204,12 @@ class Duet(PrintServer):
 
     def _value(self, path: str, params: Mapping[str, str]) -> Any:
         sentence = {503: f"{self.name} is short of memory just now: try again"}
-        return self._http.check(self._get(path, params), "to answer", sentence)
+        return self.check(self._get(path, params), "to answer", sentence)
 
     def _get(self, path: str, params: Mapping[str, str] | None = None) -> Reply:
         """The reply; a session that has ended is begun again."""
-        reply = self._http.get(path, params)
+        reply = self.get(path, params)
         if reply.status == 401:
             self._connect()
-            reply = self._http.get(path, params)
+            reply = self.get(path, params)
         return reply

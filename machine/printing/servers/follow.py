@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
@@ -29,46 +29,26 @@ UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({erro
 OnStatus = Callable[[PrintStatus, str], None]  # with a message to the person, "" when there is none
 
 
-@dataclass
-class _Heard:
-    """What the polling thread has heard last, and how long it has heard nothing."""
-
-    status: PrintStatus | None = None
-    error: ServerError | None = None
-    answered_s: float = field(default_factory=time.monotonic)
-
-
-def follow_print(
-    server: PrintServer,
-    file: str,
-    size: int,
-    *,
-    on_status: OnStatus,
-    control: Control,
-    left: Callable[[], bool],
-    running: PrintStatus | None = None,
-) -> PrintState:
-    """Have a file printed that a server holds, and follow that to its end.
+@dataclass(eq=False)
+class Follower:
+    """Has a file printed that a server holds, and follows that to its end: run() once.
 
     size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
-    the server is at already, which is not to be started. Raises ServerError when it is refused, fails or is lost, or when the
-    server no longer prints it and nobody here has cancelled it. Returns DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
+    the server is at already, which is not to be started.
     """
-    return _Follower(server, file, size, on_status, control, left, running).run()
 
-
-@dataclass
-class _Follower:
     server: PrintServer
     file: str
     size: int
     on_status: OnStatus
     control: Control
     left: Callable[[], bool]
-    running: PrintStatus | None
+    running: PrintStatus | None = None
 
     def __post_init__(self) -> None:
-        self._heard, self._over = _Heard(), threading.Event()
+        # Status, error of a later answer, and when the newest answer came: the polling thread replaces them together.
+        self._heard: tuple[PrintStatus | None, ServerError | None, float] = (None, None, time.monotonic())
+        self._over = threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
         self._last_active: PrintState | None = self.running.state if self.running else None
@@ -81,7 +61,11 @@ class _Follower:
         self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
     def run(self) -> PrintState:
-        """A stop asked for before the start prevents it; one that comes as the following ends is still given."""
+        """DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
+
+        A stop asked for before the start prevents it; one that comes as the following ends is still given. Raises ServerError
+        when the print is refused, fails or is lost, or when the server no longer prints it and nobody here has cancelled it.
+        """
         if self._take_requests():
             return PrintState.FAILED
         try:
@@ -123,20 +107,20 @@ class _Follower:
         """Tell the newest status; how the print has ended, None while it goes on."""
         if self._failed is not None:
             raise self._failed
-        heard = self._heard
-        silent_s = time.monotonic() - heard.answered_s
+        status, error, answered_s = self._heard
+        silent_s = time.monotonic() - answered_s
         if silent_s > LOST_S:
-            where = heard.error or self.server.name
+            where = error or self.server.name
             heat = last_known(self._heat, silent_s)
             raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer{heat}")
-        if heard.status is None:
+        if status is None:
             return None
-        quiet = heard.error is not None or silent_s > QUIET_S
+        quiet = error is not None or silent_s > QUIET_S
         message = self._message or (f"no answer for {silent_s:.0f} s: {UNKNOWN}" if quiet else "")
-        if heard.status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
-            self._shown, self._shown_s = (heard.status, message), time.monotonic()
-            self.on_status(heard.status, message)
-        return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
+        if status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
+            self._shown, self._shown_s = (status, message), time.monotonic()
+            self.on_status(status, message)
+        return None if quiet else self._end_of(status)  # what was told last may be true no more
 
     def _end_of(self, status: PrintStatus) -> PrintState | None:
         if self._began_s is None:
@@ -183,11 +167,11 @@ class _Follower:
 
     def _poll(self) -> None:
         while not self._over.is_set():
-            before = self._heard
+            status, _, answered_s = self._heard
             try:
-                self._heard = _Heard(self._with_percents(self.server.status()))
+                self._heard = (self._with_percents(self.server.status()), None, time.monotonic())
             except ServerError as error:
-                self._heard = _Heard(before.status, error, before.answered_s)
+                self._heard = (status, error, answered_s)
             self._over.wait(POLL_S)
 
     def _take_requests(self) -> bool:
@@ -195,7 +179,7 @@ class _Follower:
         while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
                 try:
-                    self.server.emergency_stop()
+                    self.server.order(Command.EMERGENCY_STOP)
                 except ServerError as error:
                     raise ServerError(UNCONFIRMED.format(server=self.server.name, error=error)) from None
                 return True
@@ -204,19 +188,19 @@ class _Follower:
         return False
 
     def _order(self, request: PendingCommand) -> Callable[[], None] | None:
-        server, value = self.server, request.value
-        if request.command in (Command.FEED, Command.FLOW):
-            limits = FEED_PERCENT if request.command is Command.FEED else FLOW_PERCENT
-            self._message = percent_refusal(value, limits) or ""
-            return None if self._message else partial(self._set_percent, request.command, value)
-        orders = {Command.PAUSE: server.pause, Command.RESUME: server.resume, Command.CANCEL: self._cancel}
-        return orders.get(request.command)
+        command, value = request.command, request.value
+        if command in (Command.FEED, Command.FLOW):
+            self._message = percent_refusal(value, FEED_PERCENT if command is Command.FEED else FLOW_PERCENT) or ""
+            return None if self._message else partial(self._set_percent, command, value)
+        if command is Command.CANCEL:
+            return self._cancel
+        return partial(self.server.order, command) if command in (Command.PAUSE, Command.RESUME) else None
 
     def _cancel(self) -> None:
         """What ends from now on was cancelled here, unless the order was refused."""
         self._cancels = True
         try:
-            self.server.cancel()
+            self.server.order(Command.CANCEL)
         except NoAnswerError:
             raise
         except ServerError:
@@ -234,7 +218,7 @@ class _Follower:
         return replace(status, feed_percent=feed, flow_percent=flow)
 
     def _carry_out(self) -> None:
-        """The start, then orders one after the other; what a server refuses of these is told, and following goes on.
+        """The start, then orders one after the other; a refusal becomes a message, and following goes on.
 
         A start without an answer may have been taken: whether it was is seen by the status.
         """

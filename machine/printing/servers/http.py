@@ -1,4 +1,4 @@
-"""HTTP: requests to one print server, every way in which they fail as one sentence, and values out of its JSON.
+"""HTTP: requests to one print server, a sentence for every way in which they fail, and values out of its JSON.
 
 Redirects are not followed and no proxy of the environment is used: either would carry the key to somebody else. Certificates
 are verified; nothing turns that off.
@@ -16,17 +16,19 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 from urllib.parse import urlsplit, urlunsplit
 
 from machine.link.protocol.events import Temperature
 from machine.printing.destination import NAMES, Server
-from machine.printing.servers.credentials import Credentials, how_to_give_a_key, servers_file
 from profiles.errors import NoAnswerError, ServerError, causes
+from profiles.folders import settings_folder
 
 if TYPE_CHECKING:
     import httpx
 
+VARIABLE = "TILTPRINT_SERVER_KEY"
 CONNECT_S, ANSWER_S, WRITE_S = 5.0, 10.0, 30.0
 WHOLE_S = 30.0  # from the first byte of an answer to its last: ANSWER_S is between any two of them
 ERRNO = re.compile(r"^\[errno -?\d+\] ")
@@ -55,46 +57,52 @@ class Reply:
             return None
 
 
+def servers_file() -> Path:
+    """The user's file of print servers; it need not be there."""
+    return settings_folder() / "servers.toml"
+
+
+def how_to_give_a_key(address: Server) -> str:
+    """Where the key of a server belongs, for a person."""
+    return f'give it as key = "..." below [servers."{address.host}"] in {servers_file()}, or in the variable {VARIABLE}'
+
+
 class HttpSession:
     """get() and post() below a server's address; from any thread. Raises ServerError with a sentence for a person, NoAnswerError
-    where the request may have been taken. key_refused: statuses that are about the key.
+    where the request may have been taken.
+
+    key: "" when there is none; ca_file: None: the authorities that this computer trusts. key_header: which header carries a key;
+    key_refused: statuses that are about the key. name: the server as the user names it.
     """
 
+    key_header = ""
     key_refused: tuple[int, ...] = (401, 403)
 
-    def __init__(self, address: Server, credentials: Credentials, tell: Tell | None = None) -> None:
+    def __init__(self, address: Server, key: str = "", ca_file: Path | None = None, tell: Tell | None = None) -> None:
         import httpx
 
         for name in ("httpx", "httpcore"):  # they would log addresses, and a Duet's password is part of one
             logging.getLogger(name).setLevel(logging.WARNING)
-        self.address, self.credentials = address, credentials
+        self.address, self.name, self.key = address, address.name, key
         self._tell = tell or (lambda direction, data: None)
         self._log_lock = threading.Lock()
         self._httpx = httpx
+        headers = {"User-Agent": "tiltprint", "Accept": "application/json"}
         try:
-            self._client = httpx.Client(
+            self.client = httpx.Client(
                 base_url=address.url,
-                verify=_certificates(address, credentials),
+                verify=_certificates(address, ca_file),
                 trust_env=False,
                 follow_redirects=False,
-                headers={"User-Agent": "tiltprint", "Accept": "application/json"},
+                headers=headers | ({self.key_header: key} if self.key_header and key else {}),
                 timeout=httpx.Timeout(ANSWER_S, connect=CONNECT_S),
             )
         except (httpx.InvalidURL, UnicodeError) as error:
             raise ServerError(f"server address {address.name!r} names no host: {plain(str(error)).lower()}") from None
 
-    @property
-    def name(self) -> str:
-        """The server as the user names it."""
-        return self.address.name
-
     def close(self) -> None:
         """End all connections."""
-        self._client.close()
-
-    def set_header(self, name: str, value: str) -> None:
-        """Send a header with every further request."""
-        self._client.headers[name] = value
+        self.client.close()
 
     def get(self, path: str, params: Mapping[str, str] | None = None, secret: bool = False) -> Reply:
         """GET. secret: the parameters are not logged."""
@@ -106,25 +114,23 @@ class HttpSession:
         timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S)
         return self._request("POST", path, json=value, timeout=timeout, note=note)
 
-    def upload_form(self, path: str, fields: Mapping[str, str], name: str, file: BinaryIO, *, answer_s: float) -> Reply:
-        """POST a file as `file` in a multipart form after the fields; the answer may take answer_s after its last byte."""
-        files = {"file": (name, file, FILE_TYPE)}
-        return self._request("POST", path, data=fields, files=files, timeout=self._of_upload(answer_s), note=f"{path} ({name})")
+    def post_file(self, path: str, values: Mapping[str, str], file: BinaryIO, answer_s: float, form_name: str = "") -> Reply:
+        """POST a file as the body, with the values as parameters; the answer may take answer_s after its last byte.
 
-    def upload(self, path: str, params: Mapping[str, str], file: BinaryIO, *, answer_s: float) -> Reply:
-        """The same as the body itself of a request."""
-        headers, note = {"Content-Type": FILE_TYPE}, _shown(path, params)
-        timeout = self._of_upload(answer_s)
-        return self._request("POST", path, params=params, content=file, headers=headers, timeout=timeout, note=note)
-
-    def _of_upload(self, answer_s: float) -> httpx.Timeout:
-        return self._httpx.Timeout(answer_s, connect=CONNECT_S, write=WRITE_S)
+        form_name: the file's name in a multipart form, where it stands as `file` after the values.
+        """
+        timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S, write=WRITE_S)
+        if form_name:
+            files = {"file": (form_name, file, FILE_TYPE)}
+            return self._request("POST", path, data=values, files=files, timeout=timeout, note=f"{path} ({form_name})")
+        headers, note = {"Content-Type": FILE_TYPE}, _shown(path, values)
+        return self._request("POST", path, params=values, content=file, headers=headers, timeout=timeout, note=note)
 
     def _request(self, method: str, path: str, note: str, **request: Any) -> Reply:
         self._log(">", f"{method} {note}")
         given = {key: value for key, value in request.items() if value is not None}
         try:
-            with self._client.stream(method, path, **given) as answer:
+            with self.client.stream(method, path, **given) as answer:
                 body = self._body(answer)
         except self._httpx.TransportError as error:
             sentence = _transport_sentence(error, self.address, self._httpx)
@@ -136,7 +142,7 @@ class HttpSession:
         except (self._httpx.InvalidURL, self._httpx.DecodingError) as error:
             raise ServerError(f"what answers at {self.address.url} speaks no proper HTTP: {plain(str(error))}") from None
         except RuntimeError:
-            if not self._client.is_closed:
+            if not self.client.is_closed:
                 raise
             raise ServerError(f"{self.name}: the session is over") from None
         reply = Reply(answer.status_code, body, path, answer.headers.get("location", ""))
@@ -159,8 +165,7 @@ class HttpSession:
             self._tell(direction, f"{self._without_key(text)}\n".encode())
 
     def _without_key(self, text: str) -> str:
-        key = self.credentials.key
-        return text.replace(key, "***") if key else text
+        return text.replace(self.key, "***") if self.key else text
 
     def check(self, reply: Reply, purpose: str, refusals: Mapping[int, str] | None = None) -> Any:
         """The value of a good reply. Raises ServerError; purpose: what was wanted, as `starting the print`; refusals: what a
@@ -176,8 +181,7 @@ class HttpSession:
             where = plain(self._without_key(reply.location.partition("?")[0])) or "nowhere"
             raise ServerError(f"{self.name} redirects to {where}: give that server's address, no key is carried there")
         if status in self.key_refused:
-            known = bool(self.credentials.key)
-            refused = f"refuses the key or what its user may do ({words or status})" if known else "wants a key"
+            refused = f"refuses the key or what its user may do ({words or status})" if self.key else "wants a key"
             raise ServerError(f"{self.name} {refused}: {how_to_give_a_key(address)}")
         if status == 404:
             raise ServerError(f"{address.url} is no {NAMES[address.kind].removeprefix('a ')}: it knows no {reply.path}")
@@ -199,8 +203,8 @@ class HttpSession:
 
 
 def picture_address(told: object, server: Server) -> str:
-    """The URL of a picture at the server's own host; "" where there is none, or it lies with somebody else: what a server tells
-    must not have this computer ask others.
+    """The URL of a picture at the server's own host; "" where there is none, or it is on another host: a server's answer
+    must not make this computer ask others.
 
     >>> from machine.printing.destination import parse_server_address
     >>> picture_address("/webcam/?action=snapshot", parse_server_address("moonraker:printer.local"))
@@ -222,7 +226,7 @@ def picture_address(told: object, server: Server) -> str:
 
 
 def fetch_picture(url: str) -> tuple[bytes, str]:
-    """A picture and its type. Raises ServerError where nothing, or no picture, is there."""
+    """A picture and its media type. Raises ServerError where nothing, or no picture, is found."""
     import httpx
 
     try:
@@ -249,15 +253,13 @@ def _shown(path: str, params: Mapping[str, str] | None) -> str:
     return path + ("?" + "&".join(f"{key}={value}" for key, value in params.items()) if params else "")
 
 
-def _certificates(address: Server, credentials: Credentials) -> ssl.SSLContext:
+def _certificates(address: Server, ca_file: Path | None) -> ssl.SSLContext:
     if address.scheme == "http":
         return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trusts nobody, and need not: there is no TLS on this way
     try:
-        return ssl.create_default_context(cafile=credentials.ca_file)
+        return ssl.create_default_context(cafile=ca_file)
     except OSError as error:  # ssl.SSLError is one
-        raise ServerError(
-            f"ca_file {credentials.ca_file} for {address.name} holds no certificates: {error.strerror or error}"
-        ) from None
+        raise ServerError(f"ca_file {ca_file} for {address.name} holds no certificates: {error.strerror or error}") from None
 
 
 def _transport_sentence(error: httpx.TransportError, address: Server, httpx_: Any) -> str:
@@ -291,7 +293,7 @@ def _reason(error: Exception) -> str:
 
 
 def temperature(nozzle: Any, bed: Any, now: str, target: str) -> Temperature:
-    """What two JSON objects tell of nozzle and bed under these keys."""
+    """Temperatures of nozzle and bed in two JSON objects, under these keys."""
     return Temperature(*(number(table(heater).get(key)) for heater in (nozzle, bed) for key in (now, target)))
 
 

@@ -5,14 +5,17 @@ cancellation waits for the command under way, a heating included, and is answere
 emergency stop is not.
 """
 
+import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
 
+from machine.link.identification import Answer, Kind
+from machine.link.pending_commands import Command
 from machine.link.print_state import PrintState, PrintStatus
-from machine.printing.servers.gcode_upload import GcodeUpload, Sent
-from machine.printing.servers.http import HttpSession, entry, number, picture_address, table, temperature, whole
-from machine.printing.servers.server import PrintServer, ServerIdentity
+from machine.link.protocol.events import NAME
+from machine.printing.servers.http import entry, number, picture_address, table, temperature, whole
+from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, Sent
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
@@ -28,25 +31,28 @@ STATES = {
 }
 REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed", "gcode_move")
 
+ORDERS = {  # Klipper's macros PAUSE, RESUME and CANCEL_PRINT say what each means
+    Command.PAUSE: "/printer/print/pause",
+    Command.RESUME: "/printer/print/resume",
+    Command.CANCEL: "/printer/print/cancel",
+}
+
 
 class Moonraker(PrintServer):
     """PrintServer of a Moonraker."""
 
     key_header = "X-Api-Key"
+    key_refused = (401,)
     tells_percents = True
 
-    def __init__(self, http: HttpSession) -> None:
-        super().__init__(http)
-        http.key_refused = (401,)
-
-    def greet(self) -> ServerIdentity:
+    def greet(self) -> Identity:
         """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
         server = table(self._get("/server/info"))
         if "klippy_state" not in server:
             raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
         text = f"Moonraker {server.get('moonraker_version') or ''}".strip()
         if server["klippy_state"] != "ready":
-            return ServerIdentity(text, "Klipper")
+            return Identity(text, Answer(Kind.PRINTER, f"{NAME}Klipper"))
         version = str(table(self._get("/printer/info")).get("software_version") or "")
         objects = table(self._get("/printer/objects/list")).get("objects")
         names = frozenset(name for name in objects if isinstance(name, str)) if isinstance(objects, list) else frozenset()
@@ -54,10 +60,11 @@ class Moonraker(PrintServer):
         limits = self._limits() if "toolhead" in names else {}
         commands = self._commands() if "gcode" in names else None
         klipper = f"Klipper {version}".strip()
-        return ServerIdentity(f"{text}, {klipper}", klipper, "XYZ", limits, steppers, commands)
+        printer = Answer(Kind.PRINTER, f"{NAME}{klipper}", "XYZ", limits)
+        return Identity(f"{text}, {klipper}", printer, steppers, commands)
 
     def _commands(self) -> frozenset[str] | None:
-        """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""
+        """All commands that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to report them."""
         commands = table(self._query(("gcode",)).get("gcode")).get("commands")
         return frozenset(name.upper() for name in commands) if isinstance(commands, dict) else None
 
@@ -68,12 +75,10 @@ class Moonraker(PrintServer):
         return {letter: (low, high) for letter, (low, high) in limits if low is not None and high is not None}
 
     def webcam(self) -> str:
-        reply = self._http.get("/server/webcams/list")
+        reply = self.get("/server/webcams/list")
         cameras = table(table(reply.json()).get("result")).get("webcams") if reply.status == 200 else None
         told = (table(camera) for camera in cameras) if isinstance(cameras, list) else ()
-        pictures = (
-            picture_address(camera.get("snapshot_url"), self._http.address) for camera in told if camera.get("enabled", True)
-        )
+        pictures = (picture_address(camera.get("snapshot_url"), self.address) for camera in told if camera.get("enabled", True))
         return next(filter(None, pictures), "")
 
     def status(self) -> PrintStatus:
@@ -100,7 +105,7 @@ class Moonraker(PrintServer):
         """Why Klipper cannot print."""
         if not server.get("klippy_connected"):
             return "Klipper does not run there"
-        words = table(self._http.get("/printer/info").json()).get("result")
+        words = table(self.get("/printer/info").json()).get("result")
         return f"Klipper is in the state {server.get('klippy_state')}: {table(words).get('state_message') or 'no reason given'}"
 
     def has(self, file: str) -> bool:
@@ -108,20 +113,20 @@ class Moonraker(PrintServer):
 
         /server/files/metadata answers 404 for a file that it has not scanned (file_manager.py, _handle_metadata_request).
         """
-        reply = self._http.get("/server/files/directory", {"path": "gcodes"})
+        reply = self.get("/server/files/directory", {"path": "gcodes"})
         files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
         return any(table(item).get("filename") == file for item in files) if isinstance(files, list) else False
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
-        fields, file = {"root": "gcodes", "checksum": upload.sha256}, upload.read_by(sent)
-        reply = self._http.upload_form("/server/files/upload", fields, upload.name, file, answer_s=READ_S)
+        fields = {"root": "gcodes", "checksum": hashlib.sha256(upload.content).hexdigest()}
+        reply = self.post_file("/server/files/upload", fields, upload.read_by(sent), READ_S, upload.name)
         sentences = {
             400: f"{self.name} does not take the file: {{words}}; it takes files up to max_upload_size of its [server]",
             403: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})",
             422: f"{self.name} has received another file than was sent ({{words}}): send it again",
         }
-        value = table(self._http.check(reply, "the file", sentences))
+        value = table(self.check(reply, "the file", sentences))
         path = table(value.get("item")).get("path")
         if not isinstance(path, str):
             raise ServerError(f"{self.name} has not said that it holds the file: send it again")
@@ -131,15 +136,11 @@ class Moonraker(PrintServer):
         sentence = {400: f"{self.name} cannot start it now: {{words}}"}
         self._order("/printer/print/start", {"filename": file}, sentence)
 
-    def pause(self) -> None:
-        self._order("/printer/print/pause")
-
-    def resume(self) -> None:
-        self._order("/printer/print/resume")
-
-    def cancel(self) -> None:
-        """End it: Klipper's CANCEL_PRINT macro says what that means."""
-        self._order("/printer/print/cancel")
+    def order(self, command: Command) -> None:
+        if command is Command.EMERGENCY_STOP:  # Klipper shuts down at once, whatever it is at
+            self._value(self.post("/printer/emergency_stop"), "the emergency stop")
+        else:
+            self._order(ORDERS[command])
 
     def command(self, line: str) -> None:
         """Have a line of G-code executed, after the one under way."""
@@ -150,21 +151,17 @@ class Moonraker(PrintServer):
         version = str(table(self._get("/printer/info")).get("software_version") or "")
         return json.dumps({"software_version": version, **self._query(("configfile",))})
 
-    def emergency_stop(self) -> None:
-        """Klipper shuts down at once."""
-        self._value(self._http.post("/printer/emergency_stop"), "the emergency stop")
-
     def _query(self, names: tuple[str, ...]) -> Mapping[str, Any]:
-        reply = self._http.post("/printer/objects/query", {"objects": dict.fromkeys(names)})
+        reply = self.post("/printer/objects/query", {"objects": dict.fromkeys(names)})
         return table(table(table(self._value(reply, "to tell of its printer")).get("result")).get("status"))
 
     def _get(self, path: str) -> Any:
-        return table(self._value(self._http.get(path), "to say who it is")).get("result")
+        return table(self._value(self.get(path), "to say who it is")).get("result")
 
     def _order(self, path: str, value: Mapping[str, Any] | None = None, sentences: Mapping[int, str] | None = None) -> None:
-        reply = self._http.post(path, value, answer_s=ORDERED_S)
-        self._http.check(reply, f"{path.rpartition('/')[2]}", sentences)
+        reply = self.post(path, value, answer_s=ORDERED_S)
+        self.check(reply, f"{path.rpartition('/')[2]}", sentences)
 
     def _value(self, reply: Any, purpose: str) -> Any:
         sentence = {503: f"{self.name} has lost its Klipper: {{words}}"}
-        return self._http.check(reply, purpose, sentence)
+        return self.check(reply, purpose, sentence)

@@ -7,10 +7,10 @@ Any refusal for want of a key is 403. The file is kept under temporary names unt
 from collections.abc import Mapping
 from typing import Any
 
+from machine.link.pending_commands import Command
 from machine.link.print_state import PrintState, PrintStatus
-from machine.printing.servers.gcode_upload import GcodeUpload, Sent
 from machine.printing.servers.http import number, picture_address, table, temperature, whole
-from machine.printing.servers.server import PrintServer, ServerIdentity
+from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, Sent
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers
@@ -23,33 +23,40 @@ FLAGS = (
     ("printing", PrintState.PRINTING),
 )
 
+ORDERS = {  # path, value, and what is refused when it is not taken
+    Command.PAUSE: ("/api/job", {"command": "pause", "action": "pause"}, "to pause"),
+    Command.RESUME: ("/api/job", {"command": "pause", "action": "resume"}, "to resume"),
+    Command.CANCEL: ("/api/job", {"command": "cancel"}, "to cancel"),  # its own script for it switches heaters off
+    Command.EMERGENCY_STOP: ("/api/printer/command", {"command": "M112"}, "M112"),  # sent ahead of its queue
+}
+
 
 class OctoPrint(PrintServer):
     """PrintServer of an OctoPrint."""
 
     key_header = "X-Api-Key"
 
-    def greet(self) -> ServerIdentity:
-        """Its version; what it drives is not told by the API."""
+    def greet(self) -> Identity:
+        """Its version; the API does not report what it drives."""
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
         if not isinstance(text, str) or not text.startswith("OctoPrint"):
             raise ServerError(f"{self.name} is no OctoPrint: it does not answer /api/version as one")
         if "moonraker" in text.lower():
             raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
-        return ServerIdentity(text)
+        return Identity(text)
 
     def webcam(self) -> str:
-        reply = self._http.get("/api/settings")  # some keys may not read them
+        reply = self.get("/api/settings")  # some keys may not read them
         settings = table(reply.json()) if reply.status == 200 else {}
-        return picture_address(table(settings.get("webcam")).get("snapshotUrl"), self._http.address)
+        return picture_address(table(settings.get("webcam")).get("snapshotUrl"), self.address)
 
     def status(self) -> PrintStatus:
         """From /api/job, and from /api/printer where its printer is connected."""
         job = table(self._get("/api/job", "to tell of its print"))
         progress, file = table(job.get("progress")), table(table(job.get("job")).get("file"))
-        reply = self._http.get("/api/printer", {"exclude": "sd"})
-        printer = {} if reply.status == 409 else table(self._http.check(reply, "to tell of its printer"))
+        reply = self.get("/api/printer", {"exclude": "sd"})
+        printer = {} if reply.status == 409 else table(self.check(reply, "to tell of its printer"))
         heaters, done = table(printer.get("temperature")), number(progress.get("completion"))
         return PrintStatus(
             _phase(table(table(printer.get("state")).get("flags")), progress),
@@ -62,14 +69,14 @@ class OctoPrint(PrintServer):
         )
 
     def has(self, file: str) -> bool:
-        reply = self._http.get(f"/api/files/local/{file}")
-        return reply.status != 404 and self._http.check(reply, "to tell of its files") is not None
+        reply = self.get(f"/api/files/local/{file}")
+        return reply.status != 404 and self.check(reply, "to tell of its files") is not None
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file; the name is the one that the server has made of it."""
-        reply = self._http.upload_form("/api/files/local", {}, upload.name, upload.read_by(sent), answer_s=STORED_S)
+        reply = self.post_file("/api/files/local", {}, upload.read_by(sent), STORED_S, upload.name)
         sentence = {409: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})"}
-        value = table(self._http.check(reply, "the file", sentence))
+        value = table(self.check(reply, "the file", sentence))
         local = table(table(value.get("files")).get("local"))
         if not value.get("done") or not isinstance(local.get("path"), str):
             raise ServerError(f"{self.name} has not said that it holds the whole file: send it again")
@@ -79,29 +86,18 @@ class OctoPrint(PrintServer):
         sentence = {409: f"{self.name} cannot start it now: {{words}}"}
         self._order(f"/api/files/local/{file}", {"command": "select", "print": True}, "to start it", sentence)
 
-    def pause(self) -> None:
-        self._order("/api/job", {"command": "pause", "action": "pause"}, "to pause")
-
-    def resume(self) -> None:
-        self._order("/api/job", {"command": "pause", "action": "resume"}, "to resume")
-
-    def cancel(self) -> None:
-        """End it: OctoPrint's own script for it switches heaters off."""
-        self._order("/api/job", {"command": "cancel"}, "to cancel")
+    def order(self, command: Command) -> None:
+        self._order(*ORDERS[command])
 
     def command(self, line: str) -> None:
-        self._order("/api/printer/command", {"command": line}, f"{line}")
-
-    def emergency_stop(self) -> None:
-        """M112, which OctoPrint sends ahead of its queue."""
-        self.command("M112")
+        self._order("/api/printer/command", {"command": line}, line)
 
     def _get(self, path: str, purpose: str) -> Any:
-        return self._http.check(self._http.get(path), purpose)
+        return self.check(self.get(path), purpose)
 
     def _order(self, path: str, value: Mapping[str, Any], purpose: str, refused: Mapping[int, str] | None = None) -> None:
         sentences = refused or {409: f"{self.name} refuses {purpose}: {{words}}"}
-        self._http.check(self._http.post(path, value), purpose, sentences)
+        self.check(self.post(path, value), purpose, sentences)
 
 
 def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> PrintState:

@@ -1,61 +1,110 @@
-"""Server: what every kind of print server can be asked for, and where a print on one stands."""
+"""Server: a G-code file as a print server takes it, and what every kind of server can be asked for."""
 
+import re
+import unicodedata
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from io import BytesIO
+from itertools import accumulate
+from typing import BinaryIO
 
+from machine.gcode.line_text import plain_line
+from machine.link.identification import Answer
+from machine.link.pending_commands import Command
 from machine.link.print_state import PrintStatus
-from machine.printing.servers.gcode_upload import GcodeUpload, Sent
 from machine.printing.servers.http import HttpSession
 from profiles.errors import ServerError
 
+LONGEST_NAME = 80  # RepRapFirmware keeps 120 characters of a whole path
+SUFFIX = ".gcode"
+TAKEN = (".gcode", ".gco", ".g")  # OctoPrint takes no others for programs
+STRANGE = re.compile(r"[^A-Za-z0-9._-]+")
+Sent = Callable[[int], None]  # called with how many bytes have gone
+
+
+class GcodeUpload:
+    """A program under the name it will have there.
+
+    Its lines are those that were dry-run, with the text that the dry run has read: without remarks in parentheses, which the
+    server or its firmware would execute. Raises GcodeError for a line that the dry run refuses, too.
+    """
+
+    def __init__(self, name: str, lines: Iterable[str]) -> None:
+        encoded = [f"{plain_line(line)}\n".encode() for line in lines]
+        self.name = server_name(name)
+        self.content = b"".join(encoded)
+        self._ends = list(accumulate(map(len, encoded)))
+
+    def line_at(self, position: int) -> int:
+        """How many whole lines of the file lie before a byte position."""
+        return bisect_right(self._ends, position)
+
+    def read_by(self, sent: Sent) -> BinaryIO:
+        """The content as a file; calls sent() with the bytes read so far, before each piece and at the end."""
+        return _ReportedBytes(self.content, sent)
+
+
+class _ReportedBytes(BytesIO):
+    def __init__(self, content: bytes, sent: Sent) -> None:
+        super().__init__(content)
+        self._sent = sent
+
+    def read(self, size: int | None = -1) -> bytes:
+        self._sent(self.tell())
+        return super().read(size)
+
+
+def server_name(name: str) -> str:
+    """The name that a file gets on any server: letters without accents, digits, . _ and -, ending in .gcode.
+
+    Klipper reads it from between quotes, RepRapFirmware from a card with FAT names, OctoPrint replaces what it does not like.
+    """
+    stem, suffix = name.removeprefix("demo:"), ""
+    for ending in (*TAKEN, ".nc", ".ngc"):
+        if stem.lower().endswith(ending):
+            stem, suffix = stem[: -len(ending)], stem[-len(ending) :].lower()
+            break
+    plain = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode()
+    plain = STRANGE.sub("_", plain).strip("._-")[:LONGEST_NAME]
+    return (plain or "print") + (suffix if suffix in TAKEN else SUFFIX)
+
 
 @dataclass(frozen=True)
-class ServerIdentity:
-    """Who answers. text: server, version and what it drives; firmware: as M115 names it, "" when it does not tell.
+class Identity:
+    """Who answers. text: a server with its version and what it drives, "" of a printer at a port; printer: its answer, or what
+    it would answer at a port, None where that is not known.
 
-    letters: axes of the printer; limits: letter -> least and greatest place, mm or deg; steppers: names of the [manual_stepper]
-    sections, commands: names of all commands and macros, in capitals; None where there is no such thing.
+    steppers: names of the [manual_stepper] sections, commands: names of all commands and macros, in capitals; None where there
+    is no such thing.
     """
 
     text: str
-    firmware: str = ""
-    letters: str = ""
-    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    printer: Answer | None = None
     steppers: frozenset[str] | None = None
     commands: frozenset[str] | None = None
 
 
-class PrintServer(ABC):
-    """One print server. name: as the user names it; key_header: which header carries a key. All raise ServerError; status() and
-    orders may come from any thread.
-    """
+class PrintServer(HttpSession, ABC):
+    """One print server. All methods raise ServerError; status() and orders may come from any thread."""
 
-    key_header = ""
     tells_percents = False  # whether status() tells feed and flow
 
-    def __init__(self, http: HttpSession) -> None:
-        self._http, self.name = http, http.name
-        if self.key_header and http.credentials.key:
-            http.set_header(self.key_header, http.credentials.key)
-
-    def close(self) -> None:
-        """Leave."""
-        self._http.close()
-
     @abstractmethod
-    def greet(self) -> ServerIdentity:
+    def greet(self) -> Identity:
         """Make sure that it is such a server, that the key is good, and learn what it drives."""
 
     @abstractmethod
     def status(self) -> PrintStatus:
-        """Where it stands."""
+        """The state of its print now."""
 
     def webcam(self) -> str:
-        """Where its camera gives a picture; "": it has none, or does not tell."""
+        """The address of its camera's picture; "" where it has none, or does not report it."""
         return ""
 
     def file_in_print(self) -> str:
-        """The file that it prints now, by the name that upload() returns; "" where it does not tell."""
+        """The file that it prints now, by the name that upload() returns; "" where it does not report it."""
         return self.status().file
 
     @abstractmethod
@@ -71,25 +120,13 @@ class PrintServer(ABC):
         """Begin to print a file that it holds."""
 
     @abstractmethod
-    def pause(self) -> None:
-        """Pause the print."""
-
-    @abstractmethod
-    def resume(self) -> None:
-        """Go on with it."""
-
-    @abstractmethod
-    def cancel(self) -> None:
-        """End it."""
+    def order(self, command: Command) -> None:
+        """Pause, resume or cancel the print, or halt at once: PAUSE, RESUME, CANCEL, EMERGENCY_STOP."""
 
     @abstractmethod
     def command(self, line: str) -> None:
         """Have a line of G-code executed."""
 
     def settings(self) -> str:
-        """What its firmware tells of its settings, as JSON, a line for each answer."""
+        """The settings of its firmware as JSON, a line for each answer."""
         raise ServerError(f"{self.name} does not know its firmware's settings: ask the printer at its own port")
-
-    @abstractmethod
-    def emergency_stop(self) -> None:
-        """Halt at once."""

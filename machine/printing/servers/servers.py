@@ -1,51 +1,91 @@
-"""Servers: which kinds there are, which firmwares each can print on, and a session with one."""
+"""Servers: which kinds there are, which firmwares each can print on, their keys, and a session with one.
 
-from collections.abc import Callable, Iterator, Mapping
+The key of a print server and whose certificates are trusted come from the user's own file or a variable:
+
+    [servers."octopi.local"]          host, or host:port, as in the address
+    key = "..."                       API key of OctoPrint or Moonraker, password of a Duet
+    ca_file = "workshop-ca.pem"       for https: trust the certificates of this authority alone
+
+Neither is an argument, where every user of the computer could read it.
+"""
+
+import os
+import stat
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 
 from machine.firmware import dialects
 from machine.printing.destination import NAMES, Server
-from machine.printing.servers.credentials import read_credentials
 from machine.printing.servers.duet import Duet
-from machine.printing.servers.http import HttpSession, Tell
+from machine.printing.servers.http import VARIABLE, Tell, servers_file
 from machine.printing.servers.moonraker import Moonraker
 from machine.printing.servers.octoprint import OctoPrint
 from machine.printing.servers.server import PrintServer
-from profiles.messages import phrase
-from profiles.places import shipped, tables
+from profiles.errors import ServerError
+from profiles.places import parse, shipped, tables
 
-KINDS: Mapping[str, Callable[[HttpSession], PrintServer]] = {"octoprint": OctoPrint, "moonraker": Moonraker, "duet": Duet}
+KINDS: Mapping[str, type[PrintServer]] = {"octoprint": OctoPrint, "moonraker": Moonraker, "duet": Duet}
 # What a server's firmware reads; OctoPrint sends lines to whatever takes them over a serial port.
 DIALECTS = {"moonraker": ("klipper", "klipper_steppers"), "duet": ("reprapfirmware",)}
-
-
-def printable_dialects(kind: str) -> tuple[str, ...]:
-    """The dialects of machine.dialect that a kind of server can print."""
-    return DIALECTS.get(kind) or tuple(name for name, dialect in dialects().items() if dialect.serial)
+KEYS = ("key", "ca_file")
 
 
 def dialect_mismatch(address: Server, machine: str, dialect: str) -> str:
     """Why a server cannot print what is written in a dialect, as a sentence; "" when it can."""
-    allowed = printable_dialects(address.kind)
+    allowed = DIALECTS.get(address.kind) or tuple(name for name, dialect in dialects().items() if dialect.serial)
     if dialect in allowed:
         return ""
-    named = ", ".join(name for name in shipped("machine") if _dialect(name) in allowed)
-    server = NAMES[address.kind]
+    machines = {name: tables("machine", name).get("machine", {}).get("dialect") for name in shipped("machine")}
+    named = ", ".join(name for name, written in machines.items() if written in allowed)
     return (
-        f"{machine} writes for {dialect}, but {server} prints {' or '.join(allowed)}: "
+        f"{machine} writes for {dialect}, but {NAMES[address.kind]} prints {' or '.join(allowed)}: "
         f"{phrase('machine of those', '--machine must be one of those')}, as {named}"
     )
 
 
-def _dialect(machine: str) -> str:
-    return str(tables("machine", machine).get("machine", {}).get("dialect", ""))
-
-
 @contextmanager
 def open_server(address: Server, tell: Tell | None = None) -> Iterator[PrintServer]:
-    """A session with a server. tell: what goes over the line, for a log, without keys. Raises ServerError."""
-    server = KINDS[address.kind](HttpSession(address, read_credentials(address), tell))
+    """A session with a server. tell: called with what goes over the line, without keys. Raises ServerError, ProfileError."""
+    server = KINDS[address.kind](address, *read_credentials(address), tell)
     try:
         yield server
     finally:
         server.close()
+
+
+def read_credentials(address: Server) -> tuple[str, Path | None]:
+    """The key of a server, and the file of the authority that it alone trusts; "" and None where there is none.
+
+    The variable's key goes before the file's. Raises ServerError, ProfileError.
+    """
+    file = servers_file()
+    table = _table(file, address) if file.is_file() else {}
+    key = os.environ.get(VARIABLE, "") or table.get("key", "")
+    if not (key.isascii() and key.isprintable()):
+        raise ServerError(f"the key for {address.name} has characters that no key has: letters, digits and signs are allowed")
+    ca_file = table.get("ca_file")
+    try:
+        return key.strip(), None if ca_file is None else file.parent / Path(ca_file).expanduser()
+    except RuntimeError:
+        raise ServerError(f"ca_file {ca_file} for {address.name}: no home folder of that user is known") from None
+
+
+def _table(file: Path, address: Server) -> dict[str, str]:
+    """The entry of a server in the user's file, {} where it has none. Raises ServerError for a file that is not as it must be, or
+    that others can read; Windows keeps a user's folders to the user."""
+    if os.name == "posix" and stat.S_IMODE(file.stat().st_mode) & 0o077:
+        raise ServerError(f"{file} holds keys and can be read or written by others: chmod 600 {file} makes it yours alone")
+    document = parse(file, "file of servers")
+    servers = document.get("servers", {})
+    if unknown := [key for key in document if key != "servers"]:
+        raise ServerError(f'{file}: {unknown[0]!r} is not known: [servers."HOST"] is expected')
+    if not isinstance(servers, dict) or not all(isinstance(table, dict) for table in servers.values()):
+        raise ServerError(f'{file}: servers must be tables of their own: [servers."HOST"] is expected')
+    for name, key, value in ((name, key, value) for name, table in servers.items() for key, value in table.items()):
+        if key not in KEYS:
+            raise ServerError(f'{file}: [servers."{name}"] has {key!r}: {" and ".join(KEYS)} are known')
+        if not isinstance(value, str):
+            raise ServerError(f'{file}: {key} of [servers."{name}"] must be a text in quotes')
+    known: dict[str, dict[str, str]] = {name.lower(): table for name, table in servers.items()}  # as the address has its host
+    return known.get(f"{address.host}:{address.port}", known.get(address.host, {}))

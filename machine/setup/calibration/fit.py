@@ -6,9 +6,10 @@ table, the tilt axis's place across itself, the tilt at which the table is level
 the directions of the axes: two small angles of the tilt axis, and the turn axis's lean along it; about it is the tilt's zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import acos, atan2, cos, degrees, radians, sin
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from profiles.machine import UPRIGHT, Machine
 TURN_POINT = tuple(f"turn.point_mm {letter}" for letter in "xyz")
 UNKNOWN = (*TURN_POINT, "tilt.point_mm", "tilt.point_mm", "tilt.zero_deg", "the mark's x", "the mark's y")
 DIRECTIONS = ("tilt.axis", "tilt.axis", "turn.axis")  # angles in degrees from where the profile has the axes
+DIGITS = {"axis": 6}  # a millionth of a unit vector is a tenth of a micrometre at 100 mm; of other numbers four digits are kept
+KEYS = (*(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "point_mm")), "machine.tilt.zero_deg")
+TURN_ZERO, AXES = ("machine.turn.zero_deg",), ("machine.tilt.axis", "machine.turn.axis")
 SIGNS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 UPSIDE_DOWN_DEG = 90.0
 STARTS_DEG = (0.0, 25.0, -25.0)
@@ -80,117 +84,72 @@ class Calibration:
         return int(np.argmax(self.residuals_mm)) + 1
 
 
-@dataclass(frozen=True, eq=False)
-class _Guess:
-    """One choice of both signs, and the touches that numbers are to explain: (8,) as in UNKNOWN, (11,) with DIRECTIONS."""
+def least_squares(residuals: Callable[[Floats], Floats], numbers: Floats, pull: float = 0.0) -> tuple[Floats, Floats]:
+    """(k,) numbers near to given ones at which the sum of squares of (n,) residuals is least, and the residuals there.
 
-    machine: Machine
-    signs: tuple[int, int]
-    touches: Sequence[Touch]
-    height_mm: float
-
-    def fit(self, start_deg: float) -> tuple[float, Floats]:
-        """Mean square and numbers of the best fit from a zero so far from the profile's, the axes directed as it says."""
-        return self.improved(self._start(start_deg))
-
-    def improved(self, numbers: Floats, pull: float = 0.0) -> tuple[float, Floats]:
-        """Mean square and numbers of the best fit near to some numbers, by Levenberg's damped least squares.
-
-        pull: how strongly they are drawn to where they begin, as a share of a touch's own weight: what the touches do not tell
-        stays there.
-        """
-        usual, damping, here = numbers, 1e-3, np.append(self.residuals(numbers), np.zeros(len(numbers)))
-        for _ in range(ROUNDS):
-            slope = np.vstack([self._slope(numbers), pull * np.eye(len(numbers))])
-            normal = slope.T @ slope
-            step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-9), -slope.T @ here, rcond=None)[0]
-            tried = np.append(self.residuals(numbers + step), pull * (numbers + step - usual))
-            if tried @ tried < here @ here:
-                settled = tried @ tried > (1.0 - LITTLE) * (here @ here)
-                numbers, here, damping = numbers + step, tried, damping * 0.2
-                if settled:
-                    break
-            else:
-                damping *= 8.0
-            if np.abs(step).max() < SETTLED or damping > 1e7:
+    By Levenberg's damped least squares. pull: how strongly the numbers are drawn to where they begin, as a share of a residual's
+    own weight: what the residuals do not determine stays there.
+    """
+    usual, damping, count = numbers, 1e-3, len(numbers)
+    here = np.append(residuals(numbers), np.zeros(count))
+    for _ in range(ROUNDS):
+        slope = np.vstack([slope_of(residuals, numbers), pull * np.eye(count)])
+        normal = slope.T @ slope
+        step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-9), -slope.T @ here, rcond=None)[0]
+        tried = np.append(residuals(numbers + step), pull * (numbers + step - usual))
+        if tried @ tried < here @ here:
+            settled = tried @ tried > (1.0 - LITTLE) * (here @ here)
+            numbers, here, damping = numbers + step, tried, damping * 0.2
+            if settled:
                 break
-        here = here[: -len(numbers)]
-        if abs(numbers[5] - self.machine.tilt.zero_deg) > UPSIDE_DOWN_DEG:  # the other way round fits a table seen from below
-            return np.inf, numbers
-        return float(here @ here) / len(here), numbers
+        else:
+            damping *= 8.0
+        if np.abs(step).max() < SETTLED or damping > 1e7:
+            break
+    return numbers, here[:-count]
 
-    def _start(self, start_deg: float) -> Floats:
-        """The profile's own numbers, the mark where the first touches put it."""
-        machine = self.machine
-        tilt_across = frame_across(unit(machine.tilt.axis)) @ np.array(machine.tilt.point_mm)
-        numbers = np.array([*machine.turn.point_mm, *tilt_across, machine.tilt.zero_deg + start_deg, 0.0, 0.0])
-        of_mark = [touch for touch in self.touches if not touch.on_plate] or self.touches
-        numbers[6:8] = workpiece_path(self.machine_with(numbers), _positions(of_mark))[:, :2].mean(axis=0)
-        return numbers
 
-    def residuals(self, numbers: Floats) -> Floats:
-        """Where the touches lie from the mark, x y z each; of a touch on the plate the height over the table alone.
+def slope_of(function: Callable[[Floats], Floats], numbers: Floats) -> Floats:
+    """(n, k) derivative of a function's (n,) values by each number, from both sides."""
+    steps = STEP * np.eye(len(numbers))
+    return np.column_stack([function(numbers + step) - function(numbers - step) for step in steps]) / (2.0 * STEP)
 
-        (..., k) numbers give (..., residuals): what the kinematics say of many choices at once.
-        """
-        machine, here = self.machine, _positions(self.touches)
-        tilt_axis, tilt_point, turn_axis = (value[..., None, :] for value in self._axes(numbers))
-        turn_point, zero_deg = numbers[..., None, :3], numbers[..., 5, None]
-        tip = here[:, :3] - np.array(machine.tool_mm) - tilt_point
-        tilt = np.radians(self.signs[0] * (here[:, 3] - zero_deg))
-        turn = np.radians(self.signs[1] * (here[:, 4] - machine.turn.zero_deg))
-        seen = _turned_about(turn_axis, turn, _turned_about(tilt_axis, tilt, tip) + tilt_point - turn_point)
-        mark = np.append(numbers[..., 6:8], np.full((*numbers.shape[:-1], 1), self.height_mm), axis=-1)
-        off = seen - mark[..., None, :]
-        off[..., [touch.on_plate for touch in self.touches], 2] += self.height_mm
-        residuals: Floats = off[..., _told(self.touches)]
-        return residuals
 
-    def _slope(self, numbers: Floats) -> Floats:
-        """Derivative of the residuals by each number, from both sides."""
-        steps = STEP * np.eye(len(numbers))
-        ahead, behind = self.residuals(np.stack([numbers + steps, numbers - steps]))
-        slope: Floats = (ahead - behind).T / (2.0 * STEP)
-        return slope
+def numbers_of(machine: Machine) -> Floats:
+    """(6,) those of UNKNOWN that are a machine's own. The point of the tilt axis is given across that axis."""
+    across = frame_across(unit(machine.tilt.axis))
+    return np.array([*machine.turn.point_mm, *across @ np.array(machine.tilt.point_mm), machine.tilt.zero_deg])
 
-    def _axes(self, numbers: Floats) -> tuple[Floats, Floats, Floats]:
-        """(..., 3) each: the tilt axis, a point of it, the turn axis. Along itself that point stays where the profile has it."""
-        machine, along = self.machine, unit(self.machine.tilt.axis)
-        across = frame_across(along)
-        point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[..., 3:5] @ across
-        angles = np.tan(np.radians(numbers[..., len(UNKNOWN) :]))
-        if angles.shape[-1] == 0:
-            angles = np.zeros((*numbers.shape[:-1], len(DIRECTIONS)))
-        tilt = along + angles[..., :2] @ across
-        turn = unit(machine.turn.axis) + angles[..., 2:] * _lean(machine)
-        return _units(tilt), point, _units(turn)
 
-    def sigma(self, numbers: Floats) -> dict[str, float]:
-        """How sure each number is; raises ProfileError for those that the touches do not tell."""
-        sought = (*UNKNOWN, *DIRECTIONS)[: len(numbers)]
-        _, sizes, directions = np.linalg.svd(self._slope(numbers), full_matrices=False)
-        if len(sizes) < len(numbers) or sizes[-1] < LEAST_SHARE * sizes[0]:
-            lost = np.abs(directions[-1])
-            names = dict.fromkeys(name for name, share in zip(sought, lost, strict=True) if share > 0.3 * lost.max())
-            unknown = " and ".join(names)
-            raise ProfileError(f"the touches do not tell {unknown}: touch the mark at four turns and at two more tilts")
-        off = self.residuals(numbers)
-        variance = float(off @ off) / max(1, len(off) - len(numbers))
-        spread = np.sqrt(np.diag((directions.T / sizes**2) @ directions) * variance)
-        sigma: dict[str, float] = {}
-        for name, value in zip(sought, spread.tolist(), strict=True):
-            sigma[name] = max(value, sigma.get(name, 0.0))
-        return sigma
+def machine_with(machine: Machine, numbers: Floats) -> Machine:
+    """The machine with these numbers, as in UNKNOWN and DIRECTIONS; directions that are not among them are its own, to the
+    digit, and so is the point of the tilt axis along that."""
+    along = unit(machine.tilt.axis)
+    across = frame_across(along)
+    point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[3:5] @ across
+    tilt: dict[str, object] = {"zero_deg": float(numbers[5]), "point_mm": tuple(point.tolist())}
+    turn: dict[str, object] = {"point_mm": tuple(numbers[:3].tolist())}
+    if len(numbers) > len(UNKNOWN):
+        angles, upright = np.tan(np.radians(numbers[len(UNKNOWN) :])), unit(machine.turn.axis)
+        lean = unit(along - (along @ upright) * upright)  # about the tilt axis itself it is the tilt's zero
+        tilt["axis"] = tuple(unit(along + angles[:2] @ across).tolist())
+        turn["axis"] = tuple(unit(upright + angles[2] * lean).tolist())
+    changed = {"tilt": machine.tilt.model_copy(update=tilt), "turn": machine.turn.model_copy(update=turn)}
+    return machine.model_copy(update=changed)
 
-    def machine_with(self, numbers: Floats) -> Machine:
-        """The machine with these numbers; directions that are not sought are the profile's own, to the digit."""
-        machine, (tilt_axis, point, turn_axis) = self.machine, self._axes(numbers)
-        tilt = {"sign": self.signs[0], "zero_deg": float(numbers[5]), "point_mm": tuple(point.tolist())}
-        turn = {"sign": self.signs[1], "point_mm": tuple(numbers[:3].tolist())}
-        if len(numbers) > len(UNKNOWN):
-            tilt["axis"], turn["axis"] = tuple(tilt_axis.tolist()), tuple(turn_axis.tolist())
-        changed = {"tilt": machine.tilt.model_copy(update=tilt), "turn": machine.turn.model_copy(update=turn)}
-        return machine.model_copy(update=changed)
+
+def _residuals(machine: Machine, touches: Sequence[Touch], height_mm: float) -> Callable[[Floats], Floats]:
+    """Where touches lie from the mark, x y z each, by the numbers of the machine; of a touch on the plate the height over the
+    table alone."""
+    here, told = _positions(touches), _told(touches)
+    heights_mm = np.array([0.0 if touch.on_plate else height_mm for touch in touches])
+
+    def residuals(numbers: Floats) -> Floats:
+        seen = workpiece_path(machine_with(machine, numbers), here)
+        off: Floats = (seen - np.column_stack([np.tile(numbers[6:8], (len(here), 1)), heights_mm]))[told]
+        return off
+
+    return residuals
 
 
 def calibrate(
@@ -207,54 +166,92 @@ def calibrate(
     the touches cannot tell all numbers or both signs.
     """
     _check_count(touches, len(UNKNOWN) + (len(DIRECTIONS) if directions else 0))
-    guess, numbers = _best(machine, touches, mark_height_mm, directions)
-    sigma = guess.sigma(numbers)
-    calibrated = guess.machine_with(numbers)
+    signed, numbers = _best(machine, touches, mark_height_mm, directions)
+    residuals = _residuals(signed, touches, mark_height_mm)
+    sigma = _sigma(residuals, numbers)
+    calibrated = machine_with(signed, numbers)
     mark = (float(numbers[6]), float(numbers[7]), mark_height_mm)
     if mark_angle_deg is not None:
         calibrated, mark = _set_turn_zero(calibrated, mark, mark_angle_deg)
     _check_sound(machine, calibrated)
     told = _told(touches)
     errors = np.zeros(told.shape)
-    errors[told] = guess.residuals(numbers)
+    errors[told] = residuals(numbers)
     return Calibration(calibrated, mark, tuple((float(x), float(y), float(z)) for x, y, z in errors), sigma)
 
 
 def estimate(
     machine: Machine, touches: Sequence[Touch], mark_mm: tuple[float, float, float]
 ) -> tuple[Machine, tuple[float, float, float]]:
-    """The machine and the mark as far as a few touches tell them: what they do not tell, and both signs, stay as given."""
-    guess = _Guess(machine, (machine.tilt.sign, machine.turn.sign), touches, mark_mm[2])
-    tilt_point = frame_across(unit(machine.tilt.axis)) @ np.array(machine.tilt.point_mm)
-    begin = np.array([*machine.turn.point_mm, *tilt_point, machine.tilt.zero_deg, *mark_mm[:2], *np.zeros(len(DIRECTIONS))])
-    _, numbers = guess.improved(begin, PULL)
-    return guess.machine_with(numbers), (float(numbers[6]), float(numbers[7]), mark_mm[2])
+    """The machine and the mark as far as a few touches determine them: the rest, and both signs, stay as given."""
+    begin = np.append(numbers_of(machine), [*mark_mm[:2], *np.zeros(len(DIRECTIONS))])
+    numbers, _ = least_squares(_residuals(machine, touches, mark_mm[2]), begin, PULL)
+    return machine_with(machine, numbers), (float(numbers[6]), float(numbers[7]), mark_mm[2])
 
 
-def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, directions: bool) -> tuple[_Guess, Floats]:
-    """The signs that fit and the numbers that fit best with them."""
-    guesses = [_Guess(machine, signs, touches, mark_height_mm) for signs in SIGNS]
-    best: dict[tuple[int, int], tuple[float, Floats]] = {}
+def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, directions: bool) -> tuple[Machine, Floats]:
+    """The machine with the signs that fit, and the numbers that fit best with them."""
+    signed = [_with_signs(machine, *signs) for signs in SIGNS]
+    best = [(np.inf, np.zeros(0)) for _ in signed]
     for start_deg in STARTS_DEG:
-        for guess in guesses:
-            fit = guess.fit(start_deg)
-            best[guess.signs] = min(best.get(guess.signs, fit), fit, key=lambda fit: fit[0])
-        if min(cost for cost, _ in best.values()) < GOOD_MM**2:
+        for k, each in enumerate(signed):
+            fit = _fit(each, touches, mark_height_mm, _start(each, touches, start_deg))
+            best[k] = min(best[k], fit, key=lambda fit: fit[0])
+        if min(cost for cost, _ in best) < GOOD_MM**2:
             break
     if directions:
-        worth = HOPELESS * min(cost for cost, _ in best.values())
-        for guess in guesses:
-            cost, numbers = best[guess.signs]
+        worth = HOPELESS * min(cost for cost, _ in best)
+        for k, each in enumerate(signed):
+            cost, numbers = best[k]
             if cost <= worth:
-                best[guess.signs] = guess.improved(np.append(numbers, np.zeros(len(DIRECTIONS))))
-    first, second = sorted(guesses, key=lambda guess: best[guess.signs][0])[:2]
-    cost, numbers = best[first.signs]
-    if best[second.signs][0] < APART**2 * cost + LEAST_MM**2:
-        axis = machine.tilt if first.signs[0] != second.signs[0] else machine.turn
+                best[k] = _fit(each, touches, mark_height_mm, np.append(numbers, np.zeros(len(DIRECTIONS))))
+    first, second = sorted(range(len(SIGNS)), key=lambda k: best[k][0])[:2]
+    cost, numbers = best[first]
+    if best[second][0] < APART**2 * cost + LEAST_MM**2:
+        axis = machine.tilt if SIGNS[first][0] != SIGNS[second][0] else machine.turn
         raise ProfileError(
             f"the touches do not tell the sign of {axis.letter}: touch the mark at turns 0, 90, 180 and 270 and at two tilts"
         )
-    return first, numbers
+    return signed[first], numbers
+
+
+def _with_signs(machine: Machine, tilt: int, turn: int) -> Machine:
+    signs = {"tilt": machine.tilt.model_copy(update={"sign": tilt}), "turn": machine.turn.model_copy(update={"sign": turn})}
+    return machine.model_copy(update=signs)
+
+
+def _fit(machine: Machine, touches: Sequence[Touch], height_mm: float, numbers: Floats) -> tuple[float, Floats]:
+    """Mean square and numbers of the best fit near to some numbers; one that sees the table from below is none."""
+    numbers, off = least_squares(_residuals(machine, touches, height_mm), numbers)
+    upside_down = abs(numbers[5] - machine.tilt.zero_deg) > UPSIDE_DOWN_DEG
+    return np.inf if upside_down else float(off @ off) / len(off), numbers
+
+
+def _start(machine: Machine, touches: Sequence[Touch], zero_add_deg: float) -> Floats:
+    """The profile's own numbers, the tilt's zero so far from its own, the mark where the touches put it."""
+    numbers = np.append(numbers_of(machine), [0.0, 0.0])
+    numbers[5] += zero_add_deg
+    of_mark = [touch for touch in touches if not touch.on_plate] or touches
+    numbers[6:8] = workpiece_path(machine_with(machine, numbers), _positions(of_mark))[:, :2].mean(axis=0)
+    return numbers
+
+
+def _sigma(residuals: Callable[[Floats], Floats], numbers: Floats) -> dict[str, float]:
+    """How sure each number is; raises ProfileError for those that the touches do not determine."""
+    sought = (*UNKNOWN, *DIRECTIONS)[: len(numbers)]
+    _, sizes, directions = np.linalg.svd(slope_of(residuals, numbers), full_matrices=False)
+    if len(sizes) < len(numbers) or sizes[-1] < LEAST_SHARE * sizes[0]:
+        lost = np.abs(directions[-1])
+        names = dict.fromkeys(name for name, share in zip(sought, lost, strict=True) if share > 0.3 * lost.max())
+        unknown = " and ".join(names)
+        raise ProfileError(f"the touches do not tell {unknown}: touch the mark at four turns and at two more tilts")
+    off = residuals(numbers)
+    variance = float(off @ off) / max(1, len(off) - len(numbers))
+    spread = np.sqrt(np.diag((directions.T / sizes**2) @ directions) * variance)
+    sigma: dict[str, float] = {}
+    for name, value in zip(sought, spread.tolist(), strict=True):
+        sigma[name] = max(value, sigma.get(name, 0.0))
+    return sigma
 
 
 def _check_sound(machine: Machine, calibrated: Machine) -> None:
@@ -282,12 +279,6 @@ def _check_count(touches: Sequence[Touch], sought: int) -> None:
         raise ProfileError(f"all touches are at tilt {tilts.pop():g}: the tilt axis is found from two tilts or more")
 
 
-def _lean(machine: Machine) -> Floats:
-    """(3,) unit vector across the turn axis towards the tilt axis: a lean about the tilt axis itself is the tilt's zero."""
-    tilt, upright = unit(machine.tilt.axis), unit(machine.turn.axis)
-    return unit(tilt - (tilt @ upright) * upright)
-
-
 def _set_turn_zero(
     machine: Machine, mark_mm: tuple[float, float, float], angle_deg: float
 ) -> tuple[Machine, tuple[float, float, float]]:
@@ -302,13 +293,8 @@ def _set_turn_zero(
 
 
 def _told(touches: Sequence[Touch]) -> np.ndarray:
-    """(n, 3) which of x y z each touch tells."""
+    """(n, 3) which of x y z each touch measures."""
     return np.array([[not touch.on_plate, not touch.on_plate, True] for touch in touches])
-
-
-def _units(vectors: Floats) -> Floats:
-    scaled: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return scaled
 
 
 def _positions(touches: Sequence[Touch]) -> Floats:
@@ -316,9 +302,23 @@ def _positions(touches: Sequence[Touch]) -> Floats:
     return np.array([[*touch.at_mm, touch.pose.tilt_deg, touch.pose.turn_deg] for touch in touches])
 
 
-def _turned_about(unit_axis: Floats, angles: Floats, points: Floats) -> Floats:
-    """(..., 3) points turned about (..., 3) unit axes by (...) angles in radians (Rodrigues 1840); all are broadcast."""
-    cosine, sine = np.cos(angles)[..., None], np.sin(angles)[..., None]
-    along = (points * unit_axis).sum(axis=-1, keepdims=True)
-    turned: Floats = points * cosine + np.cross(unit_axis, points) * sine + unit_axis * along * (1.0 - cosine)
-    return turned
+def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
+    """The tables of the calibrated profile: numbers, sources, and what is left uncalibrated.
+
+    zero_of_turn: the mark's direction is known, so that the turn's zero is found, too.
+    """
+    keys = (*KEYS, *(TURN_ZERO if zero_of_turn else ()), *(AXES if calibration.directions else ()))
+    source = f"tiltprint calibrate, {len(calibration.residuals_mm)} touches, {calibration.rms_mm:.3f} mm off"
+    return found_tables(before, calibration.machine, keys, source)
+
+
+def found_tables(before: Machine, after: Machine, keys: Sequence[str], source: str) -> dict[str, Any]:
+    """The tables of a profile in which these keys of the rotary axes are found: numbers, sources, what is left uncalibrated."""
+    axes: dict[str, dict[str, Any]] = {"tilt": {}, "turn": {}}
+    for key in keys:
+        _, axis, name = key.split(".")
+        value = getattr(getattr(after, axis), name)
+        digits = DIGITS.get(name, 4)
+        axes[axis][name] = [round(x, digits) for x in value] if isinstance(value, tuple) else round(value, digits)
+    left = [key for key in before.uncalibrated if key not in keys]
+    return {"machine": {"uncalibrated": left, **axes, "sources": dict.fromkeys(keys, source)}}

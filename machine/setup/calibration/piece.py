@@ -1,12 +1,12 @@
 """The calibration piece: what a print of `demo:calibration` shows of where the rotary axes are.
 
-Its pads lie on its roofs, each laid there at a pose of its own. How a pad lies tells how far the axes are from where the program
+Its pads lie on its roofs, each laid there at a pose of its own. How a pad lies shows how far the axes are from where the program
 took them to be: it should be laid at a place of the workpiece, and was laid where the true machine had its tip then. The roof
 below it was laid at the level pose.
 
-Few readings cannot tell all numbers alike: what they do not tell stays where the profile has it. The least sum of squares of
-readings and of changes, each as a share of how far it is usually off (a maximum a posteriori estimate with independent normal
-errors), by Gauss's and Newton's steps.
+Few readings do not determine all numbers equally well: what they do not determine stays where the profile has it. The numbers
+are those of the least sum of squares of readings and of changes, each as a share of how far it is usually off (a maximum a
+posteriori estimate with independent normal errors).
 """
 
 import json
@@ -20,6 +20,7 @@ import numpy as np
 
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pose_runs
 from machine.kinematics.table import machine_points, workpiece_path, workpiece_points
+from machine.setup.calibration.fit import least_squares, machine_with, numbers_of, slope_of
 from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation, unit
@@ -43,8 +44,6 @@ READ_MM = np.array([0.05, 0.05, 0.07])  # how well each way is read
 # All pads of a piece may seem to lie so much higher up their roofs and over them: a roof is steps, and plastic swells.
 BIAS_MM = np.array([0.0, 0.05, 0.1])
 LEAST_READINGS = 4
-ROUNDS = 20
-STEP, SETTLED = 1e-4, 1e-7
 DOUBTFUL_MM = 0.2
 TEMPLATE = Path(__file__).parent / "piece.html"
 
@@ -73,6 +72,10 @@ class Piece:
         errors = [self._error_mm(true, pad, pad.pose) - self._error_mm(true, pad, self.base) for pad in self.pads]
         return np.array([pad.ways @ error for pad, error in zip(self.pads, errors, strict=True)])
 
+    def slope(self) -> Floats:
+        """(pads x ways, UNKNOWN) by how much a reading changes where a number of the machine changes by 1."""
+        return slope_of(lambda changes: _explained(self.machine, [self], changes), np.zeros(len(UNKNOWN)))
+
     def _error_mm(self, true: Machine, pad: Pad, pose: Pose) -> Floats:
         told = machine_points(self.machine, pose, pad.middle_mm[None])
         error: Floats = workpiece_points(true, pose, told)[0] - pad.middle_mm
@@ -88,15 +91,11 @@ def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
     heading = [np.degrees(np.arctan2(pad.ways[2, 1], pad.ways[2, 0])) for pad in pads]
     quarters = np.diff(heading) % 360.0
     level = float(rotation(machine, poses[1])[2] @ UP)
-    if level < np.cos(np.radians(EVEN_DEG)) or (np.abs(quarters - 90.0) > EVEN_DEG).any() or not _alike(pads):
+    leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
+    alike = leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG
+    if level < np.cos(np.radians(EVEN_DEG)) or (np.abs(quarters - 90.0) > EVEN_DEG).any() or not alike:
         raise ProfileError(f"{name} is no program of demo:calibration: its parts lie otherwise")
     return Piece(machine, poses[1], pads)
-
-
-def _alike(pads: Sequence[Pad]) -> bool:
-    """Whether all pads lean by the same, enough to be those of a piece."""
-    leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
-    return bool(leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG)
 
 
 def _laid(program: ParsedProgram, machine: Machine) -> tuple[dict[int, Pose], dict[int, Floats]]:
@@ -139,10 +138,13 @@ def parse_readings(text: str) -> Floats:
 
 def parse_pad(text: str, number: int) -> list[float]:
     """The three readings of a pad in mm, nan for what was not read. Raises ProfileError naming the pad."""
-    words = text.replace(",", " ").split()
-    if len(words) not in (2, 3):
+    try:
+        values = [float("nan") if word == NOT_READ else float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        values = []
+    if len(values) not in (2, 3):
         raise ProfileError(f"pad {number}: {text!r} cannot be read: {EXPECTED}")
-    values = [_number(word, text, number) for word in words] + [float("nan")] * (3 - len(words))
+    values += [float("nan")] * (3 - len(values))
     for way, value, most in zip(WAYS, values, (MOST_MARKS, MOST_MARKS, MOST_HEIGHT_MM), strict=True):
         least = 0.0 if way == "height" else -most
         if not isnan(value) and not least <= value <= most:
@@ -155,13 +157,6 @@ def readings_text(readings_mm: Floats) -> str:
     told = (readings_mm + np.array([0.0, 0.0, HEIGHT_MM])) / np.array([MARK_MM, MARK_MM, 1.0])
     words = [[NOT_READ if isnan(value) else f"{round(value, 3) + 0.0:g}" for value in pad] for pad in told.tolist()]
     return " ".join(map(",".join, words))
-
-
-def _number(word: str, text: str, number: int) -> float:
-    try:
-        return float("nan") if word == NOT_READ else float(word)
-    except ValueError:
-        raise ProfileError(f"pad {number}: {text!r} cannot be read: {EXPECTED}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,25 +195,18 @@ def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> C
         raise ProfileError(f"{read.sum()} readings of the pads are told: at least {LEAST_READINGS} are needed")
     target, weights = readings_mm.reshape(-1)[read], np.tile(1.0 / READ_MM, readings_mm.size // len(READ_MM))[read]
     places = np.kron(np.eye(len(pieces)), _biases(pieces[0]))[read]
-    state = np.zeros(len(UNKNOWN) + places.shape[1])  # of numbers and biases, each as a share of what is usual
-    for _ in range(ROUNDS):
-        changes, biases = USUAL * state[: len(UNKNOWN)], state[len(UNKNOWN) :]
-        left = target - _explained(machine, pieces, changes)[read] - places @ biases
-        slope = np.hstack([_slope(machine, pieces, changes)[read] * USUAL, places]) * weights[:, None]
-        system = np.vstack([slope, np.eye(len(state))])
-        step = np.linalg.lstsq(system, np.append(left * weights, -state), rcond=None)[0]
-        if np.abs(step).max() < SETTLED:
-            break
-        state = state + step
-    off = np.full(readings_mm.size, np.nan)
-    off[read] = left
-    sigma = USUAL * np.sqrt(np.diag(np.linalg.inv(system.T @ system))[: len(UNKNOWN)])
-    return Correction(_changed(machine, changes), off.reshape(-1, len(WAYS)), sigma, changes)
 
+    def left(state: Floats) -> Floats:  # numbers, then biases, each as a share of what is usual
+        explained = _explained(machine, pieces, USUAL * state[: len(UNKNOWN)])[read]
+        return (explained + places @ state[len(UNKNOWN) :] - target) * weights
 
-def slope_of(machine: Machine, piece: Piece) -> Floats:
-    """(pads x ways, UNKNOWN) by how much a reading of a piece changes where a number of a machine changes by 1."""
-    return _slope(machine, [piece], np.zeros(len(UNKNOWN)))
+    state, off = least_squares(left, np.zeros(len(UNKNOWN) + places.shape[1]), pull=1.0)
+    slope = slope_of(left, state)
+    left_mm = np.full(readings_mm.size, np.nan)
+    left_mm[read] = -off / weights
+    variances = np.diag(np.linalg.inv(slope.T @ slope + np.eye(len(state))))
+    sigma, changes = (USUAL * values[: len(UNKNOWN)] for values in (np.sqrt(variances), state))
+    return Correction(_changed(machine, changes), left_mm.reshape(-1, len(WAYS)), sigma, changes)
 
 
 def _biases(piece: Piece) -> Floats:
@@ -231,22 +219,9 @@ def _explained(machine: Machine, pieces: Sequence[Piece], changes: Floats) -> Fl
     return np.concatenate([piece.laid_aside_mm(true).reshape(-1) for piece in pieces])
 
 
-def _slope(machine: Machine, pieces: Sequence[Piece], changes: Floats) -> Floats:
-    columns = [
-        _explained(machine, pieces, changes + step) - _explained(machine, pieces, changes - step)
-        for step in STEP * np.eye(len(UNKNOWN))
-    ]
-    return np.column_stack(columns) / (2.0 * STEP)
-
-
 def _changed(machine: Machine, changes: Floats) -> Machine:
     """The machine whose numbers differ so from its own, in the order of UNKNOWN; the tilt axis moves across itself."""
-    x, y, z = machine.turn.point_mm
-    tilt_point = np.array(machine.tilt.point_mm) + changes[2:4] @ frame_across(unit(machine.tilt.axis))
-    tilt = {"point_mm": tuple(tilt_point.tolist()), "zero_deg": machine.tilt.zero_deg + float(changes[4])}
-    turn = {"point_mm": (x + float(changes[0]), y + float(changes[1]), z)}
-    update = {"tilt": machine.tilt.model_copy(update=tilt), "turn": machine.turn.model_copy(update=turn)}
-    return machine.model_copy(update=update)
+    return machine_with(machine, numbers_of(machine) + np.insert(changes, 2, 0.0))
 
 
 def piece_page(piece: Piece, machine_name: str, file_name: str) -> bytes:
@@ -260,7 +235,7 @@ def piece_page(piece: Piece, machine_name: str, file_name: str) -> bytes:
         "file": file_name,
         "markMm": MARK_MM,
         "heightMm": HEIGHT_MM,
-        "slope": np.hstack([slope_of(machine, piece), _biases(piece)]).tolist(),
+        "slope": np.hstack([piece.slope(), _biases(piece)]).tolist(),
         "usual": [*USUAL.tolist(), *[1.0] * np.count_nonzero(BIAS_MM)],
         "readMm": READ_MM.tolist(),
         "turnMm": list(machine.turn.point_mm),

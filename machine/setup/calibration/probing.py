@@ -14,7 +14,7 @@ import numpy as np
 
 from machine.kinematics.table import machine_points, workpiece_points
 from machine.setup.calibration.fit import Touch, estimate
-from machine.setup.calibration.program import TILTS_DEG, clipped_head, safe_z_mm, turns_deg
+from machine.setup.calibration.program import TILTS_DEG, clipped_head, safe_z_mm, steepest_tilts, turns_deg
 from mdp.clearance import find_obstacle
 from mdp.head import Ring, bodies, directions
 from mdp.mesh import Floats
@@ -152,7 +152,7 @@ class Probe:
 
 @dataclass
 class Measuring:
-    """One measurement. machine: as far as it is known; touches: of the ball's centre so far; tell: is told what is done next."""
+    """One measurement. machine: as far as it is known; touches: of the ball's centre so far; tell: takes a line on each step."""
 
     machine: Machine
     ball: Ball
@@ -171,7 +171,8 @@ class Measuring:
     def run(self) -> list[Touch]:
         """All touches. Raises MoveError where no pose can be measured, PrinterError where probing has failed."""
         home, turns = level(self.machine), turns_deg(self.machine)
-        self._first(home)
+        self._check(home, (self.machine,))
+        self._add(home, self._visit(home, self._expected(home), NEAR))  # where the ball really stands
         self._tell_sign("turn", self._small_turn(home), np.array(self.touches[0].at_mm))
         across = Pose(home.tilt_deg, self._across_tilt(home))
         before = next((touch for touch in self.touches if touch.pose == across), None) or self._touch(across)
@@ -189,11 +190,6 @@ class Measuring:
         self._rise(home)
         self.prober.turn(home)
         return self.touches
-
-    def _first(self, home: Pose) -> None:
-        """The level table: where the ball really stands."""
-        self._check(home, (self.machine,))
-        self._add(home, self._visit(home, self._expected(home), NEAR))
 
     def _tell_sign(self, axis: str, pose: Pose, before: Floats) -> None:
         """A small step of one axis from where the ball was before, and the sign that explains it."""
@@ -232,9 +228,10 @@ class Measuring:
 
     def _tilts(self) -> list[float]:
         """The steepest tilts that can be measured, one to each side where that is possible, gentler ones before them."""
-        zero = self.machine.tilt.zero_deg
-        steepest = [next((side * t for t in TILTS_DEG if self._reachable(zero + side * t)), None) for side in (1.0, -1.0)]
-        able = [zero + tilt for tilt in steepest if tilt is not None]
+        zero, turns = self.machine.tilt.zero_deg, turns_deg(self.machine)
+        able = steepest_tilts(
+            self.machine, lambda tilt: not any(self._find_in_the_way(self.machine, Pose(tilt, turn)) for turn in turns)
+        )
         if not able:
             raise MoveError(
                 f"no tilt of {TILTS_DEG[-1]:g} deg or more can be measured on {self.machine.name} with a ball whose centre is "
@@ -248,9 +245,6 @@ class Measuring:
         zero, turns = self.machine.tilt.zero_deg, turns_deg(self.machine)
         found = [self._find_in_the_way(self.machine, Pose(zero + s * tilt_deg, turn)) for s in (1.0, -1.0) for turn in turns]
         return next(obstacle for obstacle in found if obstacle)
-
-    def _reachable(self, tilt_deg: float) -> bool:
-        return not any(self._find_in_the_way(self.machine, Pose(tilt_deg, turn)) for turn in turns_deg(self.machine))
 
     def _find_in_the_way(self, machine: Machine, pose: Pose) -> str | None:
         """What keeps the ball from being measured at a pose by a machine; None: nothing does."""

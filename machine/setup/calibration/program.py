@@ -3,7 +3,7 @@
 At a port a person's keys take the tip there: what a key makes of its place, and which places are refused.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from math import pi
@@ -19,7 +19,6 @@ from machine.kinematics.table import machine_points, workpiece_points
 from machine.planning.limits import turn_speed
 from mdp.clearance import find_obstacle, least_tip_height_mm
 from mdp.head import corners
-from mdp.mesh import Floats
 from mdp.pose import UP, Pose, level
 from profiles.errors import MoveError
 from profiles.machine import Box, Machine
@@ -147,28 +146,28 @@ def hover_z_mm(machine: Machine, expected_z_mm: float, safe_z_mm: float) -> floa
     return safe_z_mm if unsure_signs(machine) else min(safe_z_mm, expected_z_mm + ABOVE_MM)
 
 
+def steepest_tilts(machine: Machine, is_possible: Callable[[float], bool]) -> list[float]:
+    """The steepest tilts that are possible, deg: one to each side, or to one, or none."""
+    angles = ([machine.tilt.zero_deg + side * tilt for tilt in TILTS_DEG] for side in (1.0, -1.0))
+    steepest = (next(filter(is_possible, of_side), None) for of_side in angles)
+    return [tilt for tilt in steepest if tilt is not None]
+
+
 def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, float]:
     """The steepest tilts: one to each side where the limits allow it, else two to one side."""
-    least, most = machine.tilt.reach_deg
-    zero = machine.tilt.zero_deg
-    able = {}
-    for side in (1.0, -1.0):
-        inside = [zero + side * t for t in TILTS_DEG if least <= zero + side * t <= most]
-        able[side] = next((tilt for tilt in inside if _reachable(machine, mark, tilt)), None)
-    ahead, behind = able[1.0], able[-1.0]
-    if ahead is not None and behind is not None:
-        return ahead, behind
-    tilt = ahead if ahead is not None else behind
-    if tilt is None:
+    tilts = steepest_tilts(machine, lambda tilt_deg: _reachable(machine, mark, tilt_deg))
+    if not tilts:
         raise MoveError(
             f"no tilt of {TILTS_DEG[-1]:g} deg or more can be measured on {machine.name} with a mark {mark[2]:g} mm high: "
             "its head or its limits stand in the way; take a higher mark, nearer to the middle"
         )
-    return tilt, 0.5 * (tilt + zero)
+    return tilts[0], tilts[1] if len(tilts) > 1 else 0.5 * (tilts[0] + machine.tilt.zero_deg)
 
 
 def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> bool:
-    """Whether the tip can touch the mark at a tilt at every turn: head over the plate, X Y Z inside, room above to turn."""
+    """Whether the tip can touch the mark at a tilt at every turn: A, X Y Z inside, head over the plate, room above to turn."""
+    if not machine.tilt.reach_deg[0] <= tilt_deg <= machine.tilt.reach_deg[1]:
+        return False
     if safe_z_mm(machine, mark, abs(tilt_deg - machine.tilt.zero_deg)) > machine.z.limits_mm[1]:
         return False
     if least_tip_height_mm(clipped_head(machine, mark), Pose(tilt_deg, machine.turn.zero_deg)) > mark[2]:
@@ -213,12 +212,8 @@ def safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: floa
     steps = np.append(np.arange(-tilt_deg, tilt_deg, 2.0), tilt_deg)
     zero = machine.turn.zero_deg
     points = np.vstack(solid)
-    heights = [_highest(machine, Pose(machine.tilt.zero_deg + step, zero), points) for step in steps.tolist()]
-    return max(heights) + MARGIN_MM
-
-
-def _highest(machine: Machine, pose: Pose, points: Floats) -> float:
-    return float(machine_points(machine, pose, points)[:, 2].max())
+    swept = [machine_points(machine, Pose(machine.tilt.zero_deg + step, zero), points) for step in steps.tolist()]
+    return float(np.max([points[:, 2].max() for points in swept])) + MARGIN_MM
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 from machine.setup.calibration.fit import Touch
 from machine.setup.calibration.program import TouchPlan
-from machine.setup.sheet_file import check_row, number, quoted, read_document, rows_of
+from machine.setup.files import check_row, number, quoted, read_document, rows_of
 from mdp.pose import Pose
 from profiles.errors import ProfileError, reason
 from profiles.machine import Machine
@@ -21,7 +21,7 @@ WHERE = ("mark", "plate")
 
 @dataclass(frozen=True)
 class Sheet:
-    """The touches that have been filled in, how high the mark is, and where it is seen from the middle, if that is told."""
+    """The touches that have been filled in, how high the mark is, and its direction from the middle, if that is known."""
 
     touches: tuple[Touch, ...]
     mark_height_mm: float

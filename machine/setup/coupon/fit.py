@@ -1,18 +1,24 @@
-"""Fit: what the break loads of a coupon say: strengths, and which settings make joints stronger than their scatter can.
+"""Fit: what the break loads of a coupon say: strengths, and which settings make joints stronger than their scatter can; in words,
+as a table that others can compare with, and as tables of profiles.
 
 The logarithm of a bar's strength is a sum: of the plate it was printed on, its kind, and for a jointed bar half of each factor's
 effect, up or down. Least squares find them, what is left over is the scatter, the same in per cent for all bars. An effect counts
 where Student's t of it would come from scatter alone once in a hundred times.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import date
 from math import atan, cos, exp, isnan, log, pi, sin, sqrt
+from typing import Any
 
 import numpy as np
+import tomlkit
 
-from machine.setup.coupon.design import JOINTS, KINDS, Factor, signs
-from machine.setup.coupon.sheet import Sheet
+from machine.setup.coupon.bars import Shape
+from machine.setup.coupon.design import JOINTS, KINDS, Factor, Sheet, settings_in_words, signs
 from profiles.errors import ProfileError
+from profiles.material import Material
 
 BY_CHANCE = 0.01
 LEAST_FREEDOM = 3  # loads beyond the numbers that are sought
@@ -42,7 +48,7 @@ class Effect:
 @dataclass(frozen=True)
 class Outcome:
     """Strengths in MPa, of the whole section: of joints as the process makes them and with what won, of bars in one piece upright
-    and lying (None: no load is told); scatter: standard deviation of a bar's strength, share of it; how many loads tell it."""
+    and lying (None: no load is known); scatter: standard deviation of a bar's strength, as a share of it; loads: their number."""
 
     effects: tuple[Effect, ...]
     joint_mpa: float
@@ -122,3 +128,96 @@ def _t_of(beyond: float, freedom: int) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if student_beyond(middle, freedom) > beyond else (low, middle)
     return high
+
+
+def outcome_text(outcome: Outcome) -> str:
+    """Strengths, effects and scatter for the terminal."""
+    lines = [f"{name}: {mpa:.1f} MPa{share}" for name, mpa, share in _strengths(outcome)]
+    lines += [f"{_setting(effect)}: {_verdict(effect)}" for effect in outcome.effects]
+    lines.append(f"scatter: {100 * outcome.scatter:.1f} % of a bar's strength, from {outcome.loads} loads")
+    return "\n".join(lines) + "\n"
+
+
+def report_lines(sheet: Sheet, outcome: Outcome, version: str) -> list[str]:
+    """The Markdown page: what was printed and broken how, strengths, effects, every bar."""
+    how = {"machine": sheet.machine, "material": sheet.material, "process": sheet.process, "bars": bars_in_words(sheet.shape)}
+    how |= {"loads": str(outcome.loads), "scatter": f"{100 * outcome.scatter:.1f} %", "tiltprint": version}
+    strengths = [(name, f"{mpa:.1f}", share.strip(" ,")) for name, mpa, share in _strengths(outcome)]
+    lines = [f"# Joints: {sheet.material} on {sheet.machine}", "", *_table(["what", "value"], list(how.items()))]
+    lines += ["", *_table(["strength", "MPa", "of one piece upright"], strengths)]
+    effects = []
+    for effect in outcome.effects:
+        chance = f"{effect.by_chance:.3f}" if effect.by_chance >= 0.001 else "< 0.001"
+        effects.append((_setting(effect), f"{100 * (effect.ratio - 1.0):+.0f} %", chance, _verdict(effect)))
+    lines += ["", *_table(["setting", "effect", "by chance", "so"], effects), ""]
+    bars = []
+    for bar, loads in enumerate(sheet.loads_n, start=1):
+        known = [load for load in loads if not isnan(load)]
+        loads_n = ", ".join(f"{load:g}" for load in known)
+        mpa = ", ".join(f"{sheet.shape.strength_mpa(load):.1f}" for load in known)
+        bars.append((str(bar), settings_in_words(sheet, bar), loads_n, mpa))
+    return [*lines, *_table(["bar", "printed", "broke at N", "MPa"], bars)]
+
+
+def bars_in_words(shape: Shape) -> str:
+    """The section and how it is stressed."""
+    section = f"{shape.depth_mm:g} x {shape.thickness_mm:g} mm"
+    if shape.lever_mm > 0.0:
+        return f"bent, {section}, {shape.lever_mm:g} mm from the joint: 6 F L / (b d^2), d = {shape.depth_mm:g} mm"
+    return f"pulled, ISO 527-2 5A in outline, {section}: F / A"
+
+
+def _strengths(outcome: Outcome) -> list[tuple[str, float, str]]:
+    upright = outcome.upright_mpa
+
+    def share(mpa: float) -> str:
+        return f", {100 * mpa / upright:.0f} %" if upright else ""
+
+    rows = [("joint as the process has it", outcome.joint_mpa, share(outcome.joint_mpa))]
+    if outcome.won:
+        rows.append(("joint with what won", outcome.best_joint_mpa, share(outcome.best_joint_mpa)))
+    if upright is not None:
+        rows.append(("in one piece, upright", upright, ""))
+    if outcome.lying_mpa is not None:
+        rows.append(("in one piece, lying", outcome.lying_mpa, share(outcome.lying_mpa)))
+    return rows
+
+
+def _setting(effect: Effect) -> str:
+    return f"{effect.factor.key} = {effect.factor.other} instead of {effect.factor.own}"
+
+
+def _verdict(effect: Effect) -> str:
+    change = f"{100 * abs(effect.ratio - 1.0):.0f} % {'stronger' if effect.ratio > 1.0 else 'weaker'}"
+    if effect.told:
+        return f"{change}, {effect.factor.other if effect.wins else effect.factor.own} is taken"
+    least = f"{100 * (effect.least_ratio - 1.0):.0f} %"
+    chance = f"{100 * (1 - BY_CHANCE):.0f} of 100 times scatter alone stays below {least}"
+    return f"{change} is not told from scatter ({chance}): {effect.factor.own} stays"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    written = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *written)]
+
+
+def material_tables(outcome: Outcome, before: Material, day: date) -> dict[str, Any]:
+    """What the material bears across layers, by the bars in one piece, and which share of it a joint with what won does; a joint
+    that bears more counts as one piece. before: whose strength stays where no such bar was broken."""
+    measured = outcome.upright_mpa is not None
+    upright = round(outcome.upright_mpa, 2) if outcome.upright_mpa is not None else before.interlayer_strength_mpa
+    factor = round(min(1.0, outcome.best_joint_mpa / upright), 3)
+    values = {"interlayer_strength_mpa": upright} if measured else {}
+    return {
+        "material": {key: _with_source(value, outcome, day) for key, value in (values | {"cold_weld_factor": factor}).items()}
+    }
+
+
+def process_tables(outcome: Outcome, day: date) -> dict[str, Any]:
+    """The settings that won; empty where none did."""
+    return {"process": {key: _with_source(value, outcome, day) for key, value in outcome.won.items()}} if outcome.won else {}
+
+
+def _with_source(value: Any, outcome: Outcome, day: date) -> Any:
+    source = f"tiltprint coupon, {day.isoformat()}, {outcome.loads} loads, scatter {100 * outcome.scatter:.0f} %"
+    return tomlkit.item(value).comment(source)

@@ -33,6 +33,7 @@ GAP_MM = 3.0  # between bars, and to the plate's edge
 PITCH = 2.0 * pi / JOINTS
 LOW_MM = 1.0  # what of a bar lies lower stands on the plate
 FLAT = (0.0, 0.0), (0.0, 0.0)
+Halves = tuple[Floats, Floats, m3.CrossSection]
 
 
 @dataclass(frozen=True)
@@ -146,20 +147,12 @@ def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
             yield Ring(lean_rad, (low, low + rise), (radius(low), radius(low + rise)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Halves:
-    """A bar whose joint stands over the plate's middle and that leans along x: the corners (n, 3) of what lies above its joint
-    and below, and the outline of the latter, a gap around it."""
-
-    top: Floats
-    stub: Floats
-    around: m3.CrossSection
-
-
-def _halves(shape: Shape, lean_rad: float, height_mm: float) -> _Halves:
+def _halves(shape: Shape, lean_rad: float, height_mm: float) -> Halves:
+    """Both halves of a bar whose joint stands over the plate's middle and that leans along x: the corners (n, 3) above and below
+    the joint, and the outline of the lower half with a gap around it."""
     base = Plane(np.array([sin(lean_rad), 0.0, cos(lean_rad)]), height_mm * cos(lean_rad))
     top, stub = cut(stand(bar(shape, lean_rad, height_mm), shape, 0.0, 0.0), base)
-    return _Halves(mesh_of(top).vertices, mesh_of(stub).vertices, _around(stub))
+    return mesh_of(top).vertices, mesh_of(stub).vertices, _around(stub)
 
 
 def _around(solid: Solid) -> m3.CrossSection:
@@ -167,22 +160,23 @@ def _around(solid: Solid) -> m3.CrossSection:
 
 
 def _problem(
-    shape: Shape, ring: Ring, whole: Sequence[Solid], halves: Callable[[float, float], _Halves], machine: Machine
+    shape: Shape, ring: Ring, whole: Sequence[Solid], halves: Callable[[float, float], Halves], machine: Machine
 ) -> tuple[int, str] | None:
     """What stands in the way of a ring, and how near it comes to being printed; None: nothing."""
     places = [ring.place(joint) for joint in range(JOINTS)]
     bars = [halves(ring.lean_rad, height) for _, _, height in places]
-    around = [each.around.translate((r, 0.0)).rotate(degrees(turn)) for each, (turn, r, _) in zip(bars, places, strict=True)]
+    tops, stubs, outlines = zip(*bars, strict=True)
+    around = [outline.translate((r, 0.0)).rotate(degrees(turn)) for outline, (turn, r, _) in zip(outlines, places, strict=True)]
     around += [_around(solid) for solid in whole]
     if sum(area.area() for area in around) > m3.CrossSection.batch_boolean(around, m3.OpType.Add).area() + 0.01:
         return 1, f"its plate, {machine.table.radius_mm:g} mm in radius, has no room for {len(KINDS)} bars side by side"
-    stubs = [_turned(each.stub, turn, r) for each, (turn, r, _) in zip(bars, places, strict=True)]
-    below = np.vstack([*stubs, *(mesh_of(solid).vertices for solid in whole)])
+    standing = [_turned(stub, turn, r) for stub, (turn, r, _) in zip(stubs, places, strict=True)]
+    below = np.vstack([*standing, *(mesh_of(solid).vertices for solid in whole)])
     obstacle = find_obstacle(machine, level(machine), below)
     if obstacle is not None:
         return 1, obstacle
-    for joint, (each, (turn, r, _)) in enumerate(zip(bars, places, strict=True)):
-        base, vertices = ring.base(joint), _turned(each.top, turn, r)
+    for joint, (top, (turn, r, _)) in enumerate(zip(tops, places, strict=True)):
+        base, vertices = ring.base(joint), _turned(top, turn, r)
         if float(base.heights_mm(below).max()) > ORDER_TOLERANCE_MM:
             return 2, f"bars {shape.above_mm:g} mm long above their joints would stand in the head's way on so small a plate"
         if not allowed_poses(machine, base.normal, vertices):

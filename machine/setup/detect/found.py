@@ -1,4 +1,4 @@
-"""Found: what a firmware says of its machine, each value with the words it was read from; configurations of [name] and
+"""Found: the values that a firmware reports of its machine, each with the words it was read from; configurations of [name] and
 key = value, as Klipper and LinuxCNC write them.
 """
 
@@ -81,16 +81,25 @@ def corner_speed(deviation_mm: float, acceleration_mm_s2: float) -> float:
     return sqrt(acceleration_mm_s2 * deviation_mm * HALF_SQUARE / (1.0 - HALF_SQUARE))
 
 
-def limits(name: str, low: float, high: float, source: str) -> Reading:
-    """The limits of an axis. name: file and axis, for the message. Raises ProfileError where they are reversed."""
-    if not low < high:
-        raise ProfileError(f"{name}: {source} tells limits from {low:g} to {high:g}: the first must be below the second")
-    return Reading([low, high], source)
+def reading(value: float | None, source: str, unit: float = 1.0) -> Reading | None:
+    """A number in the profile's units; None where it is not known. unit: how many of those the firmware's has."""
+    return None if value is None else Reading(value * unit, source)
 
 
-def is_limit(value: float | None) -> bool:
-    """Whether a number bounds an axis at all."""
-    return value is not None and isfinite(value) and abs(value) < FARTHEST
+def axis_readings(
+    name: str, speed: Reading | None, acceleration: Reading | None, low: float | None, high: float | None, source: str
+) -> AxisReadings:
+    """What is known of an axis. name: file and axis, for the message; low, high: its limits, source: the words they come from.
+
+    Raises ProfileError where the limits are reversed. One that is beyond FARTHEST bounds nothing.
+    """
+    limits = None
+    if low is not None and high is not None and abs(low) < FARTHEST and abs(high) < FARTHEST:
+        if not low < high:
+            raise ProfileError(f"{name}: {source} tells limits from {low:g} to {high:g}: the first must be below the second")
+        limits = Reading([low, high], source)
+    told = {SPEED: speed, ACCELERATION: acceleration, LIMITS: limits}
+    return {key: reading for key, reading in told.items() if reading is not None}
 
 
 def rounded(value: Value) -> Value:

@@ -10,18 +10,7 @@ setting into inches.
 import re
 
 from machine.gcode.words import NUMBER
-from machine.setup.detect.found import (
-    ABC,
-    ACCELERATION,
-    LIMITS,
-    SPEED,
-    AxisReadings,
-    ConfigText,
-    Found,
-    Reading,
-    corner_speed,
-    limits,
-)
+from machine.setup.detect.found import ABC, AxisReadings, ConfigText, Found, Reading, axis_readings, corner_speed, reading
 from profiles.errors import ProfileError
 
 SETTING = re.compile(rf"^.*?\$(\d{{1,4}})=({NUMBER})", re.MULTILINE)
@@ -65,14 +54,10 @@ def read(config: ConfigText) -> Found:
 
 
 def _axis(config: ConfigText, values: dict[int, float], index: int, letter: str) -> AxisReadings:
-    readings: AxisReadings = {}
-    for key, first, unit_s in ((SPEED, SPEEDS, MINUTE_S), (ACCELERATION, ACCELERATIONS, 1.0)):
-        if value := values.get(first + index):
-            readings[key] = Reading(value / unit_s, f"${first + index}")
-    if travel := values.get(TRAVELS + index):
-        low, high = _envelope(values, index, travel)
-        readings[LIMITS] = limits(f"{config.name}: axis {letter}", low, high, f"${TRAVELS + index}")
-    return readings
+    speed, acceleration, travel = (values.get(first + index) or None for first in (SPEEDS, ACCELERATIONS, TRAVELS))
+    low, high = (None, None) if travel is None else _envelope(values, index, travel)
+    told = reading(speed, f"${SPEEDS + index}", 1.0 / MINUTE_S), reading(acceleration, f"${ACCELERATIONS + index}")
+    return axis_readings(f"{config.name}: axis {letter}", *told, low, high, f"${TRAVELS + index}")
 
 
 def _envelope(values: dict[int, float], index: int, travel: float) -> tuple[float, float]:

@@ -15,17 +15,14 @@ from typing import Any
 
 from machine.setup.detect.found import (
     ABC,
-    ACCELERATION,
-    LIMITS,
     PRINTING,
-    SPEED,
     AxisReadings,
     ConfigText,
     Found,
     Reading,
     Sections,
+    axis_readings,
     has_box,
-    limits,
     read_sections,
 )
 from profiles.errors import ProfileError
@@ -40,7 +37,7 @@ REGISTERED = re.compile(r"MANUAL_STEPPER\b([^\n]*\bGCODE_AXIS=[ \t]*([A-Z])\b[^\
 STEPPER = re.compile(r"\bSTEPPER=\s*\"?([A-Za-z0-9_]+)", re.IGNORECASE)
 SCREW_MM = 10.0  # greatest lead of the usual screws; as degrees it would be a gear of 36 to 1
 TURN_DEG = 360.0
-RATES = {SPEED: "velocity", ACCELERATION: "accel"}
+RATES = ("velocity", "accel")
 CORNER_MM_S = 5.0  # toolhead.py: square_corner_velocity where it is not set
 PROBES = ("bltouch", "probe", "smart_effector", "probe_eddy_current", "load_cell_probe", "cartographer", "beacon")
 SETTINGS = {  # key below machine -> section and key
@@ -135,17 +132,14 @@ def _linear(sections: Sections, remarks: list[str]) -> dict[str, AxisReadings]:
     box = has_box(", ".join(named), f"{sections.name}: [printer] kinematics")
     if not box:
         remarks.append(f"its kinematics are {named[0]}: how far X, Y and Z reach stands in no axis of them")
-    axes: dict[str, AxisReadings] = {letter: {} for letter in PRINTING}
-    for letter, readings in axes.items():
-        for key, word in RATES.items():
-            told = (sections.reading("printer", f"max_{part}{word}") for part in ("", f"{letter.lower()}_"))
-            if values := [reading for reading in told if reading is not None]:
-                readings[key] = min(values)
+    axes: dict[str, AxisReadings] = {}
+    for letter in PRINTING:
+        told = ([sections.reading("printer", f"max_{part}{word}") for part in ("", f"{letter.lower()}_")] for word in RATES)
+        speed, acceleration = (min(filter(None, readings), default=None) for readings in told)
         title = next((title for title in (f"stepper_{letter.lower()}", f"carriage {letter.lower()}") if title in sections.of), "")
         low, high = (sections.number(title, f"position_{end}") for end in ("min", "max"))
-        if box and high is not None:
-            source = f"[{title}] position_min, position_max"
-            readings[LIMITS] = limits(f"{sections.name}: axis {letter}", low or 0.0, high, source)
+        source, most = f"[{title}] position_min, position_max", high if box else None
+        axes[letter] = axis_readings(f"{sections.name}: axis {letter}", speed, acceleration, low or 0.0, most, source)
     return axes
 
 
@@ -193,17 +187,14 @@ def _doubt(sections: Sections, title: str, letter: str) -> str:
 
 def _turning(sections: Sections, title: str, registration: str) -> AxisReadings:
     """The numbers of a stepper; those with which it is registered as an axis go before its own."""
-    readings: AxisReadings = {}
-    for key, own in RATES.items():
+    rates: list[Reading | None] = []
+    for own in RATES:
         told = f"LIMIT_{own.upper()}"
         as_axis = re.search(rf"\b{told}=\s*([0-9]+(?:\.[0-9]+)?)", registration, re.IGNORECASE)
         reading = Reading(float(as_axis[1]), told) if as_axis else sections.reading(title, own)
-        if reading is not None and reading.value:  # without an accel it starts and stops at once
-            readings[key] = reading
+        rates.append(reading if reading is not None and reading.value else None)  # without an accel it starts and stops at once
     low, high = (sections.number(title, f"position_{end}") for end in ("min", "max"))
-    if low is not None and high is not None:
-        readings[LIMITS] = limits(f"{sections.name}: [{title}]", low, high, "position_min, position_max")
-    return readings
+    return axis_readings(f"{sections.name}: [{title}]", rates[0], rates[1], low, high, "position_min, position_max")
 
 
 def _settings(sections: Sections) -> dict[str, Reading]:

@@ -10,20 +10,7 @@ import re
 from collections.abc import Mapping
 from math import pi
 
-from machine.setup.detect.found import (
-    ABC,
-    ACCELERATION,
-    LIMITS,
-    SPEED,
-    AxisReadings,
-    ConfigText,
-    Found,
-    Reading,
-    Sections,
-    is_limit,
-    limits,
-    read_sections,
-)
+from machine.setup.detect.found import ABC, AxisReadings, ConfigText, Found, Reading, Sections, axis_readings, read_sections
 from profiles.errors import ProfileError
 
 SIGNS = re.compile(r"^(?:\[(?:EMC|EMCMOT|TRAJ|KINS)\]|#INCLUDE\s+\S)", re.MULTILINE)
@@ -90,23 +77,20 @@ def _unit(sections: Sections, key: str, units: Mapping[str, float], allowed: str
 
 
 def _axis(sections: Sections, letter: str, titles: list[str], unit: float) -> AxisReadings:
-    readings: AxisReadings = {}
-    for key, word in ((SPEED, "VELOCITY"), (ACCELERATION, "ACCELERATION")):
-        told = _first(sections, titles, f"MAX_{word}")
-        most = _first(sections, ["TRAJ"], f"MAX_{'ANGULAR' if letter in ABC else 'LINEAR'}_{word}")
-        if told is not None:
-            value, source = min(told, most) if most is not None else told
-            readings[key] = Reading(unit * value, source)
-    low, high = (_first(sections, titles, f"{end}_LIMIT") for end in ("MIN", "MAX"))
-    if low is not None and high is not None and is_limit(low[0]) and is_limit(high[0]):
-        source = low[1].replace("MIN_LIMIT", "MIN_LIMIT, MAX_LIMIT")
-        readings[LIMITS] = limits(f"{sections.name}: axis {letter}", unit * low[0], unit * high[0], source)
-    return readings
+    rates: list[Reading | None] = []
+    for word in ("VELOCITY", "ACCELERATION"):
+        told = _first(sections, titles, f"MAX_{word}", unit)
+        most = _first(sections, ["TRAJ"], f"MAX_{'ANGULAR' if letter in ABC else 'LINEAR'}_{word}", unit)
+        rates.append(None if told is None else Reading(*min(told, most or told)))
+    low, high = (_first(sections, titles, f"{end}_LIMIT", unit) for end in ("MIN", "MAX"))
+    ends = (low[0], high[0]) if low and high else (None, None)
+    source = low[1].replace("MIN_LIMIT", "MIN_LIMIT, MAX_LIMIT") if low else ""
+    return axis_readings(f"{sections.name}: axis {letter}", rates[0], rates[1], ends[0], ends[1], source)
 
 
-def _first(sections: Sections, titles: list[str], key: str) -> tuple[float, str] | None:
-    """The number of the first section that has it, and where it stands."""
+def _first(sections: Sections, titles: list[str], key: str, unit: float) -> tuple[float, str] | None:
+    """The number of the first section that has it, in the profile's units, and where it stands."""
     for title in titles:
         if (value := sections.number(title, key.lower())) is not None:
-            return value, f"[{title}] {key}"
+            return unit * value, f"[{title}] {key}"
     return None

@@ -13,17 +13,15 @@ from machine.link.identification import KEY, VERSION
 from machine.link.protocol.events import AREA, NAME, REACH
 from machine.setup.detect.found import (
     ABC,
-    ACCELERATION,
     EXTRUDER,
-    LIMITS,
     PRINTING,
-    SPEED,
     AxisReadings,
     ConfigText,
     Found,
     Reading,
+    axis_readings,
     corner_speed,
-    limits,
+    reading,
 )
 from profiles.errors import ProfileError
 
@@ -34,7 +32,7 @@ WORD = re.compile(rf"([A-Z])({NUMBER})")
 SOFT_LIMITS = re.compile(r"Min:(.*?)Max:(.*)")
 PLACE = re.compile(rf"([A-Z])[: ]*({NUMBER})")
 CAPABILITY = re.compile(r"Cap:(\w+):1")
-KEYS = {"M203": SPEED, "M201": ACCELERATION}
+RATES = ("M203", "M201")  # speeds and accelerations
 
 
 def recognise(text: str) -> bool:
@@ -71,21 +69,24 @@ def _words(config: ConfigText) -> dict[str, dict[str, float]]:
         if command == "G20":
             raise ProfileError(f"{config.name}: the printer tells inches (G20): send it G21 first, then it tells mm")
         letters = {letter: float(number) for letter, number in WORD.findall(rest)}
-        if letters.get("T", 0.0) == 0.0 or command not in KEYS:
+        if letters.get("T", 0.0) == 0.0 or command not in RATES:
             words[command] = words.get(command, {}) | letters
     return words
 
 
 def _axes(config: ConfigText, words: dict[str, dict[str, float]]) -> dict[str, AxisReadings]:
-    axes: dict[str, AxisReadings] = {letter: {} for letter in words.get("M203", {}) if letter != "T"}
-    for command, key in KEYS.items():
-        for letter, value in words.get(command, {}).items():
-            if letter in axes:
-                axes[letter][key] = Reading(value, command)
-    for letter, (low, high, source) in (_area(config.text, axes) | _soft_limits(config.text)).items():
-        if letter in axes:
-            axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, source)
-    return axes
+    speeds, accelerations = (words.get(command, {}) for command in RATES)
+    letters = [letter for letter in speeds if letter != "T"]
+    reach = _area(config.text, letters) | _soft_limits(config.text)
+    return {
+        letter: axis_readings(
+            f"{config.name}: axis {letter}",
+            reading(speeds.get(letter), RATES[0]),
+            reading(accelerations.get(letter), RATES[1]),
+            *reach.get(letter, (None, None, "")),
+        )
+        for letter in letters
+    }
 
 
 def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
@@ -97,7 +98,7 @@ def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
     return {letter: (low, most[letter], "M211") for letter, low in least.items() if letter in most}
 
 
-def _area(text: str, letters: dict[str, AxisReadings]) -> dict[str, tuple[float, float, str]]:
+def _area(text: str, letters: list[str]) -> dict[str, tuple[float, float, str]]:
     """The answer to M115, whose axes are in the order of M203."""
     area = AREA.search(text)
     if area is None:

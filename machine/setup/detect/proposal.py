@@ -5,7 +5,6 @@ what is left is to be measured.
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from machine.firmware import FIRMWARES
 from machine.setup.detect import grblhal, klipper, linuxcnc, marlin, reprapfirmware
@@ -176,27 +175,20 @@ def _why_fixed(found: Found, base: str) -> str:
 
 
 def _sought(tilts: bool) -> list[str]:
-    """Every key that at least one firmware tells."""
+    """Every key that at least one firmware reports."""
     linear = [f"machine.{axis}.{key}" for axis in "xyz" for key in LINEAR.values()]
     rotary = [f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("letter", *ROTARY.values())]
     return [*linear, *(rotary if tilts else ()), *(f"machine.{key}" for key in SETTINGS)]
 
 
-class Reader(NamedTuple):
-    """recognise: whether a text is of this firmware; read: what it says, raises ProfileError; text: its kind, for people."""
-
-    recognise: Callable[[str], bool]
-    read: Callable[[ConfigText], Found]
-    text: str
-
-
-READERS: Mapping[str, Reader] = {
-    "LinuxCNC": Reader(linuxcnc.recognise, linuxcnc.read, "LinuxCNC's .ini"),
-    "Klipper": Reader(klipper.recognise, klipper.read, "Klipper's printer.cfg"),
-    "RepRapFirmware": Reader(reprapfirmware.recognise, reprapfirmware.read, "RepRapFirmware's config.g"),
-    "grblHAL": Reader(grblhal.recognise, grblhal.read, "a dump of grblHAL's $$"),
-    "Marlin": Reader(marlin.recognise, marlin.read, "a log of Marlin's M503"),
-}
+# Whether a text is of a firmware, what it says (raises ProfileError), and what kind of text that is, for people.
+READERS: tuple[tuple[Callable[[str], bool], Callable[[ConfigText], Found], str], ...] = (
+    (linuxcnc.recognise, linuxcnc.read, "LinuxCNC's .ini"),
+    (klipper.recognise, klipper.read, "Klipper's printer.cfg"),
+    (reprapfirmware.recognise, reprapfirmware.read, "RepRapFirmware's config.g"),
+    (grblhal.recognise, grblhal.read, "a dump of grblHAL's $$"),
+    (marlin.recognise, marlin.read, "a log of Marlin's M503"),
+)
 
 
 def read(config: ConfigText) -> Found:
@@ -205,7 +197,7 @@ def read(config: ConfigText) -> Found:
     Raises ProfileError for a text of no firmware known here, and for one without speed or acceleration of X, Y or Z, which every
     firmware has: half a file.
     """
-    found = _reader(config).read(config)
+    found = _reader(config)(config)
     lacking = [
         f"{word} of {letter}" for letter in PRINTING for word in (SPEED, ACCELERATION) if word not in found.axes.get(letter, {})
     ]
@@ -215,9 +207,9 @@ def read(config: ConfigText) -> Found:
     return replace(found, axes=axes, settings=_rounded(found.settings))
 
 
-def _reader(config: ConfigText) -> Reader:
-    for reader in READERS.values():
-        if reader.recognise(config.text):
+def _reader(config: ConfigText) -> Callable[[ConfigText], Found]:
+    for recognise, reader, _ in READERS:
+        if recognise(config.text):
             return reader
     if SOURCE.search(config.text):
         raise ProfileError(
@@ -225,7 +217,7 @@ def _reader(config: ConfigText) -> Reader:
             "the printer has stored: the answers to M115, M503 and M211 are expected, saved as a log, or asked for by "
             f"{option('port')}"
         )
-    known = [reader.text for reader in READERS.values()]
+    known = [text for _, _, text in READERS]
     raise ProfileError(f"{config.name}: it is no firmware's configuration: {', '.join(known[:-1])} or {known[-1]} is expected")
 
 

@@ -27,8 +27,9 @@ from machine.setup.detect.found import (
     ConfigText,
     Found,
     Reading,
+    axis_readings,
     has_box,
-    limits,
+    reading,
 )
 from profiles.errors import ProfileError
 from profiles.messages import option
@@ -54,7 +55,6 @@ MINUTE_S = 60.0
 RATES = {"M201": (ACCELERATION, 1.0, ""), "M203": (SPEED, MINUTE_S, "SI")}
 JERKS = {"M205": 1.0, "M566": MINUTE_S}  # command -> the seconds of its unit
 HEATERS = {"M140": "bed", "M563": "nozzle"}  # command -> the field that H of the bed, of the first tool, sets
-FIELDS = {"speed": (SPEED, MINUTE_S), "acceleration": (ACCELERATION, 1.0)}  # of an axis in the object model
 
 Parameters = dict[str, list[float]]  # letter -> its numbers, several with colons between
 Ends = dict[str, list[float | None]]  # letter -> least and greatest
@@ -138,15 +138,17 @@ def _read_model(config: ConfigText) -> Found:
     for axis in _tables(model.get("move.axes")):
         letter = str(axis.get("letter") or "")
         source = f"move.axes, {letter}"
-        board.axes[letter] = _drive(axis, source)
-        low, high, jerk = (number(axis.get(key)) for key in ("min", "max", "jerk"))
-        if low is not None and high is not None:
-            board.axes[letter][LIMITS] = limits(f"{config.name}: axis {letter}", low, high, source)
-        if jerk is not None:
+        board.axes[letter] = _drive(axis, f"{config.name}: axis {letter}", source)
+        if (jerk := number(axis.get("jerk"))) is not None:
             board.jerks_mm_s[letter] = jerk / MINUTE_S
     for extruder in _tables(model.get("move.extruders"))[:1]:
-        board.axes["E"] = _drive(extruder, "move.extruders")
-    _take_heat(board, table(model.get("heat")), _tables(model.get("tools")))
+        board.axes["E"] = _drive(extruder, "", "move.extruders")
+    heat, tools = table(model.get("heat")), _tables(model.get("tools"))
+    heaters = heat.get("heaters")
+    limits_c = [number(table(heater).get("max")) for heater in (heaters if isinstance(heaters, list) else [])]  # some are null
+    board.heaters_c = {index: limit for index, limit in enumerate(limits_c) if limit is not None}
+    board.bed = _first(heat.get("bedHeaters"), -1)
+    board.nozzle = _first(tools[0].get("heaters") if tools else None, board.nozzle)
     probes = _tables(model.get("sensors.probes"))
     board.probe = int(number(probes[0].get("type")) or 0) if probes else 0
     main, network = table(model.get("boards[0]")), table(model.get("network"))
@@ -155,14 +157,6 @@ def _read_model(config: ConfigText) -> Found:
     board.kinematics = str(kinematics).lower().replace(" ", "")
     board.firmware = f"{main.get('firmwareName') or board.firmware} {main.get('firmwareVersion') or ''}".strip()
     return board.found(config.name, "move.kinematics", "move.axes, jerk", "heat.heaters, max")
-
-
-def _take_heat(board: DuetBoard, heat: Table, tools: list[Table]) -> None:
-    heaters = heat.get("heaters")
-    limits_c = [number(table(heater).get("max")) for heater in (heaters if isinstance(heaters, list) else [])]  # some are null
-    board.heaters_c = {index: limit for index, limit in enumerate(limits_c) if limit is not None}
-    board.bed = _first(heat.get("bedHeaters"), -1)
-    board.nozzle = _first(tools[0].get("heaters") if tools else None, board.nozzle)
 
 
 def _model(config: ConfigText) -> dict[str, Any]:
@@ -181,9 +175,10 @@ def _model(config: ConfigText) -> dict[str, Any]:
     return model
 
 
-def _drive(drive: Table, source: str) -> AxisReadings:
-    told = ((key, number(drive.get(field)), unit_s) for field, (key, unit_s) in FIELDS.items())
-    return {key: Reading(value / unit_s, source) for key, value, unit_s in told if value is not None}
+def _drive(drive: Table, name: str, source: str) -> AxisReadings:
+    speed, acceleration, low, high = (number(drive.get(field)) for field in ("speed", "acceleration", "min", "max"))
+    told = reading(speed, source, 1.0 / MINUTE_S), reading(acceleration, source)
+    return axis_readings(name, *told, low, high, source)
 
 
 def _tables(value: Any) -> list[Table]:
@@ -202,7 +197,8 @@ def _read_commands(config: ConfigText) -> Found:
         _take(board, ends, command, parameters)
     for letter, (low, high) in ends.items():
         if letter != "S" and low is not None and high is not None:
-            board.axes.setdefault(letter, {})[LIMITS] = limits(f"{config.name}: axis {letter}", low, high, "M208")
+            reach = axis_readings(f"{config.name}: axis {letter}", None, None, low, high, "M208")
+            board.axes[letter] = board.axes.get(letter, {}) | reach
     if board.turns is not None:  # the firmware ignores settings of axes that M584 does not make
         made = [letter for letter in (*PRINTING, "E", *board.turns) if letter in board.axes or letter in board.turns]
         board.axes = {letter: board.axes.get(letter, {}) for letter in made}

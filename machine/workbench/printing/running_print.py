@@ -15,7 +15,7 @@ from machine.link.print_state import PrintState, follows
 from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.rescue import cancel_on_server, rescue
-from machine.printing.servers.gcode_upload import server_name
+from machine.printing.servers.server import server_name
 from machine.workbench.printing.at_page import BEGIN, LEAVE, HandCommand, HandDoes, JobState, first_state
 from machine.workbench.work.worker_pool import heard
 from mdp.kernels.workers import Interpreter

@@ -7,7 +7,7 @@ import pytest
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.lines import GcodeFile
 from machine.link.protocol.framing import command_of
-from machine.printing.servers.gcode_upload import GcodeUpload
+from machine.printing.servers.server import GcodeUpload
 from profiles.errors import GcodeError
 from profiles.profile import load
 

@@ -18,7 +18,7 @@ from machine.gcode.line_text import plain_line, read_line, to_ascii
 from machine.gcode.reader.parse import parse_gcode
 from machine.gcode.reader.parsed import ParsedProgram
 from machine.link.protocol.framing import command_of, frame
-from machine.printing.servers.gcode_upload import GcodeUpload
+from machine.printing.servers.server import GcodeUpload
 from profiles.errors import GcodeError, LocalProtocolError
 from profiles.machine import Machine
 from profiles.profile import load

@@ -7,10 +7,10 @@ from typing import Any
 from machine.cli.terminal.requests import CalibrationRequest
 from machine.notices import show
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
-from machine.setup.calibration.fit import Calibration, calibrate
+from machine.setup.calibration.fit import Calibration, calibrate, fitted_tables
 from machine.setup.calibration.program import calibration_lines, plan_touches
-from machine.setup.calibration.saved import fitted_tables, own_profile
 from machine.setup.calibration.sheet import Sheet, read_sheet, sheet_text
+from machine.setup.files import own_profile
 from profiles.axes import RotaryAxis
 from profiles.errors import ProfileError
 from profiles.machine import Machine

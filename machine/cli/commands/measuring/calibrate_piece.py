@@ -14,6 +14,7 @@ from machine.gcode.reader.parse import parse_gcode
 from machine.notices import show
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.output import check_writable, refuse_to_overwrite, write_bytes
+from machine.setup.calibration.fit import found_tables
 from machine.setup.calibration.piece import (
     EXPECTED,
     Correction,
@@ -25,7 +26,6 @@ from machine.setup.calibration.piece import (
     read_piece,
     readings_text,
 )
-from machine.setup.calibration.saved import found_tables
 from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import load

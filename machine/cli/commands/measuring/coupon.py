@@ -17,13 +17,20 @@ from machine.pipeline.pictures import contact_sheet, write_png
 from machine.pipeline.pipeline import build
 from machine.pipeline.programs import refuse_errors
 from machine.pipeline.requests import STDOUT, Outputs
-from machine.setup.calibration.saved import own_profile
 from machine.setup.coupon.bars import SHAPES, Shape
-from machine.setup.coupon.design import factors, settings_of_bars
-from machine.setup.coupon.fit import Outcome, evaluate
+from machine.setup.coupon.design import (
+    Sheet,
+    empty_sheet,
+    factors,
+    load_problem,
+    read_sheet,
+    settings_in_words,
+    settings_of_bars,
+    sheet_text,
+)
+from machine.setup.coupon.fit import Outcome, evaluate, material_tables, outcome_text, process_tables, report_lines
 from machine.setup.coupon.plate import coupon
-from machine.setup.coupon.report import material_tables, outcome_text, process_tables, report_lines
-from machine.setup.coupon.sheet import Sheet, empty_sheet, load_problem, read_sheet, settings_in_words, sheet_text
+from machine.setup.files import own_profile
 from machine.view.page import print_page
 from profiles.errors import OutputError, ProfileError
 from profiles.part_settings import PartSettings

@@ -10,7 +10,7 @@ import pytest
 from machine.cli.cli import main
 from machine.link.identification import ask_at_any_rate
 from machine.printing import settings_queries
-from machine.printing.servers.credentials import VARIABLE
+from machine.printing.servers.http import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.machine import Machine
 from profiles.places import own, own_folder

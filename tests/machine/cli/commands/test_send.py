@@ -16,9 +16,9 @@ from machine.printing.job import Scene
 from machine.printing.serial_log import SerialLog
 from machine.printing.server_print import hand_over
 from machine.printing.servers import follow
-from machine.printing.servers.credentials import VARIABLE
-from machine.printing.servers.gcode_upload import GcodeUpload, Sent
+from machine.printing.servers.http import VARIABLE
 from machine.printing.servers.octoprint import OctoPrint
+from machine.printing.servers.server import GcodeUpload, Sent
 from tests.machine.person import HASTY, ROOT, Person
 from tests.machine.printing.servers.stand_ins import KEY, session_with, stand_in
 

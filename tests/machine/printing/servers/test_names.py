@@ -18,9 +18,9 @@ from machine.printing.destination import (
     parse_printer,
     parse_server_address,
 )
-from machine.printing.servers.credentials import VARIABLE, Credentials, read_credentials, servers_file
-from machine.printing.servers.gcode_upload import GcodeUpload, server_name
-from machine.printing.servers.http import HttpSession, fetch_picture, picture_address
+from machine.printing.servers.http import VARIABLE, HttpSession, fetch_picture, picture_address, servers_file
+from machine.printing.servers.server import GcodeUpload, server_name
+from machine.printing.servers.servers import read_credentials
 from profiles.errors import PrinterError, ServerError
 
 
@@ -40,12 +40,25 @@ def test_an_address_names_kind_host_and_port(text: str, url: str) -> None:
 
 
 @pytest.mark.parametrize(("text", "kind"), [
-    ("sim", Simulated), ("/dev/ttyACM0", SerialPort), ("socket://host:1", SerialPort), ("Duet:printer", Server),
+    ("sim", Simulated), ("/dev/serial/by-path/pci-0000:00:14.0", SerialPort), ("COM3", SerialPort),
+    ("/dev/ttyACM0", SerialPort), ("socket://host:1", SerialPort), ("Duet:printer", Server),
 ])  # fmt: skip
 def test_a_destination_is_read_once_and_keeps_its_name(text: str, kind: type) -> None:
     destination = parse_destination(text, 250000, 2.0)
     assert isinstance(destination, kind)
     assert destination.name == text
+
+
+@pytest.mark.parametrize("text", ["SIM", "Sim"])
+def test_the_simulator_is_meant_in_capitals_too(text: str) -> None:
+    assert isinstance(parse_destination(text), Simulated)
+
+
+@pytest.mark.parametrize("text", ["junk:", "junk://host", "octopi:host", "", " ", " sim", "tty\0", "octopi:me:secret@host"])
+def test_a_name_that_no_device_has_is_refused(text: str) -> None:
+    with pytest.raises(PrinterError, match="cannot be one: a device, sim, socket://HOST:PORT") as refused:
+        parse_destination(text)
+    assert "secret" not in str(refused.value)
 
 
 @pytest.mark.parametrize(("given", "sentence"), [
@@ -72,9 +85,16 @@ def test_a_port_is_no_server(text: str) -> None:
         ("prusalink:host", "octoprint:HOST, moonraker:HOST or duet:HOST"),
         ("octoprint:", "names no host"),
         ("octoprint:ftp://host", "http:// or https:// is expected"),
-        ("octoprint:host:99999", "port out of range"),
+        ("octoprint:host:99999", "port 99999 is none"),
         ("octoprint:host:0", "port 0 is none"),
+        ("octoprint:host:", "port  is none"),
+        ("octoprint:http://http://host", "port  is none"),
         ("octoprint:host?apikey=1", "nothing may follow the path"),
+        ("octoprint:host?", "nothing may follow the path"),
+        ("octoprint:host%00", "names no host"),
+        ("octoprint:[::1", "names no host"),
+        ("octoprint:[fe80::g]", "names no host"),
+        ("octoprint:[::1]x", "nothing may follow the path"),
         ("octoprint:a b", "names no host"),
         ("octoprint:ho\x1bst", "names no host"),
         ("octoprint:a..b", "names no host"),
@@ -97,7 +117,7 @@ def test_a_password_in_an_address_is_refused_and_not_repeated(text: str) -> None
 @pytest.mark.parametrize("host", ["999.999.999.999", "\ufb01x", "xn--zz"])
 def test_a_host_that_cannot_be_is_refused_in_a_sentence(host: str) -> None:
     with pytest.raises(ServerError, match="names no host"):
-        HttpSession(parse_server_address(f"octoprint:{host}"), Credentials()).get("/")
+        HttpSession(parse_server_address(f"octoprint:{host}")).get("/")
 
 
 @pytest.mark.parametrize(
@@ -117,11 +137,10 @@ def test_a_file_gets_a_name_that_every_server_can_keep(name: str, there: str) ->
     assert server_name(name) == there
 
 
-def test_an_upload_knows_its_lines_and_checksums() -> None:
+def test_an_upload_knows_its_lines() -> None:
     upload = GcodeUpload("a.gcode", ("G28", "G1 X1"))
     assert upload.content == b"G28\nG1 X1\n"
     assert [upload.line_at(position) for position in (0, 3, 4, 10)] == [0, 0, 1, 2]
-    assert upload.crc32 == "077a1e05"
 
 
 def write_servers(text: str, mode: int = 0o600) -> Path:
@@ -140,23 +159,22 @@ def _own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_key_is_found_by_host_and_port_before_the_host_alone() -> None:
     file = write_servers('[servers."octopi"]\nkey = "one"\nca_file = "ca.pem"\n[servers."octopi:5000"]\nkey = "two"\n')
-    assert read_credentials(parse_server_address("octoprint:octopi")).key == "one"
-    assert read_credentials(parse_server_address("octoprint:octopi")).ca_file == file.parent / "ca.pem"
-    assert read_credentials(parse_server_address("octoprint:octopi:5000")).key == "two"
-    assert read_credentials(parse_server_address("octoprint:other")).key == ""
+    assert read_credentials(parse_server_address("octoprint:octopi")) == ("one", file.parent / "ca.pem")
+    assert read_credentials(parse_server_address("octoprint:octopi:5000")) == ("two", None)
+    assert read_credentials(parse_server_address("octoprint:other")) == ("", None)
 
 
 def test_a_host_is_the_same_in_capitals() -> None:
     write_servers('[servers."OctoPi.local"]\nkey = "one"\n')
-    assert read_credentials(parse_server_address("octoprint:octopi.LOCAL")).key == "one"
+    assert read_credentials(parse_server_address("octoprint:octopi.LOCAL")) == ("one", None)
 
 
 def test_the_variable_goes_before_the_file_and_no_key_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     write_servers('[servers."octopi"]\nkey = "one"\n')
     monkeypatch.setenv(VARIABLE, "other")
-    credentials = read_credentials(parse_server_address("octoprint:octopi"))
-    assert credentials.key == "other"
-    assert "other" not in repr(credentials)
+    key, _ = read_credentials(parse_server_address("octoprint:octopi"))
+    assert key == "other"
+    assert "other" not in repr(HttpSession(parse_server_address("octoprint:octopi"), key))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows keeps a user's folders to the user")

@@ -17,9 +17,9 @@ import pytest
 
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
-from machine.printing.servers.credentials import VARIABLE
-from machine.printing.servers.follow import follow_print
-from machine.printing.servers.gcode_upload import GcodeUpload
+from machine.printing.servers.follow import Follower
+from machine.printing.servers.http import VARIABLE
+from machine.printing.servers.server import GcodeUpload
 from profiles.errors import ServerError
 from tests.machine.printing.servers.klippy_stub import KlippyStub
 from tests.machine.printing.servers.stand_ins import session_with
@@ -142,7 +142,7 @@ def print_on(address: str, steps: Steps) -> tuple[PrintState, list[PrintState]]:
 
     with session_with(address) as server:
         file = server.upload(UPLOAD, lambda count: None)
-        return follow_print(server, file, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False), phases
+        return Follower(server, file, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False).run(), phases
 
 
 def pause_resume_cancel() -> Steps:
@@ -241,4 +241,4 @@ def check_while_printing(address: str) -> None:
             server.upload(UPLOAD, lambda count: None)
         with pytest.raises(ServerError, match="cannot start it now: SD busy"):
             server.start("passes.gcode")
-        server.cancel()
+        server.order(Command.CANCEL)

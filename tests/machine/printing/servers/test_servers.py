@@ -18,10 +18,9 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.destination import parse_server_address
 from machine.printing.rescue import cancel_on_server, rescue
 from machine.printing.servers import duet, follow, http
-from machine.printing.servers.credentials import VARIABLE, servers_file
-from machine.printing.servers.follow import follow_print
-from machine.printing.servers.gcode_upload import GcodeUpload
-from machine.printing.servers.server import PrintServer
+from machine.printing.servers.follow import Follower
+from machine.printing.servers.http import VARIABLE, servers_file
+from machine.printing.servers.server import GcodeUpload, PrintServer
 from machine.printing.servers.servers import KINDS
 from profiles.errors import NoAnswerError, ServerError
 from tests.machine.printing.servers.stand_ins import KEY, STAND_INS, Job, session_with, stand_in
@@ -64,7 +63,7 @@ def printing(kind: str, **more: Any) -> Iterator[tuple[Job, PrintServer]]:
 
 
 def run(server: PrintServer, control: Control, on_status: Callable[[PrintStatus, str], None] = ignore) -> PrintState:
-    return follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False)
+    return Follower(server, UPLOAD.name, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False).run()
 
 
 @every_kind
@@ -143,7 +142,7 @@ def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
             return job.state == "printing"
 
         assert (
-            follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status=ignore, control=control, left=left)
+            Follower(server, UPLOAD.name, len(UPLOAD.content), on_status=ignore, control=control, left=left).run()
             is PrintState.FAILED
         )
         assert job.commands == ["M112"]
@@ -206,7 +205,7 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
 def test_a_person_leaves_a_print_that_goes_on(kind: str) -> None:
     with printing(kind) as (job, server):
         left = lambda: job.state == "printing"  # noqa: E731
-        assert follow_print(server, UPLOAD.name, 1, on_status=ignore, control=Control(), left=left) is PrintState.LEFT
+        assert Follower(server, UPLOAD.name, 1, on_status=ignore, control=Control(), left=left).run() is PrintState.LEFT
         assert job.state == "printing"
 
 
@@ -471,7 +470,12 @@ def test_whatever_a_server_answers_there_is_a_sentence_or_a_value(kind: str) -> 
     with stand_in(kind, handler=AnyAnswer) as (_, address):
         for _ in range(60):
             with session_with(address) as server:
-                calls: list[Callable[[], object]] = [server.greet, server.status, lambda: server.has("box.gcode"), server.pause]
+                calls: list[Callable[[], object]] = [
+                    server.greet,
+                    server.status,
+                    lambda: server.has("box.gcode"),
+                    lambda: server.order(Command.PAUSE),
+                ]
                 for call in [*calls, lambda: server.upload(UPLOAD, unheard), lambda: server.command("M220 S90")]:
                     with contextlib.suppress(ServerError):
                         call()
@@ -506,7 +510,7 @@ class Unanswered:
 
 def follow_unanswered(status: Callable[[], PrintStatus]) -> PrintState:
     server: object = Unanswered(status)
-    return follow_print(server, "box.gcode", 9, on_status=ignore, control=Control(), left=lambda: False)  # type: ignore[arg-type]
+    return Follower(server, "box.gcode", 9, on_status=ignore, control=Control(), left=lambda: False).run()  # type: ignore[arg-type]
 
 
 def test_a_print_whose_start_was_not_answered_is_followed_all_the_same() -> None:

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from machine.setup.calibration.fit import calibrate
-from machine.setup.calibration.saved import fitted_tables
+from machine.setup.calibration.fit import calibrate, fitted_tables
 from profiles.errors import ProfileError
 from tests.machine.setup.calibration.misaligned import misaligned, prediction_errors_mm, touches_at
 from tests.machine.setup.calibration.touches import machine_of, really

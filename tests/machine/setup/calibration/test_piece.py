@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machine.setup.calibration.piece import correct, slope_of
+from machine.setup.calibration.piece import correct
 from profiles.errors import ProfileError
 from profiles.profile import load
 from tests.machine.setup.calibration.pieces import off, read_off, seam_mm, standing
@@ -32,7 +32,7 @@ def test_a_tilt_axis_that_is_too_low_by_h_lays_a_pad_at_60_degrees_off_by_h() ->
 def test_the_slope_is_what_pads_move_by() -> None:
     true = really(GENERIC, {"zero_deg": GENERIC.tilt.zero_deg + 0.01}, {})
     moved = standing(GENERIC).laid_aside_mm(true).reshape(-1)
-    assert slope_of(GENERIC, standing(GENERIC))[:, 4] * 0.01 == pytest.approx(moved, abs=1e-6)
+    assert standing(GENERIC).slope()[:, 4] * 0.01 == pytest.approx(moved, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", MACHINES)

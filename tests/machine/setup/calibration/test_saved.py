@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.setup.calibration.saved import own_profile
+from machine.setup.files import own_profile
 from profiles.places import own_folder
 
 TABLES = {

@@ -3,8 +3,7 @@
 import numpy as np
 
 from machine.setup.coupon.bars import BEND, Shape
-from machine.setup.coupon.design import KINDS, Factor, signs
-from machine.setup.coupon.sheet import Sheet
+from machine.setup.coupon.design import KINDS, Factor, Sheet, signs
 
 FACTORS = (
     Factor("interface_overlap", 0.5, 0.75),

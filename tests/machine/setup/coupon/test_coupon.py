@@ -13,8 +13,8 @@ from machine.cli.commands.measuring.coupon import UNSUPPORTED, ask_for_loads
 from machine.cli.terminal.options import DefaultProfileOptions
 from machine.cli.terminal.requests import CouponRequest
 from machine.setup.coupon.bars import SHAPES
+from machine.setup.coupon.design import Sheet, read_sheet, sheet_text
 from machine.setup.coupon.plate import coupon
-from machine.setup.coupon.sheet import Sheet, read_sheet, sheet_text
 from profiles.errors import OutputError
 from profiles.places import own_folder
 from profiles.profile import load

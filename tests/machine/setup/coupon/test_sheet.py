@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from machine.setup.coupon.bars import BEND, TENSILE
-from machine.setup.coupon.sheet import empty_sheet, read_sheet, settings_in_words, sheet_text
+from machine.setup.coupon.design import empty_sheet, read_sheet, settings_in_words, sheet_text
 from profiles.errors import ProfileError
 from tests.machine.setup.coupon.sheets import FACTORS, broken
 

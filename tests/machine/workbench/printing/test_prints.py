@@ -28,7 +28,7 @@ from machine.printing.destination import parse_destination
 from machine.printing.job import Does, End, PrintJob, Scene
 from machine.printing.serial_log import SerialLog
 from machine.printing.servers import follow
-from machine.printing.servers.credentials import VARIABLE
+from machine.printing.servers.http import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from machine.workbench.printing import running_print
 from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage, JobState, Slices

@@ -1,9 +1,11 @@
-"""Sheets: TOML files that the program writes with numbers left open, and reads again when a person has filled them in.
+"""Files of setup: sheets that a person fills in, and profiles of the person's own.
 
-Every function raises ProfileError that names the file and what is wrong in it.
+A sheet is a TOML file that the program writes with numbers left open, and reads again when they are filled in. What reads one
+raises ProfileError that names the file and what is wrong in it.
 """
 
-from collections.abc import Mapping, Sequence
+import tomllib
+from collections.abc import Mapping, MutableMapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 import tomlkit
 
 from profiles.errors import ProfileError
-from profiles.places import parse
+from profiles.places import PARENT, merged, own, own_folder, parse, shipped
 
 
 def quoted(text: str) -> str:
@@ -49,3 +51,28 @@ def number(path: Path, key: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
         raise ProfileError(f"{path}: {key} is {value!r}: it must be a number")
     return float(value)
+
+
+def own_profile(kind: str, name: str, parent: str, tables: Mapping[str, Any]) -> tuple[Path, str]:
+    """The file in the user's folder for a kind of profile and its new text: what it holds already, comments too, the new tables
+    over it."""
+    file = own_folder(kind) / f"{name}.toml"
+    if name not in own(kind):
+        known = parent in (*shipped(kind), *own(kind))
+        return file, tomlkit.dumps({PARENT: parent if known else str(Path(parent).resolve()), **tables})
+    whole = merged(parse(file), tables)
+    document = tomlkit.parse(file.read_text(encoding="utf-8"))
+    _overlay(document, tables)
+    text = tomlkit.dumps(document)
+    # Beside dotted keys tomlkit puts a new table before the keys that follow: then the comments are given up.
+    return file, text if tomllib.loads(text) == whole else tomlkit.dumps(whole)
+
+
+def _overlay(table: MutableMapping[str, Any], values: Mapping[str, Any]) -> None:
+    """Put values into a table, its other keys left as they are."""
+    for key, value in values.items():
+        below = table.get(key)
+        if isinstance(value, Mapping) and isinstance(below, MutableMapping):
+            _overlay(below, value)
+        else:
+            table[key] = value
