@@ -13,6 +13,7 @@ from machine.gcode.reader.parsed import Indices32, MoveKind, ParsedProgram, piec
 from machine.kinematics.table import goes_on, workpiece_segments
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
+from mdp.pose import Pose, rotation
 from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.bead import infill_cell_mm, support_cell_mm
@@ -47,6 +48,20 @@ class Beads:
     def segments(self, some: Indices | slice = slice(None)) -> Floats:
         """(k, 2, 3) ends of some beads in the workpiece frame, mm."""
         return workpiece_segments(self.machine, self.program.start, self.program.end, self.rows[some])
+
+    def directions(self, some: Indices | slice = slice(None)) -> Floats:
+        """(k, 3) printing directions of some beads in the workpiece frame."""
+        begins, ups = self._runs
+        which = np.arange(*some.indices(len(self.rows))) if isinstance(some, slice) else some
+        printing: Floats = ups[np.searchsorted(begins, which, side="right") - 1]
+        return printing
+
+    @cached_property
+    def _runs(self) -> tuple[Indices, Floats]:
+        """(j,) the first beads of runs at one pose, and (j, 3) the printing direction of each run."""
+        begins = np.flatnonzero(np.append(True, self.program.turned_between(self.rows))[: len(self.rows)])
+        poses = self.program.end[self.rows[begins], 3:].tolist()
+        return begins, np.array([rotation(self.machine, Pose(*pose))[2] for pose in poses]).reshape(-1, 3)
 
     @property
     def width_mm(self) -> Floats:

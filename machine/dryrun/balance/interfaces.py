@@ -116,15 +116,6 @@ def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> It
         yield _interface(program, deposited, (first, earlier), turn, profile)
 
 
-def _printing_directions(program: ParsedProgram, rows: Indices, profile: Profile) -> Floats:
-    """(k, 3) direction in which the bead of each row was laid, workpiece frame."""
-    if not len(rows):
-        return np.zeros((0, 3))
-    begins = np.concatenate([[0], np.flatnonzero(program.turned_between(rows)) + 1])
-    poses = program.end[rows[begins], 3:].tolist()
-    return np.repeat([rotation(profile.machine, Pose(*pose))[2] for pose in poses], np.diff(begins, append=len(rows)), axis=0)
-
-
 def _interface(
     program: ParsedProgram, deposited: Beads, which: tuple[Indices, Mask], turn: Floats, profile: Profile
 ) -> Interface:
@@ -183,7 +174,7 @@ def _bars(program: ParsedProgram, deposited: Beads, which: Indices, turn: Floats
     begin, end = (segments[:, side] @ turn.T for side in (0, 1))
     height, length = deposited.sizes[deposited.size[which], 1], np.maximum(deposited.length_mm[which], 1e-9)
     mm3 = program.e_mm[rows] * _filament_mm2(profile)
-    return Bars(begin, end, _printing_directions(program, rows, profile) @ turn.T, 0.5 * mm3 / length / height, height)
+    return Bars(begin, end, deposited.directions(which) @ turn.T, 0.5 * mm3 / length / height, height)
 
 
 def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
