@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, extrusion, heat, layering, motion, own_comments, placement, sequence
-from machine.dryrun.balance import interfaces
-from machine.dryrun.balance.interfaces import InterfaceBalance
+from machine.dryrun import clearance, extrusion, heat, interfaces, layering, motion, own_comments, placement, sequence
 from machine.dryrun.findings import Finding
+from machine.dryrun.interfaces import InterfaceBalance, balance_of
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
 from machine.gcode.lines import Lines
@@ -91,7 +90,7 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
         touching = ahead(_touching, program, deposited, profile)  # half of all work, on a core of its own
-        balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
+        balances = tuple(map(balance_of, interfaces.interfaces(program, deposited, profile)))
         moving, of_program = _findings(text, program, deposited, balances, profile)
         times_s = motion.times_s(program, machine)
         contacts, touches = touching.result()
@@ -144,6 +143,39 @@ def _refuse_far_places(program: ParsedProgram) -> None:
         axis = int(far[row].argmax())
         place = f"{'XYZ'[axis]} comes to {program.end[row, axis]:g} mm"
         raise GcodeError(f"line {program.line[row]}: {place}: no printer reaches beyond {MOST_MM:g}")
+
+
+class Timeline:
+    """Where the axes stand after any line of a program, how long the rest takes, how many layers a part has; nothing is known of
+    a program that is not here (None)."""
+
+    def __init__(self, run: DryRun | None) -> None:
+        self._letters, self._waits, self._layers = tuple[str, ...](), tuple[tuple[int, float], ...](), dict[int, int]()
+        self._line, self._ends, self._done_s = np.zeros(0, np.int32), np.zeros((0, 5)), np.zeros(1)
+        if run is not None:
+            program, self._letters, self._waits = run.program, run.letters, run.waits
+            self._line, self._ends = program.line, program.end
+            self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
+            laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
+            self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
+
+    def at(self, file_line: int) -> dict[str, float]:
+        """Where the axes stand after a line of the program, by their letters, mm and deg; {} before the first move."""
+        row = self._rows(file_line) - 1
+        return {} if row < 0 else dict(zip(self._letters, self._ends[row].tolist(), strict=False))
+
+    def remaining_s(self, file_line: int) -> float:
+        """How long moves and waits after a line of the program take; heating before the print and homing are not counted."""
+        waits_s = sum(wait_s for line, wait_s in self._waits if line > file_line)
+        return float(self._done_s[-1] - self._done_s[self._rows(file_line)]) + waits_s
+
+    def layers(self, part: int | None) -> int | None:
+        """Layers of a part."""
+        return None if part is None else self._layers.get(part)
+
+    def _rows(self, file_line: int) -> int:
+        """How many moves there are up to a line."""
+        return int(np.searchsorted(self._line, file_line, side="right"))
 
 
 def retractions(program: ParsedProgram) -> int:

@@ -7,7 +7,7 @@ as the bead, lying in its part's own direction; the corners that round beads lea
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.balance.columns import Lattice, inside_loops
+from machine.dryrun.columns import Lattice, inside_loops
 from machine.dryrun.dryrun import DryRun
 from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel

@@ -174,14 +174,9 @@ def highest_of(segments: Floats) -> Floats:
     return highest_mm
 
 
-@kernel
 def lengths_of(segments: Floats) -> Floats:
     """(k,) lengths of (k, 2, 3) segments."""
-    lengths_mm = np.empty(len(segments))
-    for k in range(len(segments)):
-        x, y = segments[k, 1, 0] - segments[k, 0, 0], segments[k, 1, 1] - segments[k, 0, 1]
-        z = segments[k, 1, 2] - segments[k, 0, 2]
-        lengths_mm[k] = np.sqrt(x * x + y * y + z * z)
+    lengths_mm: Floats = np.sqrt(((segments[:, 1] - segments[:, 0]) ** 2).sum(axis=1))
     return lengths_mm
 
 

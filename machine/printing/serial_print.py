@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import chain
 from math import inf, isfinite
 
-from machine.dryrun.timeline import Timeline
+from machine.dryrun.dryrun import Timeline
 from machine.firmware import dialect_of
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal

@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 from time import monotonic
 
-from machine.dryrun.timeline import Timeline, UnknownTimeline
+from machine.dryrun.dryrun import Timeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.print_state import PrintState, PrintStatus, last_known
@@ -220,7 +220,7 @@ class ReportedProgress:
         self.line, self.elapsed_s = 0, 0.0
         self._upload, self._position = upload, ProgramPosition()
         self._lines: Sequence[str] = () if loaded is None else loaded.program.lines
-        self._timeline = UnknownTimeline() if loaded is None else Timeline(loaded.program.run)
+        self._timeline = Timeline(None if loaded is None else loaded.program.run)
         self._last_status: PrintStatus | None = None
         self._last_status_s = monotonic()
 

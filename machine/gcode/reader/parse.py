@@ -11,7 +11,7 @@ from machine.gcode.commands import PATHS
 from machine.gcode.line_text import FREE_TEXT, begins_layer, begun_part, command_name, read_line, to_ascii
 from machine.gcode.lines import Lines
 from machine.gcode.modes import MODES
-from machine.gcode.reader.codes import BARE_WORDS, VALUED, dispatch, flush, macro
+from machine.gcode.reader.codes import BARE_WORDS, VALUED, do_command, do_macro, flush
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, Remarks, Unheld, pieces
 from machine.gcode.reader.plain_moves import read_plain_moves
 from machine.gcode.reader.state import Reader, reader_of
@@ -136,7 +136,7 @@ def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
     others = {letter: value for letter, value in words if letter not in "GMT"}
     goes_on = reader.motion != "" and not reader.dialect.serial and not reader.letters.keys().isdisjoint(others)
     if not named and goes_on:
-        dispatch(reader, reader.motion, others)
+        do_command(reader, reader.motion, others)
         return
     if not named and not reader.dialect.serial and words[0][0] == "F" and words[0][1] > 0:
         reader.modes.move(reader.at, words[:1])
@@ -146,17 +146,17 @@ def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
     if reader.dialect.serial and (second := next((_name(*word) for word in words[1:] if word[0] in "GM"), None)):
         raise GcodeError(f"{quote(text)} holds two commands, {named[0]} and {second}: write one a line")
     if len(named) == 1 or reader.dialect.serial:
-        dispatch(reader, named[0], dict(words[1:]))
+        do_command(reader, named[0], dict(words[1:]))
         return
     placed = [name for name in named if name in PLACED]
     if len(placed) > 1:
         raise GcodeError(f"{quote(text)} holds two motions, {placed[0]} and {placed[1]}")
     for name in [name for name in named if name not in (*placed, *STOPS)]:
-        dispatch(reader, name, {} if name[0] == "G" else others)
+        do_command(reader, name, {} if name[0] == "G" else others)
     if placed or goes_on:
-        dispatch(reader, placed[0] if placed else reader.motion, others)
+        do_command(reader, placed[0] if placed else reader.motion, others)
     for name in [name for name in named if name in STOPS]:
-        dispatch(reader, name, {})
+        do_command(reader, name, {})
 
 
 def _irregular(reader: Reader, code: str, text: str) -> None:
@@ -174,12 +174,12 @@ def _irregular(reader: Reader, code: str, text: str) -> None:
         if dialect.serial and name not in FREE_TEXT:
             _check_alone(name, rest, text)
         words = FLAG.findall(rest) if FLAGS.fullmatch(code) else []
-        dispatch(reader, name, {letter: float(value or 0.0) for letter, value in words})
+        do_command(reader, name, {letter: float(value or 0.0) for letter, value in words})
     elif MACRO.fullmatch(code) and text.isprintable():
         name, _, rest = code.partition(" ")
         if dialect.serial and not dialect.macros and name not in dialect.statements:
             _check_alone(name, rest, text)
-        if not dialect.macros or not macro(reader, code):
+        if not dialect.macros or not do_macro(reader, code):
             reader.own(name)
     elif re.match(r"O *[0-9<]|#|IF *\[|WHILE *\[", code):
         raise GcodeError(f"{quote(text)}: parameters and O words are not supported, only plain G-code is")

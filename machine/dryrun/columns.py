@@ -1,4 +1,5 @@
-"""Columns: a lattice over a part's X and Y, what of each column beads take, and sums over windows of a square millimetre."""
+"""Columns: a lattice over X and Y, the plastic that beads lay into each of its columns, how high they reach there, and which
+columns lie inside loops. It shares no code with what gave each bead its volume."""
 
 from typing import NamedTuple
 

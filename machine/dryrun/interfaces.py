@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, tops
+from machine.dryrun.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, tops
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.strokes import Beads, parts_on_plate, turned_box
 from machine.gcode.reader.parsed import ParsedProgram
@@ -46,33 +46,12 @@ class Interface:
     plastic: Floats
     walls: Bars
 
-    @property
-    def area_mm2(self) -> float:
-        """The area of the section."""
-        return float(self.section.sum()) * self.lattice.column_mm2
-
-    @property
-    def contact(self) -> float:
-        """Share of the section where a bead lies on an earlier part."""
-        return float((self.bead & self.touching).sum() / max(1, self.section.sum()))
-
-    @property
-    def over_room(self) -> float:
-        """Plastic over room of all of the section that has something below it."""
-        there = self.touching & self.section
-        return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
-
-    @property
-    def beads_over_room(self) -> float:
-        """Plastic over room where beads lie on something, whatever they leave open."""
-        there = self.touching & self.bead
-        return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
-
 
 @dataclass(frozen=True)
 class InterfaceBalance:
-    """What an interface comes to, without its columns: area_mm2, contact, over_room, beads_over_room as there; touching_mm2: of
-    the section, where earlier parts reach up to it."""
+    """The sums over an interface. area_mm2: of its section; contact: share of the section where a bead lies on an earlier part;
+    over_room: plastic over room of all of the section that has something below it; beads_over_room: of the beads alone that lie
+    on something; touching_mm2: area of the section that earlier parts reach up to."""
 
     part: int
     row: int
@@ -82,11 +61,24 @@ class InterfaceBalance:
     beads_over_room: float
     touching_mm2: float
 
-    @classmethod
-    def of(cls, face: Interface) -> "InterfaceBalance":
-        """The balance of an interface."""
-        touching_mm2 = float((face.touching & face.section).sum()) * face.lattice.column_mm2
-        return cls(face.part, face.row, face.area_mm2, face.contact, face.over_room, face.beads_over_room, touching_mm2)
+
+def balance_of(face: Interface) -> InterfaceBalance:
+    """The sums over an interface."""
+    section, beads, column_mm2 = face.touching & face.section, face.touching & face.bead, face.lattice.column_mm2
+    return InterfaceBalance(
+        part=face.part,
+        row=face.row,
+        area_mm2=float(face.section.sum()) * column_mm2,
+        contact=float(beads.sum() / max(1, face.section.sum())),
+        over_room=_over_room(face, section),
+        beads_over_room=_over_room(face, beads),
+        touching_mm2=float(section.sum()) * column_mm2,
+    )
+
+
+def _over_room(face: Interface, there: Mask) -> float:
+    """Plastic over room of some columns."""
+    return float(face.plastic[there].sum() / max(float(face.room[there].sum()), 1e-9))
 
 
 def findings(program: ParsedProgram, balances: Sequence[InterfaceBalance], profile: Profile) -> Iterator[Finding]:
