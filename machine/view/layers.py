@@ -1,6 +1,7 @@
 """Layers: which rows of a program belong to one layer, as its comments tell or else as the heights of its strokes show."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,6 @@ from machine.view.encoding import Column
 from mdp.mesh import Floats
 
 SAME_MM = 0.02  # strokes whose heights differ less lie in one layer
-NONE: dict[str, Column] = {
-    **{name: Column(np.zeros(0), "i32") for name in ("layer_part", "layer_number", "layer_first", "layer_rows")},
-    **{name: Column(np.zeros(0), "f32") for name in ("layer_z", "layer_time")},
-}  # of a page without paths
 FEWEST = 4  # strokes that a helix takes to rise by a layer, at least: what goes up and down more quickly is no helix
 
 
@@ -63,6 +60,22 @@ def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.in
         steps[1:] |= rises
     number[strokes[steps]] = 1
     return np.cumsum(number)
+
+
+def sums_of_parts(program: ParsedProgram, layers: Layers, ends_s: Floats) -> list[dict[str, Any]]:
+    """Layers, time and filament of each part; without ;PART: comments all is part 0. ends_s: (n,) when each row ends."""
+    seconds, sums = np.diff(ends_s, prepend=0.0), []
+    for index in program.parts or (0,):
+        rows = np.flatnonzero(program.part == index)
+        sums.append(
+            {
+                "index": index,
+                "layers": int((program.part[layers.first] == index).sum()),
+                "time_s": float(seconds[rows].sum()),
+                "filament_mm": float(program.e_mm[rows].sum()),
+            }
+        )
+    return sums
 
 
 def columns(

@@ -19,15 +19,6 @@ STILL = 1e-9
 MOST_ROWS = 1_500_000
 FINEST_MM = 0.01
 Mask = NDArray[np.bool_]
-NONE: dict[str, Column] = {
-    "end": Column(np.zeros((0, 5)), "i32", 0.001, delta=True),
-    "jump_row": Column(np.zeros(0), "i32"),
-    "jump_start": Column(np.zeros((0, 5)), "i32", 0.001),
-    **{name: Column(np.zeros(0), "f64", 0.001, delta=True) for name in ("time", "filament")},
-    **{name: Column(np.zeros(0), "i32", delta=True) for name in ("line", "part", "layer", "speed")},
-    **{name: Column(np.zeros(0), "u16") for name in ("type", "width", "height", "nozzle", "bed")},
-    **{name: Column(np.zeros(0), "u8") for name in ("kind", "fan")},
-}  # of a page without paths
 
 
 def end_times_s(run: DryRun) -> Floats:

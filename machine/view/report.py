@@ -22,7 +22,6 @@ from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, standing_still
 from mdp.joint import Joint, weakest_of
-from mdp.mesh import Floats
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
 from profiles.places import OF_KIND, shipped
@@ -68,19 +67,18 @@ def print_report(
     program: Program,
     profile: Profile,
     layers: Layers,
-    ends_s: Floats,
+    parts: Sequence[dict[str, Any]],
     *,
     joints: Sequence[Joint] = (),
     alternatives: Sequence[Alternative] = (),
     known: bool = True,
     ours: bool = True,
 ) -> dict[str, Any]:
-    """The report of a whole print. ends_s: (n,) when each row ends; joints: of a model that is known; alternatives: it printed in
-    one part.
+    """The report of a whole print. parts: sums_of_parts(); joints: of a known model; alternatives: the model in one part.
 
     known: the machine is no guess; ours: the file was made with this profile, else its settings are not told.
     """
-    tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile, "" if known else profile.machine.name)]
+    tables = [_parts(program, parts, profile), _kinds(program.run, profile, "" if known else profile.machine.name)]
     tables += _joints(joints) or _interfaces(program.run)
     if program.decomposition is not None:
         tables += _front(program.decomposition)
@@ -96,8 +94,8 @@ def with_alternatives(report: dict[str, Any], alternatives: Sequence[Alternative
     return report | {"tables": tables}
 
 
-def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = ()) -> Table:
-    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": False}
+def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
+    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": folded}
 
 
 SOLID = ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²"]
@@ -111,18 +109,15 @@ def _solid(part: Part, profile: Profile) -> Row:
     return [str(part.index), *angles, f"{part.volume_mm3 / 1000.0:.2f}", *areas]
 
 
-def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -> Table:
+def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) -> Table:
     """Each part with its layers, time and material; what its solid is where the program came from a model."""
-    parsed, seconds = program.run.program, np.diff(ends_s, prepend=0.0)
     decomposition = program.decomposition
     solids = {part.index: _solid(part, profile) for part in decomposition.parts} if decomposition is not None else {}
     interfaces = program.interface_mm3
     rows = []
-    for index in parsed.parts or (0,):
-        mine = parsed.part == index
-        count = int((parsed.part[layers.first] == index).sum())
-        mass_g = filament_g(float(parsed.e_mm[mine].sum()), profile.material)
-        figures = [str(count), duration(float(seconds[mine].sum())), f"{mass_g:.1f}"]
+    for part in parts:
+        index, mass_g = part["index"], filament_g(part["filament_mm"], profile.material)
+        figures = [str(part["layers"]), duration(part["time_s"]), f"{mass_g:.1f}"]
         stands_on = [f"{interfaces.get(index, 0.0) / 1000:.2f}"] if interfaces else []
         rows.append([*solids.get(index, [str(index) if index else "all"]), *figures, *stands_on])
     head = [*(SOLID if solids else SOLID[:1]), "layers", "time", "g", *([STANDS_ON] if interfaces else [])]
@@ -283,8 +278,8 @@ def settings_tables(profile: Profile) -> list[Table]:
         changed += [[f"part {part.part}: process.{key}", _text(value), _text(shared[key])] for key, value in part.process.items()]
     notes = [] if changed else ["all settings are the usual ones"]
     return [
-        {"title": "Settings changed", "head": ["setting", "value", "usual"], "rows": changed, "notes": notes, "folded": False},
-        {"title": "All settings", "head": ["setting", "value", "meaning"], "rows": every, "notes": [], "folded": True},
+        _table("Settings changed", ["setting", "value", "usual"], changed, notes),
+        _table("All settings", ["setting", "value", "meaning"], every, folded=True),
     ]
 
 

@@ -101,14 +101,8 @@ def machine_bodies(machine: Machine, known: bool) -> dict[str, Any]:
 
 
 def _axis(axis: RotaryAxis) -> dict[str, Any]:
-    return {
-        "letter": axis.letter,
-        "axis": unit(axis.axis).tolist(),
-        "point_mm": list(axis.point_mm),
-        "sign": axis.sign,
-        "zero_deg": axis.zero_deg,
-        "limits_deg": list(axis.limits_deg),
-    }
+    kept = {"letter", "axis", "point_mm", "sign", "zero_deg", "limits_deg"}
+    return axis.model_dump(mode="json", include=kept) | {"axis": unit(axis.axis).tolist()}
 
 
 def relevant_findings(run: DryRun, known: bool) -> list[Finding]:
