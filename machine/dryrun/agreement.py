@@ -1,7 +1,7 @@
-"""Agreement: the deposited plastic beside the model it was made from: what is filled, what lies outside, what hangs in air;
-and by how much each part lies beside the model.
+"""Agreement: the deposited plastic compared with the model it was made from: the share that is filled, that lies outside and that
+hangs in air; and by how much each part is shifted.
 
-An outer wall runs half its width inside the surface. What it lies farther in or out, seen along the surface's normal, is a
+An outer wall runs half its width inside the surface. Its further offset along the surface's normal is a
 constant (a compensation, the resolution) and the share of a shift along that normal: a least-squares fit over walls of all
 directions tells them apart (the point-to-plane step of Chen and Medioni 1992). Walls along cuts are on no surface and are left
 out by their distance; a shift in a direction in which no wall faces is not known.
@@ -58,8 +58,8 @@ class Agreement:
 
 
 def agreement(run: DryRun, mesh: Mesh, profile: Profile, modifiers: Sequence[Modifier] = ()) -> tuple[Agreement, DryRun]:
-    """How the plastic of a dry run, one that has looked for its findings itself, agrees with the closed model (workpiece frame);
-    the run with what that found added. modifiers: where the print has other settings than the profile's.
+    """The agreement of a dry run, made without known findings, with the closed model (workpiece frame); and the run with the
+    findings added. modifiers: where the print has other settings than the profile's.
 
     Findings: outside and shift (errors), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
     """

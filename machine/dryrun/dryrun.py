@@ -28,10 +28,10 @@ MOST_MM = 10_000.0  # five times what the largest printers reach
 
 @dataclass(frozen=True, eq=False)
 class DryRun:
-    """What a G-code text does on a machine.
+    """The result of a dry run: the program, its times, plastic and findings.
 
-    times_s: (n,) seconds of each row of program; waits: line and seconds of what G4 tells and of heating in the midst of the
-    print (what comes before it, and homing, are not counted).
+    times_s: (n,) seconds of each row of program; waits: line and seconds of each G4 and of heating during the print (heating
+    before it and homing are not counted).
     deposited: its plastic. contacts: what lay under each row; None where it was known before what there is to find. interfaces:
     where parts stand on others; none where contacts are not known.
     """
@@ -73,7 +73,7 @@ class DryRun:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """The findings that a print is refused for."""
+        """The findings for which a print is refused."""
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
@@ -113,7 +113,7 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
 
 
 def _touching(program: ParsedProgram, deposited: Beads, profile: Profile) -> tuple[Contacts, list[Finding]]:
-    """What lies under each row, and what is wrong with that."""
+    """The contacts of each row, and the findings about them."""
     contacts = replay(program, deposited, profile)
     return contacts, [*placement.findings(program, deposited, contacts), *layering.findings(program, deposited, contacts)]
 
@@ -121,7 +121,7 @@ def _touching(program: ParsedProgram, deposited: Beads, profile: Profile) -> tup
 def _findings(
     text: Sequence[str], program: ParsedProgram, deposited: Beads, balances: Sequence[InterfaceBalance], profile: Profile
 ) -> tuple[list[Finding], list[Finding]]:
-    """What is wrong with the moves of a program, and with the rest of it."""
+    """The findings about the moves of a program, and about the rest of it."""
     moving = [*motion.findings(program, profile.machine), *clearance.findings(program, deposited, profile.machine)]
     of_program = [
         *extrusion.findings(program, deposited, profile),
@@ -136,7 +136,7 @@ def _findings(
 
 
 def _refuse_far_places(program: ParsedProgram) -> None:
-    """What is tried along a move takes as long as the move: one of a damaged number would be tried for days."""
+    """Refuse a damaged coordinate: checks sample along a move, and one so long would take days."""
     if len(program.line) and np.abs(program.bounds[:, :3]).max() > MOST_MM:
         far = np.abs(program.end[:, :3])
         row = int(np.flatnonzero((far > MOST_MM).any(axis=1))[0])

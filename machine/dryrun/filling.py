@@ -1,7 +1,7 @@
-"""Filling: what share of the model's inside the deposited beads fill.
+"""Filling: the share of the model's inside that the deposited beads fill.
 
-Judged at the points of a lattice inside the model. A bead is taken as what its neighbours leave of it: a bar as wide and as high
-as the bead, lying in its part's own direction; the corners that round beads leave are filled by the plastic they push aside.
+Judged at the points of a lattice inside the model. A bead counts as a bar as wide and as high as itself, in its part's printing
+direction; the corners that round beads leave are filled by the plastic they push aside.
 """
 
 import numpy as np
@@ -27,8 +27,8 @@ def of_model(run: DryRun) -> Indices:
 
 
 def filled_share(run: DryRun, mesh: Mesh, points: int = POINTS) -> float:
-    """0 to 1: how much of the closed model, in the workpiece frame, the beads of its own fill (support and skirt aside); 1 where
-    it has no inside. points: at about how many that is judged."""
+    """0 to 1: the share of the closed model, in the workpiece frame, that its beads fill (support and skirt aside); 1 where it
+    has no inside. points: number of lattice points, about."""
     step_mm = float(np.cbrt(max(mesh.volume_mm3, 1e-9) / points))
     low, high = mesh.bounds_mm
     filled, which = np.zeros(np.ceil((high - low) / step_mm - 0.5).astype(np.int64), np.bool_), of_model(run)

@@ -72,7 +72,7 @@ def _until_standstill(program: ParsedProgram, begin: int) -> slice:
 
 
 def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
-    """(n,) before which rows the machine stands still, whatever comes after."""
+    """(n,) rows before which the machine always stops."""
     stop = np.zeros(len(program.line), dtype=np.bool_)
     stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
     return stop

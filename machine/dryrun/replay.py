@@ -54,8 +54,8 @@ class Contacts(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What the rows of one pose meet: rows from `first` on are its own, and beads from `first_bead` on; support keeps `gap` away,
-    the plate is a x + b y + c; head: what may run into all of that.
+    """The surroundings of the moves at one pose: rows from `first` on belong to it, and beads from `first_bead` on; support keeps
+    `gap` away, the plate is a x + b y + c; head: the bodies that may collide with them.
     """
 
     field: Field
@@ -80,7 +80,7 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     raft_gap_mm = process.raft_contact_distance_mm if process.raft_layers else 0.0
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm, raft_gap_mm)
     width_mm, height_mm = deposited.sizes.max(axis=0)
-    below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # what is lower under all moves of a run is not met
+    below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # lower plastic does not matter to the moves of a run
     for run, pose in pose_runs(program):
         before, after = (int(at) for at in np.searchsorted(deposited.rows, (run.start, run.stop)))
         turned += before

@@ -24,7 +24,7 @@ class Stop:
 
     @property
     def option(self) -> str:
-        """What a person has written."""
+        """The stop as a command-line option."""
         at = f"{f'{self.height_mm:.6f}'.rstrip('0').rstrip('.')}mm" if self.layer is None else str(self.layer)
         return f"{'--filament-change' if self.change else '--pause'} {self.part}:{at}"
 

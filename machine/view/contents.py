@@ -90,7 +90,7 @@ def compared(header: dict[str, Any], alternatives: Sequence[Alternative]) -> dic
 
 
 def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, Any]:
-    """What every page tells; the empty values are those of a page without paths."""
+    """The header of every page; the empty values are those of a page without paths."""
     material = profile.material
     return {
         "format": FORMAT,
@@ -135,7 +135,7 @@ def _parts(
 
 
 def _pose(parsed: ParsedProgram, rows: NDArray[np.int64]) -> dict[str, float]:
-    """Where the table stands for most of the rows: at the end of the middle one."""
+    """The table's pose for most of the rows: at the end of the middle one."""
     if not len(rows):
         return {}
     tilt, turn = parsed.end[rows[len(rows) // 2], 3:].tolist()

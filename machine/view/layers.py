@@ -1,4 +1,4 @@
-"""Layers: which rows of a program belong to one layer, as its comments tell or else as the heights of its strokes show."""
+"""Layers: which rows of a program belong to one layer, by its comments or else by the heights of its strokes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +18,7 @@ FEWEST = 4  # strokes that a helix takes to rise by a layer, at least: what goes
 class Layers:
     """number: (n,) for the rows of a program, 0 before the first. first, rows: (l,) where layers begin and how long they are.
 
-    by: "comments", or "heights" where the text does not tell its layers.
+    by: "comments", or "heights" in a text without layer comments.
     """
 
     number: NDArray[np.int64]
@@ -42,7 +42,7 @@ def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
 def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.int64]:
     """(n,) numbers of layers: a level stroke at another height begins one, and so does a rise of a layer's height in a helix.
 
-    What is laid while the table turns has no height of its own: it is one layer, or goes on with the one before.
+    Beads laid while the table turns have no height of their own: they are one layer, or continue the one before.
     """
     number = np.zeros(len(program.line), dtype=np.int64)
     number[np.flatnonzero((program.kind == MoveKind.ROTATE) & (program.e_mm > 0.0))[:1]] = 1

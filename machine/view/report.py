@@ -76,7 +76,7 @@ def print_report(
 ) -> dict[str, Any]:
     """The report of a whole print. parts: sums_of_parts(); joints: of a known model; alternatives: the model in one part.
 
-    known: the machine is no guess; ours: the file was made with this profile, else its settings are not told.
+    known: the machine is no guess; ours: the file was made with this profile, else its settings are left out.
     """
     tables = [_parts(program, parts, profile), _kinds(program.run, profile, "" if known else profile.machine.name)]
     tables += _joints(joints) or _interfaces(program.run)
@@ -110,7 +110,7 @@ def _solid(part: Part, profile: Profile) -> Row:
 
 
 def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) -> Table:
-    """Each part with its layers, time and material; what its solid is where the program came from a model."""
+    """Each part with its layers, time and material; with its shape where the program came from a model."""
     decomposition = program.decomposition
     solids = {part.index: _solid(part, profile) for part in decomposition.parts} if decomposition is not None else {}
     interfaces = program.interface_mm3
@@ -125,7 +125,7 @@ def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) 
 
 
 def _joints(joints: Sequence[Joint]) -> list[Table]:
-    """Every joint: its area and seam, how its first layer lies where it is sliced, and what it bears."""
+    """Every joint: its area and seam, the contact of its first layer where it is sliced, and its strength."""
     sliced = any(joint.contact_share is not None for joint in joints)
     weakest, rows = weakest_of(joints), []
     for joint in joints:
@@ -140,7 +140,7 @@ def _joints(joints: Sequence[Joint]) -> list[Table]:
 
 
 def _interfaces(run: DryRun) -> list[Table]:
-    """What G-code alone tells of where its parts stand on others."""
+    """The joints of a program without a model, from its G-code alone."""
     rows = [[str(face.part), f"{face.area_mm2:.1f}", *_laid(face.contact, face.over_room)] for face in run.interfaces]
     return [_table("Joints", ["part", "mm²", *LAID], rows, [CONTACT])] if rows else []
 
@@ -168,9 +168,9 @@ def _front(decomposition: Decomposition) -> list[Table]:
 
 
 def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
-    """Time and material by what is printed, then the ways between, then waiting; they add up to the whole print.
+    """Time and material by kind of line, then of travels, then of waits; they add up to the whole print.
 
-    guess: name of the machine whose speeds were taken where the file tells none.
+    guess: name of the machine whose speeds were used where the file names none.
     """
     program, kind = run.program, page_kinds(run.program)
     groups: list[tuple[str, NDArray[np.bool_]]] = [
@@ -242,7 +242,7 @@ def _names(profile: Profile) -> list[Row]:
 
 
 def _assumptions(profile: Profile, known: bool) -> list[Row]:
-    """The same of a file that does not tell them."""
+    """The rows of _names() for a file that does not name them."""
     machine = profile.machine.name if known else f"{UNTOLD}: limits, clearance and the plate were not judged"
     return [["machine", machine], ["material", f"{UNTOLD}: weights as of {profile.material.name}"]]
 

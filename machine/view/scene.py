@@ -47,7 +47,7 @@ def _marks(part: Part, profile: Profile) -> NDArray[np.int64]:
 
 
 def solids(decomposition: Decomposition, profile: Profile, joints: Sequence[Joint]) -> list[dict[str, Any]]:
-    """What the header tells of each part's pose, base plane, joint and place in the surfaces."""
+    """Records of each part for the header: pose, base plane, joint and place in the surfaces."""
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
     by_part = {joint["part"]: joint for joint in joint_values(joints)}
     records, vertex, face = [], 0, 0
@@ -106,12 +106,12 @@ def _axis(axis: RotaryAxis) -> dict[str, Any]:
 
 
 def relevant_findings(run: DryRun, known: bool) -> list[Finding]:
-    """The findings in their order; known: False leaves out what only the right machine could tell."""
+    """The findings in their order; known: False leaves out those that need the right machine."""
     return [finding for finding in run.findings if known or finding.code not in MACHINES_OWN]
 
 
 def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[np.int64]) -> list[dict[str, Any]]:
-    """The relevant findings as the page has them; row: where it is shown, -1 for a finding about the whole."""
+    """The relevant findings for the page; row: the row that shows it, -1 for a finding about the whole."""
     program = run.program
     records = []
     for finding in relevant_findings(run, known):

@@ -1,4 +1,4 @@
-"""Codes: what each G and M code and each macro of Klipper does to the reader; straight moves, arcs and turns become rows."""
+"""Codes: the effect of each G and M code and of each macro of Klipper on the reader; moves, arcs and turns become rows."""
 
 import re
 from collections.abc import Mapping
@@ -276,7 +276,7 @@ def _wait(reader: Reader) -> None:
 
 
 def _accelerate(reader: Reader, words: Words) -> None:
-    """M204: P while filament moves, T while it stands still, S both; what is not above 0 changes nothing."""
+    """M204: P for moves that push filament, T for others, S for both; values that are not above 0 change nothing."""
     for letter, value in words.items():
         if value > 0 and letter in "PS":
             reader.printing = value * reader.modes.unit_mm
@@ -285,7 +285,7 @@ def _accelerate(reader: Reader, words: Words) -> None:
 
 
 def _override(reader: Reader, name: str, words: Words) -> None:
-    """M220, M221: S percent of every feed, of all filament; what is not above 0 changes nothing."""
+    """M220, M221: S percent of every feed, of all filament; a value that is not above 0 changes nothing."""
     percent = words.get("S", 0.0)
     if percent > 0 and name == "M220":
         reader.feed_share = percent / 100.0

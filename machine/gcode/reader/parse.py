@@ -80,7 +80,7 @@ def _line(reader: Reader, line: str) -> None:
 
 
 def _remark(reader: Reader, text: str) -> None:
-    """What a comment says, the sign taken off: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
+    """Apply a comment, without its sign: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
     text = text.strip()
     if begins_layer(text):
         reader.layer += 1
@@ -116,7 +116,7 @@ def _positive(text: str) -> float:
 
 
 def _check_condition(reader: Reader, line: str, command: str) -> None:
-    """Refuse a move or a mode below `if`, `else` or `while`: only the firmware knows whether it is done, and how often."""
+    """Refuse a move or a mode below `if`, `else` or `while`: only the firmware knows whether and how often it runs."""
     spread, name = line.expandtabs(4), command_name(command)
     indent = len(spread) - len(spread.lstrip())
     if reader.condition is not None and indent <= reader.condition:
@@ -198,7 +198,7 @@ def _name(letter: str, value: float) -> str:
 
 
 def _program_of(reader: Reader) -> ParsedProgram:
-    """All that a reader has read."""
+    """The program that a reader has read."""
     columns, count = reader.columns, reader.rows
     begins, remark = columns.starts if len(columns.starts) else columns.places, columns.remark_rows[: reader.remarks].T
     program = ParsedProgram(
@@ -236,7 +236,7 @@ def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader
 
 
 def _feed_length(change: Floats, largest: bool = False) -> Floats:
-    """(n,) what F counts along (n, 6) changes, by the rule of NIST RS274.
+    """(n,) lengths that F refers to along (n, 6) changes, by the rule of NIST RS274.
 
     largest: of a pure turn only the axis that goes farthest (Klipper).
     """
@@ -258,7 +258,7 @@ def _feeds(given: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floa
 
 
 def _turn_starts(program: ParsedProgram, followed: Indices) -> NDArray[np.bool_]:
-    """(n,) False for a row that only goes on with the turn of the row before: the head stays, the direction too."""
+    """(n,) False for a row that continues the turn of the row before, with the head at rest and in the same direction."""
     start, end = program.start, program.end
     turn = end[:, 3:] - start[:, 3:]
     size = np.hypot(turn[:, 0], turn[:, 1])

@@ -1,4 +1,4 @@
-"""Guard: who is answered here: only pages of this server, under a name of this computer, by an address that holds the token.
+"""Guard: only pages of this server are answered, under a name of this computer, by an address that holds the token.
 
 Other users of this computer reach its ports too, so the address is secret. A page from elsewhere could reach the server by the
 person's own browser: its Origin is refused, and a name of its own that points here (DNS rebinding) is no name of this computer.
