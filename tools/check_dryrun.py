@@ -14,7 +14,7 @@ from time import process_time
 
 from machine.cli.cli import main as tiltprint
 from machine.dryrun import dry_run
-from machine.dryrun.conformity.agreement import agreement
+from machine.dryrun.agreement import agreement
 from machine.pipeline.embedded_profile import read_embedded_profile
 from mdp.read import read_mesh
 from profiles.profile import load

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
-from machine.dryrun.conformity.agreement import agreement
+from machine.dryrun.agreement import agreement
 from machine.link.stream import print_lines
 from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.requests import ModelRequest

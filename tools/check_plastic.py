@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.dryrun.balance.interfaces import Interface, interfaces
 from machine.dryrun.dryrun import dry_run
+from machine.dryrun.interfaces import Interface, balance_of, interfaces
 from machine.pipeline.embedded_profile import read_embedded_profile
 from machine.pipeline.pictures import write_png
 from profiles.profile import load
@@ -44,8 +44,9 @@ def row(name: str, face: Interface) -> str:
     told = np.isfinite(ratio)
     over, under = (float(bad.sum()) / max(int(told.sum()), 1) for bad in (ratio[told] > MOST, ratio[told] < LEAST))
     held, inside = wall_edges(face)
+    sums = balance_of(face)
     cells = [
-        name, face.part, f"{face.area_mm2:.1f}", f"{100 * face.contact:.1f}", f"{100 * face.over_room:.0f}", f"{100 * over:.0f}",
+        name, face.part, f"{sums.area_mm2:.1f}", f"{100 * sums.contact:.1f}", f"{100 * sums.over_room:.0f}", f"{100 * over:.0f}",
         f"{100 * under:.0f}", f"{100 * (1.0 - held.mean()):.1f}", f"{np.median(inside):.2f}", f"{np.quantile(inside, 0.95):.2f}",
     ]  # fmt: skip
     return "| " + " | ".join(str(cell) for cell in cells) + " |"

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from machine.dryrun.balance.interfaces import AT_THE_EDGE, NO_PART, interfaces
 from machine.dryrun.dryrun import DryRun, dry_run
+from machine.dryrun.interfaces import AT_THE_EDGE, NO_PART, interfaces
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram
 from machine.kinematics.table import shift, workpiece_points
 from machine.pipeline.choice import pricing

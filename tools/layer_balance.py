@@ -11,8 +11,8 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.balance.columns import Bars, Lattice, Mask, laid, lattice_over
-from machine.dryrun.balance.interfaces import Interface
+from machine.dryrun.columns import Bars, Lattice, Mask, laid, lattice_over
+from machine.dryrun.interfaces import Interface
 from machine.dryrun.strokes import Beads
 from machine.gcode.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices

@@ -1,7 +1,7 @@
 """The dry run: any G-code read back through the machine's kinematics: timeline, findings, deposited plastic.
 
-`dry_run` plays the lines, `summary` has its figures for `--json`; `conformity.agreement` holds the plastic against the model,
-`starvation.find_starvation` a slow line against the moves, `timeline.Timeline` tells where any line of the program is.
+`dry_run` plays the lines, `summary` has its figures for `--json`; `agreement.agreement` holds the plastic against the model,
+`starvation.find_starvation` a slow line against the moves, `dryrun.Timeline` tells where any line of the program is.
 """
 
 from machine.dryrun.dryrun import DryRun, dry_run, summary

@@ -142,7 +142,7 @@ def _ends(segments: Floats) -> tuple[Floats, Floats]:
 
 
 def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> Iterator[Finding]:
-    """One turn of the table, swept: no pose is farther from a tried one than what its gaps leave room for.
+    """One turn of the table, swept: poses are tried so densely that the gaps at two neighbours cover the poses between them.
 
     Between two poses every point of what turns moves, against the tip, by at most `_way_mm`; where the gaps at both ends do not
     leave half of that, the pose between them is tried too, until the way is MOST_LEFT_MM. What MOST_POSES leave open is said.
@@ -156,7 +156,7 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
         return Pose(float(tilt), float(turn))
 
     def room(share: float, most: float) -> float:
-        """How much more than needed is left at a share of the turn, at most `most`; what is too near is noted."""
+        """Spare gap at a share of the turn, at most `most`; bodies that come too near are noted."""
         pose = pose_at(share)
         left, met = _room(machine, printed, pose, start[:3] + share * (end[:3] - start[:3]), most)
         for meeting, gap in met.items():
@@ -206,7 +206,7 @@ def _way_mm(start: Floats, end: Floats, printed: Printed, machine: Machine) -> f
 
 
 def _room(machine: Machine, printed: Printed, pose: Pose, tip: Floats, most: float) -> tuple[float, dict[tuple[str, str], float]]:
-    """By how much all gaps in one pose exceed what is needed (at most `most`), and those that do not: (body, solid) -> mm."""
+    """Spare gap in one pose (at most `most`), and the gaps that are too small: (body, solid) -> mm."""
     normal = rotation(machine, pose) @ UP
     met: dict[tuple[str, str], float] = {}
     left, head, around = most, bodies(machine), directions(normal)

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, extrusion, heat, layering, motion, own_comments, placement, sequence
-from machine.dryrun.balance import interfaces
-from machine.dryrun.balance.interfaces import InterfaceBalance
+from machine.dryrun import clearance, extrusion, heat, interfaces, layering, motion, own_comments, placement, sequence
 from machine.dryrun.findings import Finding
+from machine.dryrun.interfaces import InterfaceBalance, balance_of
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
 from machine.gcode.lines import Lines
@@ -29,10 +28,10 @@ MOST_MM = 10_000.0  # five times what the largest printers reach
 
 @dataclass(frozen=True, eq=False)
 class DryRun:
-    """What a G-code text does on a machine.
+    """The result of a dry run: the program, its times, plastic and findings.
 
-    times_s: (n,) seconds of each row of program; waits: line and seconds of what G4 tells and of heating in the midst of the
-    print (what comes before it, and homing, are not counted).
+    times_s: (n,) seconds of each row of program; waits: line and seconds of each G4 and of heating during the print (heating
+    before it and homing are not counted).
     deposited: its plastic. contacts: what lay under each row; None where it was known before what there is to find. interfaces:
     where parts stand on others; none where contacts are not known.
     """
@@ -74,7 +73,7 @@ class DryRun:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """The findings that a print is refused for."""
+        """The findings for which a print is refused."""
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
@@ -91,7 +90,7 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
         touching = ahead(_touching, program, deposited, profile)  # half of all work, on a core of its own
-        balances = tuple(map(InterfaceBalance.of, interfaces.interfaces(program, deposited, profile)))
+        balances = tuple(map(balance_of, interfaces.interfaces(program, deposited, profile)))
         moving, of_program = _findings(text, program, deposited, balances, profile)
         times_s = motion.times_s(program, machine)
         contacts, touches = touching.result()
@@ -114,7 +113,7 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
 
 
 def _touching(program: ParsedProgram, deposited: Beads, profile: Profile) -> tuple[Contacts, list[Finding]]:
-    """What lies under each row, and what is wrong with that."""
+    """The contacts of each row, and the findings about them."""
     contacts = replay(program, deposited, profile)
     return contacts, [*placement.findings(program, deposited, contacts), *layering.findings(program, deposited, contacts)]
 
@@ -122,7 +121,7 @@ def _touching(program: ParsedProgram, deposited: Beads, profile: Profile) -> tup
 def _findings(
     text: Sequence[str], program: ParsedProgram, deposited: Beads, balances: Sequence[InterfaceBalance], profile: Profile
 ) -> tuple[list[Finding], list[Finding]]:
-    """What is wrong with the moves of a program, and with the rest of it."""
+    """The findings about the moves of a program, and about the rest of it."""
     moving = [*motion.findings(program, profile.machine), *clearance.findings(program, deposited, profile.machine)]
     of_program = [
         *extrusion.findings(program, deposited, profile),
@@ -137,13 +136,42 @@ def _findings(
 
 
 def _refuse_far_places(program: ParsedProgram) -> None:
-    """What is tried along a move takes as long as the move: one of a damaged number would be tried for days."""
+    """Refuse a damaged coordinate: checks sample along a move, and one so long would take days."""
     if len(program.line) and np.abs(program.bounds[:, :3]).max() > MOST_MM:
         far = np.abs(program.end[:, :3])
         row = int(np.flatnonzero((far > MOST_MM).any(axis=1))[0])
         axis = int(far[row].argmax())
         place = f"{'XYZ'[axis]} comes to {program.end[row, axis]:g} mm"
         raise GcodeError(f"line {program.line[row]}: {place}: no printer reaches beyond {MOST_MM:g}")
+
+
+class Timeline:
+    """Where the axes stand after any line of a program, how long the rest takes, how many layers a part has."""
+
+    def __init__(self, run: DryRun) -> None:
+        program, self._letters, self._waits = run.program, run.letters, run.waits
+        self._line, self._ends = program.line, program.end
+        self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
+        laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
+        self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
+
+    def at(self, file_line: int) -> dict[str, float]:
+        """Where the axes stand after a line of the program, by their letters, mm and deg; {} before the first move."""
+        row = self._rows(file_line) - 1
+        return {} if row < 0 else dict(zip(self._letters, self._ends[row].tolist(), strict=False))
+
+    def remaining_s(self, file_line: int) -> float:
+        """How long moves and waits after a line of the program take; heating before the print and homing are not counted."""
+        waits_s = sum(wait_s for line, wait_s in self._waits if line > file_line)
+        return float(self._done_s[-1] - self._done_s[self._rows(file_line)]) + waits_s
+
+    def layers(self, part: int | None) -> int | None:
+        """Layers of a part."""
+        return None if part is None else self._layers.get(part)
+
+    def _rows(self, file_line: int) -> int:
+        """How many moves there are up to a line."""
+        return int(np.searchsorted(self._line, file_line, side="right"))
 
 
 def retractions(program: ParsedProgram) -> int:

@@ -32,7 +32,7 @@ FEW = 0.03
 
 
 def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
-    """Errors of code extrusion and extruding-travel; a warning of code extrusion where the file tells no widths."""
+    """Errors of code extrusion and extruding-travel; a warning of code extrusion in a file without width comments."""
     if not len(deposited.rows):
         return
     remarks = program.remarks
@@ -68,7 +68,7 @@ class Counted(NamedTuple):
     diameter_mm: float
 
     def plastic(self, which: Indices) -> tuple[Floats, Floats]:
-        """What (j,) of the m beads push, mm3, and what they need."""
+        """Plastic that (j,) of the m beads push and that they need, mm3."""
         rows = self.rows[which]
         pushed = self.program.e_mm[rows]
         pushed *= pi
@@ -79,7 +79,7 @@ class Counted(NamedTuple):
         return pushed, needed
 
     def some(self) -> Iterator[tuple[Indices, Floats, Floats]]:
-        """All that are held against each other, a few at a time: which of the m, and their plastic."""
+        """The counted beads in pieces: which of the m, and their plastic, pushed and needed."""
         for some in pieces(len(self.mine)):
             which = some.start + np.flatnonzero(self.mine[some])
             yield which, *self.plastic(which)
@@ -140,7 +140,7 @@ def _whole_file(beads: Counted, profile: Profile) -> list[Finding]:
 
 
 def _odd(beads: Counted) -> Iterator[Finding]:
-    """Single moves far from the cross-section told, in every part that has a good length of them."""
+    """Single moves far from their stated cross-section, in every part that has at least ODD_MM of them."""
     places, shares = [], []
     for which, pushed, needed in beads.some():
         share = pushed / needed
@@ -205,7 +205,7 @@ def _weighted_median(values: Floats, weights: Floats) -> float:
 
 
 def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> Iterator[Finding]:
-    """Strokes as fast as travels, in a file whose other strokes are slower; a slow machine purges as fast as it goes."""
+    """Strokes as fast as travels, in a file whose other strokes are slower; purges may be as fast on a slow machine."""
     travels = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm == 0.0))
     across = np.hypot(*(program.end[travels] - program.start[travels])[:, :2].T)
     if not (across > ROW_MM).any():

@@ -1,4 +1,4 @@
-"""Findings: what a person must know before a print is started."""
+"""Findings: errors and warnings about a program, and helpers that make them."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ MOST = 20
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing wrong; line, part and layer tell where it shows first (0: the file as a whole, before the first part)."""
+    """An error or a warning; line, part and layer: its first place (0: the file as a whole, before the first part)."""
 
     severity: Severity
     code: str
@@ -30,19 +30,19 @@ class Finding:
 
 @dataclass(frozen=True)
 class KnownFindings:
-    """What a dry run has found of the lines of a digest for a profile."""
+    """The findings of a dry run, with the digest of its lines and its profile."""
 
     digest: str
     profile: Profile
     findings: tuple[Finding, ...]
 
     def of(self, lines: Sequence[str], profile: Profile) -> tuple[Finding, ...] | None:
-        """What a dry run of lines for a profile would find, where they are the very same; None: that is not known."""
+        """The findings for these lines and this profile if they are the same as recorded, else None."""
         return self.findings if profile == self.profile and _digest(lines) == self.digest else None
 
 
 def known_findings(lines: Sequence[str], profile: Profile, findings: Iterable[Finding]) -> KnownFindings:
-    """The findings of a dry run of lines for a profile, to be known of the very same."""
+    """Record the findings of a dry run of lines for a profile."""
     return KnownFindings(_digest(lines), profile, tuple(findings))
 
 
@@ -66,7 +66,7 @@ def at_event(program: ParsedProgram, event: Event, severity: Severity, code: str
 def by_part(
     program: ParsedProgram, places: NDArray[np.int64], rows: NDArray[np.int64] | None = None
 ) -> Iterator[NDArray[np.int64]]:
-    """For every part its own of (m,) places, which are rows themselves or places in rows."""
+    """(m,) places split by part; places are rows, or indices into rows."""
     part = program.remarks.part[program.remark[places if rows is None else rows[places]]]
     for index in np.unique(part):
         yield places[part == index]
@@ -90,8 +90,8 @@ def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:
 
 
 def unless_own(program: ParsedProgram, first: int, last: int) -> tuple[Severity, str]:
-    """How grave it is that something was not told, and what to add: a macro of the machine's own before rows first to last may
-    have done it unseen.
+    """Severity of a missing command, and the words to add: a macro of the machine's own before rows first to last may have done
+    it unseen.
     """
     names = [event.letters for event in program.events if event.code == OWN and first <= event.row <= last]
     return ("warning", f", unless {names[0]} does that") if names else ("error", "")

@@ -24,7 +24,7 @@ ROUNDING_MM = 3e-3  # both ends are written to a thousandth, and a point dropped
 
 
 def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
-    """All findings about heat, fans, flow and the profile; own: the file itself tells that it was made with this material."""
+    """All findings about heat, fans, flow and the profile; own: the file's configuration names this material."""
     return [
         *_cold(program),
         *_left_on(program),
@@ -41,7 +41,7 @@ def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Findin
 def waits(program: ParsedProgram, times_s: Floats, machine: Machine) -> list[tuple[int, float]]:
     """(line, seconds) of every wait for a hotter nozzle in the midst of the print; times_s: (n,) of the rows.
 
-    How long the first one takes is not known: nobody tells how cold the machine was.
+    The length of the first one is unknown, for it depends on how cold the machine was.
     """
     first = int(np.argmax(program.kind == MoveKind.EXTRUDE)) if len(program.kind) else 0
     waited, target_c, from_c, asked = [], 0.0, 0.0, 0
@@ -110,7 +110,7 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
 
 
 def _bed_off(program: ParsedProgram) -> list[Finding]:
-    """The bed switched off while beads are still to come: what is printed lets go of the plate."""
+    """The bed switched off before the last bead: the print would come off the plate."""
     beads = np.flatnonzero(
         (program.kind == MoveKind.EXTRUDE) & (program.remarks.part + program.remarks.layer > 0)[program.remark]
     )
@@ -168,7 +168,7 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Findin
 
 
 def _without_fan(part: int, profile: Profile) -> int:
-    """How many layers of a part are meant to have no fan at first."""
+    """Number of first layers of a part that are printed without fan by intent."""
     process, on_plate = profile.of_part(part).process, profile.material.fan_off_layers
     if part <= 1:
         return on_plate
@@ -210,7 +210,7 @@ def _unknown_commands(program: ParsedProgram) -> list[Finding]:
 
 
 def _replaced_texts(program: ParsedProgram) -> Iterator[Finding]:
-    """Texts for the display with characters that a serial line does not carry, told once."""
+    """Texts for the display with characters that a serial line does not carry; one finding for all."""
     if program.replaced:
         line, command = program.replaced[0]
         message = f"{quote(command)} is sent as {quote(to_ascii(command))}: a serial line carries ASCII only"

@@ -39,9 +39,9 @@ def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> li
 
 
 def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
-    """In every part the first bead whose underside lies above all that was laid before it, by the heights told.
+    """In every part the first bead whose underside lies above all earlier beads, by the heights in comments.
 
-    What stands off by most of a layer may stand on support that ends as high as the part does there: the replay knows.
+    A gap of most of a layer may be above support that ends as high as the part does there: the replay knows.
     """
     sized = (program.remarks.height_mm > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
     rows = deposited.rows[sized[deposited.rows]]
@@ -109,7 +109,7 @@ def _gaps(ends: tuple[Floats, Floats], rows: Indices, remarks: Indices32, told: 
 
 
 def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(k,) which remarks are of the first layer that their part lays beads in, of which another finding tells."""
+    """(k,) which remarks are of the first layer of their part with beads, which another finding covers."""
     (part, layer), laid = program.remarks[:2], np.zeros(len(program.remarks.part), dtype=np.bool_)
     laid[program.remark[rows]] = True
     first = np.full(int(part.max(initial=0)) + 1, np.iinfo(np.int64).max)

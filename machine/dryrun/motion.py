@@ -10,11 +10,9 @@ from machine.firmware import dialect_of
 from machine.gcode.commands import EVERY
 from machine.gcode.reader.parsed import AT_ONCE, MoveKind, ParsedProgram, pieces
 from machine.planning.limits import ROUNDING, axis_limits
-from mdp.kernels.arrays import flags
-from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.machine import Machine
-from slicer.estimate.timing import TINY, axis_speeds, lengths, move_times
+from slicer.estimate.timing import axis_speeds, lengths, move_times
 
 STANDSTILLS = frozenset(name for name, command in EVERY.items() if command.waits or command.homes)
 SLACK = 1.001
@@ -22,7 +20,6 @@ ROUNDING_MM_S = 1.0 / 60.0  # F is written as a whole number
 STILL = 3  # the measure of what does not move
 WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
 LEVEL_DEG = 0.01
-ROUNDED_UP = 1.0 + 1e-12
 TURNED_DEG = 1e-3
 
 
@@ -75,43 +72,29 @@ def _until_standstill(program: ParsedProgram, begin: int) -> slice:
 
 
 def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
-    """(n,) before which rows the machine stands still, whatever comes after."""
+    """(n,) rows before which the machine always stops."""
     stop = np.zeros(len(program.line), dtype=np.bool_)
     stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
     return stop
 
 
 def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
-    names = [*axis_limits(machine), "E"]
+    """In every part the axes that are asked for more than they can do: the firmware slows such moves down."""
     most = axis_speeds(machine)
-    allowed = most * SLACK + ROUNDING_MM_S
-    fast = np.flatnonzero(_are_fast(program.start, program.end, program.e_mm, program.feed, allowed, WRITTEN))
-    change = program.changes(fast)
-    way = np.maximum(lengths(change)[0], 1e-9)
-    speeds = np.maximum(np.abs(change) - WRITTEN, 0.0) / way[:, None] * (program.feed[fast] / 60.0)[:, None]
-    for axis, letter in enumerate(names):
+    allowed, fast, asked = most * SLACK + ROUNDING_MM_S, [np.zeros(0, np.int64)], [np.zeros((0, 6))]
+    for some in pieces(len(program.line)):
+        change = program.changes(some)
+        way = np.maximum(lengths(change)[0], 1e-9)
+        speeds = np.maximum(np.abs(change) - WRITTEN, 0.0) / way[:, None] * (program.feed[some] / 60.0)[:, None]
+        over = (speeds > allowed).any(axis=1)
+        fast.append(some.start + np.flatnonzero(over))
+        asked.append(speeds[over])
+    rows, speeds = np.concatenate(fast), np.concatenate(asked)
+    for axis, letter in enumerate([*axis_limits(machine), "E"]):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
         message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most[axis]:g} {unit} (moves: {{count}})"
         too_fast = speeds[:, axis] > allowed[axis]
-        yield from per_part(program, fast[too_fast], speeds[too_fast, axis], message, code="axis-speed", severity="warning")
-
-
-@kernel
-def _are_fast(start: Floats, end: Floats, e_mm: Floats, feed: Floats, most: Floats, written: Floats) -> NDArray[np.bool_]:
-    """(n,) which rows may ask an axis for more than its most, of X Y Z tilt turn E."""
-    fast = flags(len(feed))
-    for row in range(len(feed)):
-        x, y, z = end[row, 0] - start[row, 0], end[row, 1] - start[row, 1], end[row, 2] - start[row, 2]
-        way = np.sqrt(x * x + y * y + z * z)
-        if way <= TINY:
-            way = np.hypot(end[row, 3] - start[row, 3], end[row, 4] - start[row, 4])
-        if way <= TINY:
-            way = abs(e_mm[row])
-        share = feed[row] / 60.0 * ROUNDED_UP / max(way, TINY)
-        for axis in range(6):
-            change = abs(end[row, axis] - start[row, axis]) if axis < 5 else abs(e_mm[row])
-            fast[row] = fast[row] or (change - written[axis]) * share > most[axis]
-    return fast
+        yield from per_part(program, rows[too_fast], speeds[too_fast, axis], message, code="axis-speed", severity="warning")
 
 
 def _homing(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
@@ -133,23 +116,15 @@ def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
     """The first move of a linear axis that has been neither homed nor given a position."""
     events = sorted((e for e in program.events if e.code in ("G28", "G92")), key=lambda e: e.row)
     for axis, letter in enumerate("XYZ"):
-        first = _first_moved(program, axis)
+        moved = np.abs(program.end[:, axis] - program.start[:, axis]) > 1e-9
+        first = int(moved.argmax()) if moved.any() else len(moved)
         homed = [
             e for e in events if e.row <= first and (letter in e.letters or (e.code == "G28" and not set(e.letters) & set("XYZ")))
         ]
-        if first < len(program.line) and not homed:
+        if first < len(moved) and not homed:
             severity, unless = unless_own(program, 0, first)
             return [at_row(program, first, severity, "not-homed", f"{letter} moves before it is homed{unless}")]
     return []
-
-
-def _first_moved(program: ParsedProgram, axis: int) -> int:
-    """The first row in which an axis moves; the number of rows where none does."""
-    for some in pieces(len(program.line)):
-        moved = np.abs(program.end[some, axis] - program.start[some, axis]) > 1e-9
-        if moved.any():
-            return int(some.start + moved.argmax())
-    return len(program.line)
 
 
 def _turning_strokes(program: ParsedProgram, machine: Machine) -> Iterable[Finding]:

@@ -1,6 +1,6 @@
-"""Own comments: what a file of ours tells of itself in comments, held against its own moves and against the profile.
+"""Own comments: the comments of a file written by this program, compared with its moves and with the profile.
 
-Its configuration and poses say whether it was made for this machine, its parts' totals whether it was changed since.
+Its configuration and poses show whether it was made for this machine, its parts' totals whether it was changed since.
 """
 
 import re
@@ -65,7 +65,7 @@ def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
 
 
 def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
-    """Parts of which beads are laid at another pose than their ;POSE: comment tells."""
+    """Parts whose beads are laid at another pose than that of their ;POSE: comment."""
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
     beads = (program.kind == MoveKind.EXTRUDE) & (program.remarks.part > 0)[program.remark]
     for place in Lines.of(lines).beginning_with(";POSE:"):
@@ -86,7 +86,7 @@ def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> It
 
 
 def _part_totals(program: ParsedProgram) -> Iterator[Finding]:
-    """Parts whose beads do not come to what the file tells of them, and parts that are missing."""
+    """Parts whose beads differ from their ;CONTENTS: comment, and parts that are missing."""
     part, layer = program.remarks[:2]
     beads = (program.kind == MoveKind.EXTRUDE) & (part > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
     laid = np.zeros(len(part), np.bool_)
@@ -99,7 +99,7 @@ def _part_totals(program: ParsedProgram) -> Iterator[Finding]:
 
 
 def _missing(program: ParsedProgram, printed: set[int]) -> list[Finding]:
-    """The parts of which nothing is printed, of those that `;PART:1 of 3` tells."""
+    """The parts announced by `;PART:1 of 3` of which nothing is printed."""
     absent = [index for index in range(1, program.announced + 1) if index not in printed]
     if not absent:
         return []
@@ -110,7 +110,7 @@ def _missing(program: ParsedProgram, printed: set[int]) -> list[Finding]:
 
 
 def _of_part(program: ParsedProgram, rows: NDArray[np.int64], layers: int, totals: PartTotals) -> Iterator[Finding]:
-    """What differs in a part: its layers, its filament, where it lies."""
+    """Differences of a part: its layers, its filament, its place."""
     if layers != totals.layers:
         message = f"beads are laid in {layers} layers of part {totals.part}, the file tells of {totals.layers}"
         yield at_row(program, int(rows[-1]), "error", "contents", message)

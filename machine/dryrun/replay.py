@@ -54,8 +54,8 @@ class Contacts(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What the rows of one pose meet: rows from `first` on are its own, and beads from `first_bead` on; support keeps `gap` away,
-    the plate is a x + b y + c; head: what may run into all of that.
+    """The surroundings of the moves at one pose: rows from `first` on belong to it, and beads from `first_bead` on; support keeps
+    `gap` away, the plate is a x + b y + c; head: the bodies that may collide with them.
     """
 
     field: Field
@@ -73,24 +73,22 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     if not len(deposited.rows):
         return contacts
     strokes, moves, head = strokes_of(program), moves_of(program, deposited, profile), head_of(machine)
-    begins, ups, turned = list[int](), list[Floats](), 0
+    turned = 0
     many_turns = np.count_nonzero(program.kind == MoveKind.ROTATE) > FEW_TURNS
     segments = deposited.segments() if many_turns else None  # computed once for all runs; else for each, which saves memory
     process = profile.process
     raft_gap_mm = process.raft_contact_distance_mm if process.raft_layers else 0.0
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm, raft_gap_mm)
     width_mm, height_mm = deposited.sizes.max(axis=0)
-    below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # what is lower under all moves of a run is not met
+    below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # lower plastic does not matter to the moves of a run
     for run, pose in pose_runs(program):
         before, after = (int(at) for at in np.searchsorted(deposited.rows, (run.start, run.stop)))
-        begins.append(before)
-        ups.append(rotation(machine, pose)[2])
         turned += before
         if turned > MOST_TURNED:
             return contacts._replace(untested_row=run.start)
         if after:
             least_mm = min(float(side[run, 2].min()) for side in (program.start, program.end)) - below_mm
-            field = _field(deposited, segments, (before, after), (pose, least_mm), (np.array(ups), np.array(begins)), machine)
+            field = _field(deposited, segments, (before, after), (pose, least_mm), machine)
             about = Surroundings(field, head, run.start, before, gap, _plate(machine, pose))
             _replay_run(moves, strokes, about, contacts, np.zeros((run.stop - run.start, 2)))
             del field, about  # before there is another one
@@ -98,16 +96,11 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
 
 
 def _field(
-    deposited: Beads,
-    segments: Floats | None,
-    laid: tuple[int, int],
-    place: tuple[Pose, float],
-    directions: tuple[Floats, NDArray[np.int64]],
-    machine: Machine,
+    deposited: Beads, segments: Floats | None, laid: tuple[int, int], place: tuple[Pose, float], machine: Machine
 ) -> Field:
     """The field of a run at one pose with all earlier plastic in it that the run may meet. segments: of all beads, None where
     they are computed here. laid: the number of beads before the run and after it. place: its pose, and the height up to which
-    plastic is left out. directions: those in which runs print, and the bead with which each begins.
+    plastic is left out.
     """
     (before, after), (pose, least_mm) = laid, place
     turn = np.column_stack([rotation(machine, pose), shift(machine, pose)])
@@ -122,10 +115,9 @@ def _field(
     for some, box in deposited.boxes(before):
         if turned_box(box, turn)[1, 2] + thick_mm < least_mm:
             continue
-        run_of = np.searchsorted(directions[1], np.arange(some.start, some.stop), side="right") - 1
         own = deposited.segments(some) if segments is None else segments[some]
         mine = (own, deposited.rows[some], deposited.sizes, deposited.size[some])
-        _lay_turned(*mine, directions[0][run_of], turn, least_mm, field)
+        _lay_turned(*mine, deposited.directions(some), turn, least_mm, field)
     return highest_first(field)
 
 

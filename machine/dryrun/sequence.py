@@ -54,7 +54,7 @@ def _layers(program: ParsedProgram) -> Iterator[Finding]:
 def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     """Filament pushed at standstill that was not pulled back before, and beads begun with filament still pulled back.
 
-    Nothing is said of a program that never pulls back; what the start block does is its own affair.
+    A program that never retracts and the moves of the start block are left out.
     """
     e, material = program.e_mm, profile.material
     counted = (program.remarks.part + program.remarks.layer > 0)[program.remark]

@@ -6,7 +6,7 @@ while fewer than half of the places are taken, so that the sender catches up; th
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from machine.gcode.line_text import is_plain_move, read_line
 from machine.gcode.reader.parsed import Indices32, ParsedProgram
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, no_nrt
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Indices
 from profiles.machine import Machine
 from slicer.estimate.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 
@@ -30,17 +30,6 @@ GREETING = 3  # lines sent before the program
 FREE_BAUD = 1e12  # a line that takes no time
 OK_BYTES = float(len("ok N12345 P15 B3\n"))  # during which the printer reads nothing
 NONE = -1
-
-
-@dataclass(frozen=True, eq=False)
-class Feeding:
-    """What a line does to a program's n rows. slowed, stopped: (n,) whether the printer slowed the move down since too few were
-    planned, and whether it had run dry before it although it need not have stood still; time_s: until the last one is over.
-    """
-
-    slowed: NDArray[np.bool_]
-    stopped: NDArray[np.bool_]
-    time_s: float
 
 
 class SerialLine(NamedTuple):
@@ -64,16 +53,14 @@ class Planned(NamedTuple):
 
 def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: int) -> DryRun:
     """The dry run with a finding for every part that a serial line at a baud rate starves."""
-    slow, free = (feeding(run.program, lines, machine, rate) for rate in (baud, FREE_BAUD))
-    rows = (slow.slowed & ~free.slowed) | (slow.stopped & ~free.stopped)
-    problems = _findings(run.program, rows, slow.stopped, run.times_s, baud)
+    (slow, _), (free, _) = (feeding(run.program, lines, machine, rate) for rate in (baud, FREE_BAUD))
+    rows = np.flatnonzero((slow & ~free).any(axis=0))
+    problems = _findings(run.program, rows, slow[1], run.times_s, baud)
     return replace(run, findings=tuple(sorted((*run.findings, *problems), key=lambda finding: (finding.severity, finding.line))))
 
 
-def _findings(
-    program: ParsedProgram, rows: NDArray[np.bool_], stopped: NDArray[np.bool_], times_s: Floats, baud: int
-) -> Iterator[Finding]:
-    for mine in by_part(program, np.flatnonzero(rows)):
+def _findings(program: ParsedProgram, rows: Indices, stopped: NDArray[np.bool_], times_s: Floats, baud: int) -> Iterator[Finding]:
+    for mine in by_part(program, rows):
         needed = 1.0 / max(float(np.median(times_s[mine])), TINY)
         stops = int(stopped[mine].sum())
         message = (
@@ -83,8 +70,11 @@ def _findings(
         yield at_row(program, int(mine[0]), "warning", "starvation", message)
 
 
-def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> Feeding:
-    """Play a program's lines over a line and its blocks in the printer's planner."""
+def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> tuple[NDArray[np.bool_], float]:
+    """Play a program's lines over a serial line and its blocks in the printer's planner.
+
+    (2, n) of each row, whether the printer slowed the move down since too few were planned, and whether it had run dry before it
+    although it need not have stood still; seconds until the last move is over."""
     accelerations = program.remarks.acceleration[program.remark]
     blocks, moving = blocks_of(program.changes(), program.feed / 60.0, standstills(program), machine, accelerations)
     own, ahead = _bytes(lines, program.line[moving])
@@ -93,7 +83,7 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
     time_s = _play(blocks, line, machine.junction_speed_mm_s, flags[0], flags[1])
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
     whole[:, moving] = flags
-    return Feeding(whole[0], whole[1], float(time_s))
+    return whole, float(time_s)
 
 
 def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:

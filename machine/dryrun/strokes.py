@@ -13,6 +13,7 @@ from machine.gcode.reader.parsed import Indices32, MoveKind, ParsedProgram, piec
 from machine.kinematics.table import goes_on, workpiece_segments
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
+from mdp.pose import Pose, rotation
 from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.bead import infill_cell_mm, support_cell_mm
@@ -48,6 +49,20 @@ class Beads:
         """(k, 2, 3) ends of some beads in the workpiece frame, mm."""
         return workpiece_segments(self.machine, self.program.start, self.program.end, self.rows[some])
 
+    def directions(self, some: Indices | slice = slice(None)) -> Floats:
+        """(k, 3) printing directions of some beads in the workpiece frame."""
+        begins, ups = self._runs
+        which = np.arange(*some.indices(len(self.rows))) if isinstance(some, slice) else some
+        printing: Floats = ups[np.searchsorted(begins, which, side="right") - 1]
+        return printing
+
+    @cached_property
+    def _runs(self) -> tuple[Indices, Floats]:
+        """(j,) the first beads of runs at one pose, and (j, 3) the printing direction of each run."""
+        begins = np.flatnonzero(np.append(True, self.program.turned_between(self.rows))[: len(self.rows)])
+        poses = self.program.end[self.rows[begins], 3:].tolist()
+        return begins, np.array([rotation(self.machine, Pose(*pose))[2] for pose in poses]).reshape(-1, 3)
+
     @property
     def width_mm(self) -> Floats:
         """(m,) widths."""
@@ -82,9 +97,8 @@ class Beads:
 
 
 class Strokes(NamedTuple):
-    """(n,) of each row: the path it belongs to, how far along all moves it ends, and whether it is support, which stands off by a
-    gap.
-    """
+    """(n,) of each row: the path it belongs to, the length of all moves up to its end, and whether it is support, which keeps
+    a gap."""
 
     path: NDArray[np.int32]
     way: Floats
@@ -93,7 +107,7 @@ class Strokes(NamedTuple):
 
 class Moves(NamedTuple):
     """(n, 5) start and end of each row; (n,) its MoveKind, whether it lies below the bead that was just laid, whether it leads to
-    or from a turn of the table, its remarks. spans: of each of those, how far beads may span over what is sparse below them.
+    or from a turn of the table, its remarks. spans: for each remark, how far beads may span over sparse infill or support.
 
     rows, sizes, size: of the beads. Apart from Strokes, which the innermost functions take: each array more there slows
     all of it down.
@@ -112,7 +126,8 @@ class Moves(NamedTuple):
 
 
 def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Beads:
-    """Widths and heights as the program's comments tell, else by its layers or the profile's, and the filament pushed."""
+    """The beads of some rows, their widths and heights from the program's comments, else from its layers or the profile's, and
+    from the filament pushed."""
     remarks, size = program.remarks, program.remark[rows]
     sizes = np.column_stack([remarks.width_mm, remarks.height_mm])
     unsized = np.flatnonzero((np.minimum(remarks.width_mm, remarks.height_mm) <= 0.0)[size])
@@ -159,20 +174,15 @@ def highest_of(segments: Floats) -> Floats:
     return highest_mm
 
 
-@kernel
 def lengths_of(segments: Floats) -> Floats:
     """(k,) lengths of (k, 2, 3) segments."""
-    lengths_mm = np.empty(len(segments))
-    for k in range(len(segments)):
-        x, y = segments[k, 1, 0] - segments[k, 0, 0], segments[k, 1, 1] - segments[k, 0, 1]
-        z = segments[k, 1, 2] - segments[k, 0, 2]
-        lengths_mm[k] = np.sqrt(x * x + y * y + z * z)
+    lengths_mm: Floats = np.sqrt(((segments[:, 1] - segments[:, 0]) ** 2).sum(axis=1))
     return lengths_mm
 
 
 def _layers_mm(beads: Beads, has_heights: bool, profile: Profile) -> tuple[float, float]:
-    """Heights of the first layer and of others for beads that tell none: the profile's, and in a file that tells none at all
-    those of its own level beads.
+    """Heights of the first layer and of others for beads without a height comment: the profile's, or in a file without any such
+    comment those of its own level beads.
     """
     process, most = profile.process, profile.machine.head.nozzle_mm  # a higher step is no layer's
     first, usual = process.first_layer_height_mm, process.layer_height_mm
@@ -219,8 +229,8 @@ def moves_of(program: ParsedProgram, deposited: Beads, profile: Profile) -> Move
 
 
 def _spans(program: ParsedProgram, profile: Profile) -> Floats:
-    """How far a bead may span that some remarks are of: what fills, over sparse infill's cells; support, over its own lines; any,
-    its width: walls, too, bridge slots and teeth narrower than themselves.
+    """How far a bead of each remark may span: skin, over the cells of sparse infill; support, over its own lines; any bead, its
+    own width: walls, too, bridge slots and teeth narrower than themselves.
     """
     process = profile.process
     infill_mm, support_mm = infill_cell_mm(process), support_cell_mm(process)
@@ -231,7 +241,7 @@ def _spans(program: ParsedProgram, profile: Profile) -> Floats:
 
 
 def _below_last_bead(program: ParsedProgram, rows: NDArray[np.int64], beads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Those of some travels that go below the last bead, laid at their own pose."""
+    """The travels among some rows that go below the last bead, laid at the same pose."""
     after = np.searchsorted(beads, rows)
     rows, last = rows[after > 0], beads[after[after > 0] - 1]
     height = np.maximum(program.start[last, 2], program.end[last, 2])
@@ -243,7 +253,7 @@ def _below_last_bead(program: ParsedProgram, rows: NDArray[np.int64], beads: NDA
 
 
 def _ways_to_turns(program: ParsedProgram, rows: NDArray[np.int64], beads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Those of some rows that travel between the last bead before a turn of the table and the first one after it."""
+    """The travels among some rows between the last bead before a turn of the table and the first one after it."""
     turns = np.flatnonzero(program.kind == MoveKind.ROTATE)
     rows = rows[(program.kind[rows] == MoveKind.TRAVEL) & (program.e_mm[rows] >= 0.0)]
     after = np.searchsorted(beads, rows)

@@ -1,5 +1,5 @@
-"""Blocks: the G-code blocks of a machine: what they may name in braces, the values, the blocks with them filled in, and why one
-cannot be written, before there is a program."""
+"""Blocks: the G-code blocks of a machine: their placeholders and values, the filled-in blocks, and the check before there is a
+program."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,7 +30,7 @@ PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
 def block_problems(profile: Profile, *blocks: str) -> list[str]:
-    """What cannot be filled in of blocks, of all where none is named, each by itself; and what the firmware refuses of them."""
+    """Problems of blocks, by default of all: placeholders that cannot be filled in, and lines that the firmware refuses."""
     machine, dialect = profile.machine, dialect_of(profile.machine)
     problems, refused = list[str](), dict[str, list[str]]()
     for block in blocks or tuple(Blocks.model_fields):
@@ -64,7 +64,7 @@ def _moving(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
 
 
 def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """What a person should do about lines of blocks that the firmware refuses."""
+    """Advice about lines of blocks that the firmware refuses."""
     if not refused:
         return
     lines = list(dict.fromkeys(line for block in refused.values() for line in block))
@@ -80,7 +80,7 @@ def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator
 
 
 def block_values(profile: Profile, block: str) -> dict[str, object]:
-    """What a block may name, in the order of docs/profiles.md, each with a value to try it with."""
+    """The placeholders of a block, in the order of docs/profiles.md, each with an example value."""
     if block == RESUME:
         return resume_placeholders(profile.machine, (0.0, 0.0, 0.0), level(profile.machine), 0.0)
     values = placeholders("check", profile, [], 0.0, 0.0)
@@ -138,7 +138,7 @@ def _is_known(text: str, dialect: Dialect) -> bool:
 
 
 def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: float, filament_mm: float) -> dict[str, object]:
-    """What the blocks may name; the part's values change from part to part."""
+    """The placeholders of the blocks; the part's values change from part to part."""
     machine, material, process = profile.machine, profile.material, profile.process
     first = parts[0] if parts else None
     pose = first.pose if first else level(machine)
@@ -155,7 +155,7 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
 
 
 def resume_placeholders(machine: Machine, tip_mm: Sequence[float] | Floats, pose: Pose, clear_z_mm: float) -> dict[str, object]:
-    """What the block may name that goes on with a print after a power cut: where the tip was, the table's pose, a safe height."""
+    """The placeholders of the block that resumes a print after a power cut: the tip's place, the table's pose, a safe height."""
     return {
         "x_mm": float(tip_mm[0]), "y_mm": float(tip_mm[1]), "z_mm": float(tip_mm[2]),
         "tilt_deg": pose.tilt_deg, "turn_deg": pose.turn_deg, "clear_z_mm": clear_z_mm, **_axes(machine),
@@ -163,7 +163,7 @@ def resume_placeholders(machine: Machine, tip_mm: Sequence[float] | Floats, pose
 
 
 def _axes(machine: Machine) -> dict[str, object]:
-    """What all blocks may say of the rotary axes."""
+    """The placeholders of the rotary axes, for all blocks."""
     return {
         "tilt": machine.tilt.letter, "turn": machine.turn.letter,
         "tilt_stepper": stepper_name(machine.tilt), "turn_stepper": stepper_name(machine.turn),

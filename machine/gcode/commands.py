@@ -189,7 +189,7 @@ def command_in(line: str) -> Command:
 
 
 class Heat(Enum):
-    """What a line may do to the heaters of a machine that is to stay cold."""
+    """The effect of a line on the heaters of a machine that must stay cold."""
 
     COLD = "it neither heats nor waits for heat"
     HEATS = "it sets a heater's target above 0, or waits for heat"
@@ -197,7 +197,7 @@ class Heat(Enum):
 
 
 def heat_in(line: str, dialect: Dialect) -> Heat:
-    """What a line does with heat, in any spelling: m104s200, several commands in a line, a macro's KEY=VALUE."""
+    """The effect of a line on heaters, in any spelling: m104s200, several commands in a line, a macro's KEY=VALUE."""
     found = {_heat(name, rest, dialect) for name, rest in _commands(line)}
     return next((heat for heat in (Heat.UNSURE, Heat.HEATS) if heat in found), Heat.COLD)
 
@@ -217,9 +217,9 @@ def stands_still(line: str, dialect: Dialect) -> bool:
 
 
 def _commands(line: str) -> list[tuple[str, str]]:
-    """Name and rest of every command in a line; a text that is shown is none.
+    """Name and rest of every command in a line; displayed text is no command.
 
-    A line that firmwares read differently is one command that nothing is known of.
+    A line that firmwares read differently counts as one unknown command.
     """
     try:
         text = read_line(line).command.upper()

@@ -85,7 +85,7 @@ def read_line(line: str) -> LineText:
 
 
 def command_name(text: str) -> str:
-    """What a command is called: "G1" of "g01 x5", "M117" of "M117 50 %", of a macro its first word in capitals."""
+    """The name of a command: "G1" for "g01 x5", "M117" for "M117 50 %", for a macro its first word in capitals."""
     head = HEAD.match(text)
     if head:
         fraction = (head[3] or "").rstrip("0")
@@ -119,7 +119,7 @@ def plain_line(line: str) -> str:
     comment = CONTROL.sub("?", comment)
     if clean and line.partition(";")[0].strip(" \t") == command:
         return line
-    indent = line[: len(line) - len(line.lstrip(" \t"))]  # RepRapFirmware's blocks of statements are told by it
+    indent = line[: len(line) - len(line.lstrip(" \t"))]  # RepRapFirmware recognises blocks of statements by it
     return indent + (f"{command} ;{comment}".strip() if comment else command)
 
 
@@ -209,6 +209,6 @@ def begins_layer(comment: str) -> bool:
 
 
 def begun_part(comment: str) -> tuple[int, int] | None:
-    """The part that a comment begins, from 1, and of how many, 0 where it does not tell; None for another comment."""
+    """Number (from 1) and count (0: not given) of the part that a comment begins; None for any other comment."""
     match = PART.fullmatch(comment)
     return (int(match[1]), int(match[2] or 0)) if match else None

@@ -28,7 +28,7 @@ Coordinates = tuple[float | None, ...]  # X Y Z tilt turn E
 
 
 class Axes(NamedTuple):
-    """What a machine's firmware calls its axes, and how it reads their modes."""
+    """The letters of a machine's axes, and the dialect that reads their modes."""
 
     letters: tuple[str, ...] = ("X", "Y", "Z", "A", "C", "E")  # in the order of a place
     words: Mapping[str, int] = {"X": 0, "Y": 1, "Z": 2, "A": 3, "C": 4, "E": E_AXIS}  # those that a move may have
@@ -60,7 +60,7 @@ class Modes:
     strict: bool = False
     inches: bool = False
     relative: bool = False
-    filament_relative: bool = False  # told by M82 and M83, and by G90 and G91 where the firmware has it so
+    filament_relative: bool = False  # set by M82 and M83, and by G90 and G91 in some firmwares
     inverse_time: bool = False
     offset: list[float] = field(default_factory=lambda: [0.0] * 6)  # of G92: program's coordinate less the place
     units: list[float] = field(default_factory=lambda: [1.0] * 6)  # mm or deg of a word's 1
@@ -91,10 +91,10 @@ class Modes:
         return self.units[0]
 
     def move(self, coordinates: list[Any], words: Iterable[Word]) -> bool:
-        """Take the words of a move: `coordinates` become where it leads, F the feed; True when an axis is named.
+        """Apply the words of a move to `coordinates` and the feed; True when an axis is named.
 
-        A coordinate that is None is not known: a step leaves it so. Raises GcodeError, if strict, for an F that is not above 0
-        and for a word that is no axis's; else they change nothing.
+        None is an unknown coordinate: a relative move leaves it unknown. Raises GcodeError, if strict, for an F that is not above
+        0 and for a word that is no axis's; else they change nothing.
         """
         axes, units, steps, offset = self.axes.words, self.units, self.steps, self.offset
         moved = False
@@ -126,8 +126,8 @@ class Modes:
 
 @dataclass
 class ModalState:
-    """take() every command in order; lines() says it all again.
-    at: the positions of the program (what M114 tells), rotary axes unwrapped; None where the sender cannot know them."""
+    """The state of a firmware: take() every command in order; lines() are the commands that restore it.
+    at: the positions of the program (what M114 reports), rotary axes unwrapped; None where the sender cannot know them."""
 
     axes: Axes
     at: list[float | None] = field(default_factory=lambda: [None] * 6)
@@ -135,15 +135,15 @@ class ModalState:
     bed_c: float = 0.0
     fans: dict[str, str] = field(default_factory=dict)
     settings: dict[str, str] = field(default_factory=dict)
-    pulled_mm: float = 0.0  # filament that stands further back than it has stood
-    pushed_mm: float = 0.0  # filament that the newest command pushes; inf: some, nobody can know how much
+    pulled_mm: float = 0.0  # retracted filament
+    pushed_mm: float = 0.0  # filament that the last command pushes; inf: an unknown amount
     modes: Modes = field(init=False)
 
     def __post_init__(self) -> None:
         self.modes = Modes(self.axes)
 
     def coordinates(self) -> Coordinates:
-        """Where the axes stand."""
+        """The positions of the axes."""
         return tuple(self.at)
 
     @property
@@ -152,7 +152,7 @@ class ModalState:
         return self.settings.get("follow") == self.axes.dialect.follow_on != ""
 
     def take(self, command: str) -> bool:
-        """Take note of a command; True when it moves an axis or filament."""
+        """Apply a command; True when it moves an axis or filament."""
         text, axes = command.upper(), self.axes
         self.pushed_mm = 0.0
         if text[:3] == "G1 ":  # nearly every line

@@ -1,4 +1,4 @@
-"""Pen: what the firmware knows after the lines written so far, and the lines that follow from it.
+"""Pen: the firmware's state after the lines written so far, and the lines of the next moves.
 
 A kernel sets the lines of many moves in digits, for nearly all lines of a program are these; single words, and the lines that
 bring the table to a pose in each firmware's way, are set one by one.
@@ -27,7 +27,7 @@ Whole = NDArray[np.int64]
 LONGEST = 128  # characters of a line: five words of 20 digits at most with sign and point, and the command
 SPACE, MINUS, POINT, ZERO, LINE_END, FEED = 32, 45, 46, 48, 10, 70
 COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point
-PUSHING, TRAVELLING, STANDING = range(3)  # what a path does: strokes and wipes, travels, retractions
+PUSHING, TRAVELLING, STANDING = range(3)  # kinds of paths: strokes and wipes, travels, retractions
 X, Y, Z, PUSHED, F = range(5)  # what the firmware knows
 STEPS = 20  # a short stroke that must go slower does so by twentieths, or the speeds of its like would flicker
 UNKNOWN = -(10**12)
@@ -158,7 +158,7 @@ def _copy(what: Bytes, first: int, end: int, text: Bytes, at: int) -> int:
 
 @no_nrt
 def _word(letter: int, value: int, digits: int, text: Bytes, at: int) -> int:
-    """A blank, a letter and a whole number with a point before its last digits; returns where the text goes on."""
+    """A blank, a letter and a whole number with a point before its last digits; returns the end of the text."""
     text[at], text[at + 1] = SPACE, letter
     at += 2
     if value < 0:
@@ -227,7 +227,7 @@ class Pen:
         return text[:size].tobytes().decode("utf-8")
 
     def filament(self, pushed_mm: float) -> str:
-        """The filament's word after so much more: a step, or the sum where the firmware knows no steps."""
+        """The filament's word for a length to push: a step, or the sum where the firmware knows no steps."""
         self.pushed_mm[0] += pushed_mm
         e = round(float(self.pushed_mm[0]) * 1e5)
         step, self.known[PUSHED] = e - int(self.known[PUSHED]), e

@@ -1,5 +1,5 @@
-"""Settings: the comments from which a reader sees how a G-code file was made, at its head and foot, and what the beads of each
-part come to, so that a program that was changed later gives itself away.
+"""Settings: the comments at the head and foot of a G-code file that record how it was made, and the totals of each part's beads,
+by which a later change of the file shows.
 """
 
 import re
@@ -72,7 +72,7 @@ def flat(value: Any, key: str) -> Iterator[tuple[str, str]]:
 
 @dataclass(frozen=True, eq=False)
 class PartTotals:
-    """What a part's beads come to: (2, 3) least and greatest axis positions X Y Z, filament, the layers that have any.
+    """Totals of a part's beads: (2, 3) least and greatest axis positions X Y Z, filament, number of layers with beads.
 
     line: of the comment.
     """
@@ -94,7 +94,7 @@ def totals_comment(points_mm: Floats, filament_mm: float, layers: int) -> str:
 
 
 def read_totals(text: str, line: int, part: int) -> PartTotals | None:
-    """What the comment's text behind its colon tells of a part; None where it is no such text."""
+    """The totals in a comment's text behind its colon; None for any other text."""
     match = FORM.fullmatch(text.strip())
     if match is None:
         return None

@@ -116,7 +116,7 @@ def _dialect_line(word: str, pen: Pen, **values: object) -> list[str]:
 
 
 def _start(profile: Profile, parts: Sequence[BeginPart], pen: Pen) -> Iterator[str]:
-    """What the firmware wants to know first, the start block, its modes, and the first layer's heat if that has not come yet."""
+    """The firmware's first lines, the start block, its modes, and the first layer's temperature unless the block has set it."""
     dialect, heat, advance = pen.dialect, profile.material.first_layer_nozzle_c, profile.material.pressure_advance
     yield ";TYPE:Custom"
     for word in (*dialect.before_start, dialect.parts):
@@ -161,7 +161,7 @@ def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
 
 
 def _contents(program: MachineProgram, row: int, after: int) -> str:
-    """What the strokes of a part, rows `row` to `after`, come to."""
+    """The totals comment of a part, whose strokes are rows `row` to `after`."""
     begin, end = program.starts[row], program.starts[after]
     own = program.is_stroke[row:after] & (program.what[row:after] != NUMBER[Kind.PURGE])
     points = np.repeat(own, np.diff(program.starts[row : after + 1]))
@@ -185,12 +185,12 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
 
 
 def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:
-    """How hot the first layer among marks is printed; 0 where there is none."""
+    """Nozzle temperature of the first layer among marks, deg C; 0 where there is none."""
     return next((_nozzle_c(mark, profile) for mark in marks if isinstance(mark, BeginLayer)), 0.0)
 
 
 def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:
-    """How hot a layer is printed."""
+    """Nozzle temperature of a layer, deg C."""
     return min(profile.material.nozzle_c + layer.nozzle_add_c, profile.machine.nozzle_limit_c)
 
 
@@ -265,7 +265,8 @@ def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int]
 def _before_stroke(
     kind: int, fan: float, acceleration_mm_s2: float, width_mm: float, profile: Profile, pen: Pen
 ) -> Iterator[str]:
-    """The lines of what changes before a stroke; fan: NaN for the layer's; acceleration: inf where the axes decide."""
+    """The lines that a change of fan, acceleration, kind or width needs before a stroke. fan: NaN for the layer's; acceleration:
+    inf where the axes decide."""
     yield from _set_fan(pen.layer_fan if isnan(fan) else fan, pen)
     if not isinf(acceleration_mm_s2) and round(acceleration_mm_s2) != pen.acceleration and pen.dialect.acceleration:
         pen.acceleration = round(acceleration_mm_s2)

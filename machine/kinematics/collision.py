@@ -1,4 +1,4 @@
-"""Collide: how far the head's bodies stay from table, cradle and what is printed, by separating directions.
+"""Collision: the distances of the head's bodies from table, cradle and print, by separating directions.
 
 The distance of two convex bodies is the greatest gap over all unit directions d, where the gap is the least d . x of the one
 minus the greatest d . x of the other. Trying some directions gives a lower bound of the distance: a verdict "clear" is always
@@ -33,7 +33,7 @@ def table_reach(machine: Machine, pose: Pose) -> "Reach":
 
 
 def _plate_reach(table: Table, normal: Floats, centre: Floats, tried: Floats) -> Floats:
-    """The same of a round plate."""
+    """(k,) greatest d . x over a round plate."""
     along = tried @ normal
     across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
     reach: Floats = tried @ centre + table.radius_mm * across + np.maximum(0.0, -along) * table.thickness_mm
@@ -53,13 +53,13 @@ def _corner_reach(points: Floats, tried: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Printed:
-    """What stands on the table: the corners of its convex hull, workpiece frame, and how far beads reach outside them."""
+    """The print on the table: the corners of its convex hull, workpiece frame, and how far beads reach outside them."""
 
     points_mm: Floats
     bead_mm: float
 
     def reach(self, machine: Machine, pose: Pose, tried: Floats) -> Floats:
-        """(k,) greatest d . x over what is printed at a pose, in the frame of X Y Z."""
+        """(k,) greatest d . x over the print at a pose, in the frame of X Y Z."""
         if not len(self.points_mm):
             return np.full(len(tried), -FAR_MM)
         reach: Floats = (machine_points(machine, pose, self.points_mm) @ tried.T).max(axis=0) + self.bead_mm
@@ -67,7 +67,7 @@ class Printed:
 
 
 def hull(points_mm: Floats, bead_mm: float) -> Printed:
-    """What (n, 3) workpiece points, the centres of beads that reach bead_mm to each side, cover at most."""
+    """The hull of (n, 3) workpiece points, the centres of beads that reach bead_mm to each side."""
     corners = np.zeros((0, 3))
     if len(points_mm) > 3:
         corners = np.asarray(Manifold.hull_points(points_mm).to_mesh64().vert_properties)[:, :3]
@@ -84,7 +84,7 @@ Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) how far a solid 
 
 
 def solids(machine: Machine, pose: Pose, printed: Printed | None = None) -> list[tuple[str, Reach]]:
-    """What the head can meet at a pose: the table, the cradle's bodies, what is printed; names for messages."""
+    """The solids that the head can meet at a pose: table, cradle bodies, print; with names for messages."""
     bodies: list[tuple[str, Reach]] = [("the table", table_reach(machine, pose))]
     bodies += [(f"the cradle's {box.name}", _reach_of_cradle(machine, box, pose)) for box in machine.cradle]
     if printed is not None and len(printed.points_mm):

@@ -13,7 +13,7 @@ from functools import cache
 import manifold3d as m3
 import numpy as np
 
-from machine.dryrun.conformity.agreement import agreement
+from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.pipeline.choice import pricing

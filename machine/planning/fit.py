@@ -288,7 +288,7 @@ class Plate:
         return self._known[key]
 
     def _hull(self, part: Part) -> Floats:
-        """(m, 3, 3) corners of the faces of a part's hull, of one on the plate with what is around its base."""
+        """(m, 3, 3) corners of the faces of a part's hull; on the plate with its brim, raft or support."""
         if part not in self._hulls:
             hull = convex_hull(part.mesh.vertices)
             if self._around_mm.get(part, 0.0) > 0.0:

@@ -47,7 +47,7 @@ SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN)
 
 @dataclass
 class Tip:
-    """Where the tip is (machine X Y Z), how the table stands, what is printed before the part at hand, and all moves so far.
+    """The tip's position (machine X Y Z), the table's pose, the hull of the earlier parts, and all moves so far.
 
     trail: (n, 3) the way of a wipe over what has been printed since the last retraction. run_in_mm: filament that the next
     strokes inside are to push beyond their own. limb: while a limb is printed, its part number and what stands beside it.
@@ -68,7 +68,7 @@ class Tip:
 
     @cached_property
     def speeds(self) -> Speeds:
-        """What its moves between strokes may have."""
+        """Speed limits of moves between strokes."""
         return speeds_of(self.profile)
 
     def add(self, moves: Moves) -> None:
@@ -84,7 +84,7 @@ class Tip:
         self.add(Moves(ways, np.array([[what, len(way_mm), speed, nan, nan, acceleration_mm_s2]])))
 
     def mark(self, mark: Mark) -> None:
-        """A mark, or a turn of the table, after which nothing of what was printed is to be wiped over any more."""
+        """A mark, or a turn of the table, after which the last strokes cannot be wiped over any more."""
         self.marks.append(mark)
         if isinstance(mark, Reorient):
             self.move(REORIENT, self.at_mm[None], 0.0, mark.speed_deg_s)
@@ -164,7 +164,7 @@ def add_travel(out: Moves, done: Indices, between_mm: Floats, x_mm: float, y_mm:
 
 
 def retract(tip: Tip) -> None:
-    """Pull back what is not yet pulled back, moving over what was just printed where there is any."""
+    """Retract the rest of the retraction length, wiping over the last strokes where there are any."""
     material, speeds = tip.profile.material, tip.speeds
     amount = material.retract_mm - tip.retracted_mm
     if amount <= 0:
@@ -208,7 +208,7 @@ def trail_after(laid: Laid, first: int, end: int, before: Floats, wipe_mm: float
 
 @no_nrt
 def _suffices(laid: Laid, k: int, wipe_mm: float) -> bool:
-    """Whether what was printed before a stroke does not matter for a wipe after it."""
+    """Whether a wipe after a stroke is independent of the strokes before it."""
     if laid.wiped[k]:
         return bool(length_between(laid.points, laid.starts[k], laid.starts[k + 1]) >= wipe_mm)
     return not runs_round(laid.points[laid.starts[k] : laid.starts[k + 1]], laid.width[k])

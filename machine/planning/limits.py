@@ -60,12 +60,12 @@ def location(program: MachineProgram, index: int) -> str:
 
 
 def wipe_filament_mm_s(machine: Machine) -> float:
-    """The greatest speed of the filament that a path may plan with: the text may round its ends to a little more."""
+    """Greatest filament speed to plan a wipe with, mm/s: rounding in the text may raise it a little."""
     return machine.extruder_speed_mm_s / RICHER
 
 
 def stroke_filament_mm_s(profile: Profile) -> float:
-    """The same of a stroke, whose plastic the hot end has to melt."""
+    """Greatest filament speed to plan a stroke with, mm/s: as for a wipe, and not more than the hot end melts."""
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
     return min(profile.material.volumetric_limit_mm3_s / filament_mm2, wipe_filament_mm_s(profile.machine))
 
@@ -82,7 +82,7 @@ def path_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, axes_mm
 
 @no_nrt
 def path_speed(points_mm: Floats, first: int, end: int, speed_mm_s: float, axes_mm_s: Floats) -> float:
-    """The same along the path of some of the points."""
+    """The speed lowered to what X, Y and Z allow along points first to end."""
     for k in range(first + 1, end):
         squared = 0.0
         for axis in range(3):

@@ -98,7 +98,7 @@ def over_print_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
 def is_way_clear(
     machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None, parts: int = 1
 ) -> bool:
-    """True when each body keeps what it must from table, cradle and print while the tip goes from start to end.
+    """True when each body of the head keeps its clearance from table, cradle and print while the tip goes from start to end.
 
     The way is checked in `parts` pieces: a direction that separates body and solid is easier to find for a short piece.
     """
@@ -262,7 +262,7 @@ def _places(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float]) ->
 def _ways_clear(candidate: Route, turn: Turn, machine: Machine) -> bool:
     """True when the ways to the stand, at the first pose, and from it, at the second, keep off table and cradle.
 
-    What is printed need not be tested: in either pose the ways across lie above it, and nothing is under the head where the tip
+    The print need not be tested: in either pose the ways across lie above it, and nothing is under the head where the tip
     goes straight up or down.
     """
     halves = _places(turn, candidate.over_mm, (candidate.z_mm, candidate.across_z_mm))

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from dataclasses import replace
 from math import inf, isfinite
 
-from machine.dryrun.timeline import Timeline
+from machine.dryrun.dryrun import Timeline
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal
 from machine.link.port import open_port

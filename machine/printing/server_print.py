@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from time import monotonic
 
-from machine.dryrun.timeline import Timeline
+from machine.dryrun.dryrun import Timeline
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.print_state import PrintState, PrintStatus, ProgramPosition, last_known

@@ -1,6 +1,7 @@
-"""Layers: which rows of a program belong to one layer, as its comments tell or else as the heights of its strokes show."""
+"""Layers: which rows of a program belong to one layer, by its comments or else by the heights of its strokes."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,6 @@ from machine.view.encoding import Column
 from mdp.mesh import Floats
 
 SAME_MM = 0.02  # strokes whose heights differ less lie in one layer
-NONE: dict[str, Column] = {
-    **{name: Column(np.zeros(0), "i32") for name in ("layer_part", "layer_number", "layer_first", "layer_rows")},
-    **{name: Column(np.zeros(0), "f32") for name in ("layer_z", "layer_time")},
-}  # of a page without paths
 FEWEST = 4  # strokes that a helix takes to rise by a layer, at least: what goes up and down more quickly is no helix
 
 
@@ -21,7 +18,7 @@ FEWEST = 4  # strokes that a helix takes to rise by a layer, at least: what goes
 class Layers:
     """number: (n,) for the rows of a program, 0 before the first. first, rows: (l,) where layers begin and how long they are.
 
-    by: "comments", or "heights" where the text does not tell its layers.
+    by: "comments", or "heights" in a text without layer comments.
     """
 
     number: NDArray[np.int64]
@@ -45,7 +42,7 @@ def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
 def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.int64]:
     """(n,) numbers of layers: a level stroke at another height begins one, and so does a rise of a layer's height in a helix.
 
-    What is laid while the table turns has no height of its own: it is one layer, or goes on with the one before.
+    Beads laid while the table turns have no height of their own: they are one layer, or continue the one before.
     """
     number = np.zeros(len(program.line), dtype=np.int64)
     number[np.flatnonzero((program.kind == MoveKind.ROTATE) & (program.e_mm > 0.0))[:1]] = 1
@@ -63,6 +60,22 @@ def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.in
         steps[1:] |= rises
     number[strokes[steps]] = 1
     return np.cumsum(number)
+
+
+def sums_of_parts(program: ParsedProgram, layers: Layers, ends_s: Floats) -> list[dict[str, Any]]:
+    """Layers, time and filament of each part; without ;PART: comments all is part 0. ends_s: (n,) when each row ends."""
+    seconds, sums = np.diff(ends_s, prepend=0.0), []
+    for index in program.parts or (0,):
+        rows = np.flatnonzero(program.part == index)
+        sums.append(
+            {
+                "index": index,
+                "layers": int((program.part[layers.first] == index).sum()),
+                "time_s": float(seconds[rows].sum()),
+                "filament_mm": float(program.e_mm[rows].sum()),
+            }
+        )
+    return sums
 
 
 def columns(

@@ -64,7 +64,7 @@ def page(title: str, block: bytes, live: bool = False) -> bytes:
 
 
 def policy(style: str, script: str, live: bool) -> str:
-    """What the page may do: run its own script, use its own style, draw pictures that it has made itself."""
+    """The content security policy: the page may run its own script, use its own style, show images that it has made itself."""
     asks = "; connect-src 'self'" if live else ""
     pictures = "img-src data: blob:; base-uri 'none'; form-action 'none'"
     return f"default-src 'none'; script-src {hash_source(script)}; style-src {hash_source(style)}; {pictures}{asks}"

@@ -27,7 +27,7 @@ def part_colours(count: int) -> Floats:
 
 
 def page_colours(count: int) -> list[str]:
-    """The same as #rrggbb."""
+    """The part_colours() as #rrggbb."""
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(part_colours(count)).astype(int).tolist()]
 
 
@@ -40,7 +40,7 @@ def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
 
 
 def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> NDArray[np.bool_]:
-    """(m,) what is risky of a part's own faces, the cut below it left out, when the model is printed straight up."""
+    """(m,) risky faces of a part when the model is printed straight up, the cut below it left out."""
     if part.needing_upright is not None:
         return part.needing_upright
     down = risky_upright(part.mesh, angle_deg, count_platform_faces)
@@ -49,7 +49,7 @@ def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> ND
 
 
 def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> float:
-    """The area of those faces."""
+    """Area of risky_before() faces, mm2."""
     return float(part.mesh.areas_mm2[risky_before(part, angle_deg, count_platform_faces)].sum())
 
 

@@ -19,15 +19,6 @@ STILL = 1e-9
 MOST_ROWS = 1_500_000
 FINEST_MM = 0.01
 Mask = NDArray[np.bool_]
-NONE: dict[str, Column] = {
-    "end": Column(np.zeros((0, 5)), "i32", 0.001, delta=True),
-    "jump_row": Column(np.zeros(0), "i32"),
-    "jump_start": Column(np.zeros((0, 5)), "i32", 0.001),
-    **{name: Column(np.zeros(0), "f64", 0.001, delta=True) for name in ("time", "filament")},
-    **{name: Column(np.zeros(0), "i32", delta=True) for name in ("line", "part", "layer", "speed")},
-    **{name: Column(np.zeros(0), "u16") for name in ("type", "width", "height", "nozzle", "bed")},
-    **{name: Column(np.zeros(0), "u8") for name in ("kind", "fan")},
-}  # of a page without paths
 
 
 def end_times_s(run: DryRun) -> Floats:
@@ -40,7 +31,7 @@ def end_times_s(run: DryRun) -> Floats:
 
 
 def page_kinds(program: ParsedProgram) -> NDArray[np.int8]:
-    """(n,) kinds as the page tells them: wipes and primes apart, beads laid while the table turns are beads."""
+    """(n,) kinds of moves on the page: wipes and primes are kinds of their own, beads laid during turns count as beads."""
     kind = program.kind.copy()
     kind[turning_strokes(program)] = MoveKind.EXTRUDE
     kind[(kind == MoveKind.TRAVEL) & (program.e_mm < -STILL)] = WIPE
@@ -88,7 +79,7 @@ def _jumps(program: ParsedProgram, shown: NDArray[np.int64]) -> NDArray[np.int64
 
 
 def _bead_sizes(run: DryRun, profile: Profile) -> tuple[Floats, Floats]:
-    """(n,) width and height of the beads, mm, as the file tells or as the filament makes them; 0 where none is laid."""
+    """(n,) width and height of the beads, mm, from comments or from the filament; 0 where none is laid."""
     program, width, height = run.program, np.zeros(len(run.times_s)), np.zeros(len(run.times_s))
     for beads in (run.deposited, beads_of(program, np.flatnonzero(turning_strokes(program)), profile)):
         width[beads.rows], height[beads.rows] = beads.width_mm, beads.height_mm

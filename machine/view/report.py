@@ -22,7 +22,6 @@ from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, standing_still
 from mdp.joint import Joint, weakest_of
-from mdp.mesh import Floats
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
 from profiles.messages import terminal_words
@@ -69,19 +68,18 @@ def print_report(
     program: Program,
     profile: Profile,
     layers: Layers,
-    ends_s: Floats,
+    parts: Sequence[dict[str, Any]],
     *,
     joints: Sequence[Joint] = (),
     alternatives: Sequence[Alternative] = (),
     known: bool = True,
     ours: bool = True,
 ) -> dict[str, Any]:
-    """The report of a whole print. ends_s: (n,) when each row ends; joints: of a model that is known; alternatives: it printed in
-    one part.
+    """The report of a whole print. parts: sums_of_parts(); joints: of a known model; alternatives: the model in one part.
 
-    known: the machine is no guess; ours: the file was made with this profile, else its settings are not told.
+    known: the machine is no guess; ours: the file was made with this profile, else its settings are left out.
     """
-    tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile, "" if known else profile.machine.name)]
+    tables = [_parts(program, parts, profile), _kinds(program.run, profile, "" if known else profile.machine.name)]
     tables += _joints(joints) or _interfaces(program.run)
     if program.decomposition is not None:
         tables += _front(program.decomposition)
@@ -97,8 +95,8 @@ def with_alternatives(report: dict[str, Any], alternatives: Sequence[Alternative
     return report | {"tables": tables}
 
 
-def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = ()) -> Table:
-    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": False}
+def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
+    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": folded}
 
 
 SOLID = ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²"]
@@ -112,18 +110,15 @@ def _solid(part: Part, profile: Profile) -> Row:
     return [str(part.index), *angles, f"{part.volume_mm3 / 1000.0:.2f}", *areas]
 
 
-def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -> Table:
-    """Each part with its layers, time and material; what its solid is where the program came from a model."""
-    parsed, seconds = program.run.program, np.diff(ends_s, prepend=0.0)
+def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) -> Table:
+    """Each part with its layers, time and material; with its shape where the program came from a model."""
     decomposition = program.decomposition
     solids = {part.index: _solid(part, profile) for part in decomposition.parts} if decomposition is not None else {}
     interfaces = program.interface_mm3
     rows = []
-    for index in parsed.parts or (0,):
-        mine = parsed.part == index
-        count = int((parsed.part[layers.first] == index).sum())
-        mass_g = filament_g(float(parsed.e_mm[mine].sum()), profile.material)
-        figures = [str(count), duration(float(seconds[mine].sum())), f"{mass_g:.1f}"]
+    for part in parts:
+        index, mass_g = part["index"], filament_g(part["filament_mm"], profile.material)
+        figures = [str(part["layers"]), duration(part["time_s"]), f"{mass_g:.1f}"]
         stands_on = [f"{interfaces.get(index, 0.0) / 1000:.2f}"] if interfaces else []
         rows.append([*solids.get(index, [str(index) if index else "all"]), *figures, *stands_on])
     head = [*(SOLID if solids else SOLID[:1]), "layers", "time", "g", *([STANDS_ON] if interfaces else [])]
@@ -131,7 +126,7 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
 
 
 def _joints(joints: Sequence[Joint]) -> list[Table]:
-    """Every joint: its area and seam, how its first layer lies where it is sliced, and what it bears."""
+    """Every joint: its area and seam, the contact of its first layer where it is sliced, and its strength."""
     sliced = any(joint.contact_share is not None for joint in joints)
     weakest, rows = weakest_of(joints), []
     for joint in joints:
@@ -146,7 +141,7 @@ def _joints(joints: Sequence[Joint]) -> list[Table]:
 
 
 def _interfaces(run: DryRun) -> list[Table]:
-    """What G-code alone tells of where its parts stand on others."""
+    """The joints of a program without a model, from its G-code alone."""
     rows = [[str(face.part), f"{face.area_mm2:.1f}", *_laid(face.contact, face.over_room)] for face in run.interfaces]
     return [_table("Joints", ["part", "mm²", *LAID], rows, [CONTACT])] if rows else []
 
@@ -174,9 +169,9 @@ def _front(decomposition: Decomposition) -> list[Table]:
 
 
 def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
-    """Time and material by what is printed, then the ways between, then waiting; they add up to the whole print.
+    """Time and material by kind of line, then of travels, then of waits; they add up to the whole print.
 
-    guess: name of the machine whose speeds were taken where the file tells none.
+    guess: name of the machine whose speeds were used where the file names none.
     """
     program, kind = run.program, page_kinds(run.program)
     groups: list[tuple[str, NDArray[np.bool_]]] = [
@@ -248,7 +243,7 @@ def _names(profile: Profile) -> list[Row]:
 
 
 def _assumptions(profile: Profile, known: bool) -> list[Row]:
-    """The same of a file that does not tell them."""
+    """The rows of _names() for a file that does not name them."""
     machine = profile.machine.name if known else f"{UNTOLD}: limits, clearance and the plate were not judged"
     return [["machine", machine], ["material", f"{UNTOLD}: weights as of {profile.material.name}"]]
 
@@ -284,8 +279,8 @@ def settings_tables(profile: Profile) -> list[Table]:
         changed += [[f"part {part.part}: process.{key}", _text(value), _text(shared[key])] for key, value in part.process.items()]
     notes = [] if changed else ["all settings are the usual ones"]
     return [
-        {"title": "Settings changed", "head": ["setting", "value", "usual"], "rows": changed, "notes": notes, "folded": False},
-        {"title": "All settings", "head": ["setting", "value", "meaning"], "rows": every, "notes": [], "folded": True},
+        _table("Settings changed", ["setting", "value", "usual"], changed, notes),
+        _table("All settings", ["setting", "value", "meaning"], every, folded=True),
     ]
 
 

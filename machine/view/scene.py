@@ -47,7 +47,7 @@ def _marks(part: Part, profile: Profile) -> NDArray[np.int64]:
 
 
 def solids(decomposition: Decomposition, profile: Profile, joints: Sequence[Joint]) -> list[dict[str, Any]]:
-    """What the header tells of each part's pose, base plane, joint and place in the surfaces."""
+    """Records of each part for the header: pose, base plane, joint and place in the surfaces."""
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
     by_part = {joint["part"]: joint for joint in joint_values(joints)}
     records, vertex, face = [], 0, 0
@@ -101,23 +101,17 @@ def machine_bodies(machine: Machine, known: bool) -> dict[str, Any]:
 
 
 def _axis(axis: RotaryAxis) -> dict[str, Any]:
-    return {
-        "letter": axis.letter,
-        "axis": unit(axis.axis).tolist(),
-        "point_mm": list(axis.point_mm),
-        "sign": axis.sign,
-        "zero_deg": axis.zero_deg,
-        "limits_deg": list(axis.limits_deg),
-    }
+    kept = {"letter", "axis", "point_mm", "sign", "zero_deg", "limits_deg"}
+    return axis.model_dump(mode="json", include=kept) | {"axis": unit(axis.axis).tolist()}
 
 
 def relevant_findings(run: DryRun, known: bool) -> list[Finding]:
-    """The findings in their order; known: False leaves out what only the right machine could tell."""
+    """The findings in their order; known: False leaves out those that need the right machine."""
     return [finding for finding in run.findings if known or finding.code not in MACHINES_OWN]
 
 
 def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[np.int64]) -> list[dict[str, Any]]:
-    """The relevant findings as the page has them; row: where it is shown, -1 for a finding about the whole."""
+    """The relevant findings for the page; row: the row that shows it, -1 for a finding about the whole."""
     program = run.program
     records = []
     for finding in relevant_findings(run, known):

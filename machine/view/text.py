@@ -28,19 +28,6 @@ Wholes = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
-class _Moves:
-    """What the rows tell of m lines: moved (m,), whether any is of the line; axes (3, m), step and total of filament (m,)."""
-
-    moved: Mask
-    axes: Wholes
-    step: Wholes
-    total: Wholes
-
-    def between(self, first: int, end: int) -> "_Moves":
-        return _Moves(self.moved[first:end], self.axes[:, first:end], self.step[first:end], self.total[first:end])
-
-
 def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dict[str, Any] | None, dict[str, Column]]:
     """For the header the patterns and where sums of filament begin anew, and the column of the lines' places among the patterns;
     None and an empty column where the lines are too unlike. rows: from machine.view.paths."""
@@ -49,7 +36,7 @@ def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dic
     pushed = np.concatenate([[0], whole(rows["filament"])])
     zeros, zero = _zeros(lines, pushed[last])
     axes = np.concatenate([np.zeros((1, 3), dtype=np.int64), whole(rows["end"])[:, :3]])[last].T
-    moves = _Moves(last > first, axes, pushed[last] - pushed[first], pushed[last] - zero)
+    moves = np.vstack([last > first, axes, pushed[last] - pushed[first], pushed[last] - zero])
     places: dict[str, int] = {}
     numbers: list[int] = []
     for begin in range(0, len(lines), LINES_AT_ONCE):
@@ -57,7 +44,7 @@ def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dic
         text = "\n".join(lines[begin:end])
         if any(hole in text for hole in STEPS + SUMS):
             return NOTHING
-        numbers += [places.setdefault(line, len(places)) for line in _with_holes(text, moves.between(begin, end)).split("\n")]
+        numbers += [places.setdefault(line, len(places)) for line in _with_holes(text, moves[:, begin:end]).split("\n")]
         if sum(map(len, places)) > MOST_LETTERS:
             return NOTHING
     return {"patterns": list(places), "zeros": zeros}, {"text": Column(np.array(numbers), "i32", delta=True)}
@@ -85,21 +72,23 @@ def _zero(line: str, pushed: int, before: int) -> int:
     return before
 
 
-def _with_holes(text: str, moves: _Moves) -> str:
-    """The lines with a hole instead of every number that the rows tell."""
+def _with_holes(text: str, moves: Wholes) -> str:
+    """The lines with a hole instead of every number that the page's rows have.
+
+    moves: (6, m) of the lines: 1 where one has a row, X Y Z, then the step and the sum of filament."""
     letters = np.frombuffer(text.encode(), dtype=np.uint8)
     breaks = np.flatnonzero((letters == SPACE) | (letters == BREAK))
     start, end = np.concatenate([[0], breaks + 1]), np.concatenate([breaks, [len(letters)]])
     line = np.concatenate([[0], np.cumsum(letters[breaks] == BREAK)])
     axes, filament = (np.isin(np.append(letters, 0)[start], list(names.encode())) for names in (AXES, FILAMENT))
-    chosen = (axes | filament) & moves.moved[line] & (end - start > 1) & (end - start <= LONGEST)
+    chosen = (axes | filament) & (moves[0, line] > 0) & (end - start > 1) & (end - start <= LONGEST)
     start, end, line, filament = start[chosen], end[chosen], line[chosen], filament[chosen]
     number = _numbers(letters, start + 1, end)
     axis = np.searchsorted(list(AXES.encode()), letters[start]) % len(AXES)
-    step = _form(number, moves.step[line], FILAMENT_DIGITS)
-    total = _form(number, moves.total[line], FILAMENT_DIGITS)
+    step = _form(number, moves[4, line], FILAMENT_DIGITS)
+    total = _form(number, moves[5, line], FILAMENT_DIGITS)
     by_sum = np.where(total > 0, total + len(STEPS), 0)
-    hole = np.where(filament, np.where(step > 0, step, by_sum), _form(number, moves.axes[axis, line], AXIS_DIGITS))
+    hole = np.where(filament, np.where(step > 0, step, by_sum), _form(number, moves[1 + axis, line], AXIS_DIGITS))
     filled, start, end = hole[hole > 0], start[hole > 0], end[hole > 0]
     covered = np.zeros(len(letters) + 1, dtype=np.int8)
     covered[start + 2] += 1

@@ -188,17 +188,17 @@ def _find_blocked(begin: int, end: int, tree: TriangleTree, bundles: tuple[Float
         out[f] = blocked / len(rays)
 
 
-def distances_mm(surface: Mesh, places: Floats, reach_mm: float) -> Floats:
-    """(n,) how far places (n, 3) lie from a mesh whose faces are in spatial order, reach_mm for those that lie farther, mm."""
-    squares = np.full(len(places), reach_mm * reach_mm)
-    in_threads(_find_nearest, len(places), triangle_tree(surface), places, squares)
-    distances: Floats = np.sqrt(squares)
-    return distances
+def nearest_faces(surface: Mesh, places: Floats, reach_mm: float) -> tuple[Floats, Ints]:
+    """(n,) distances of places (n, 3) from a mesh whose faces are in spatial order, mm, and (n,) the nearest faces; reach_mm and
+    face 0 for places that lie farther."""
+    squares, nearest = np.full(len(places), reach_mm * reach_mm), np.zeros(len(places), np.int32)
+    in_threads(_find_nearest, len(places), triangle_tree(surface), places, squares, nearest)
+    return np.sqrt(squares), nearest
 
 
 @kernel
-def _find_nearest(begin: int, end: int, tree: TriangleTree, places: Floats, squares: Floats) -> None:
-    """Lower the squares to those of the distances of the places from the surface."""
+def _find_nearest(begin: int, end: int, tree: TriangleTree, places: Floats, squares: Floats, nearest: Ints) -> None:
+    """Lower the squares to those of the distances of the places from the surface, and note the nearest faces."""
     vertices, faces, leaves = tree.vertices, tree.faces, len(tree.low) // 2
     stack = ints(DEPTH, 1)
     for k in range(begin, end):
@@ -217,7 +217,9 @@ def _find_nearest(begin: int, end: int, tree: TriangleTree, places: Floats, squa
                 continue
             first = (node - leaves) * LEAF_FACES
             for f in range(first, min(first + LEAF_FACES, len(faces))):
-                least = min(least, _from_face(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], place))
+                square = _from_face(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], place)
+                if square < least:
+                    least, nearest[k] = square, f
         squares[k] = least
 
 

@@ -48,7 +48,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
         mesh = mesh_at_place(model.mesh, profile)
     agreed = None
     if mesh is not None:
-        from machine.dryrun.conformity.agreement import agreement
+        from machine.dryrun.agreement import agreement
 
         modifiers = () if program.decomposition is None else program.decomposition.parts[0].modifiers
         agreed, run = agreement(program.run, mesh, profile, modifiers)

@@ -13,7 +13,7 @@ from profiles.profile import Profile
 from slicer.paths import SlicedPart
 
 if TYPE_CHECKING:  # what only models have is loaded with them
-    from machine.dryrun.conformity.agreement import Agreement
+    from machine.dryrun.agreement import Agreement
     from mdp.decomposition import Decomposition, FrontRow
     from mdp.joint import Joint
 

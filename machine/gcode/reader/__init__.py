@@ -1,4 +1,4 @@
-"""Reader: what a firmware would understand of a G-code text, command by command.
+"""Reader: a G-code text as a firmware would understand it, command by command.
 
 `parse.parse_gcode` gives a `parsed.ParsedProgram`, one row a move; `machine.gcode.lines.GcodeFile` is a file of text.
 """

@@ -1,7 +1,7 @@
-"""Codes: what each G and M code and each macro of Klipper does to the reader; straight moves, arcs and turns become rows."""
+"""Codes: the effect of each G and M code and of each macro of Klipper on the reader; moves, arcs and turns become rows."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import hypot, inf, pi
 
 import numpy as np
@@ -23,29 +23,111 @@ KEYS = re.compile(r"(?: +[A-Z_][A-Z0-9_]*=(?:\"[^\"]*\"|[^\s\"'#()\\]*))* *").fu
 HEATERS = {"EXTRUDER": NOZZLE, "HEATER_BED": BED}
 
 
-def dispatch(reader: Reader, name: str, words: Words) -> None:
+# What is put on record under its Marlin name, with its value; and what has no bearing on motion, heat or time.
+# fmt: off
+NOTED = frozenset({
+    "G4", "M0", "M1", "M18", "M84", "M104", "M106", "M107", "M109", "M140", "M190", "M226", "M400", "M600",
+})
+WITHOUT_EFFECT = frozenset({
+    "G17", "G40", "G43", "G49", "G53", "G54", "G61", "G64", "G80", "G91.1", "G92.1", "G92.2", "M6", "M17", "M73", "M105", "M110",
+    "M115", "M117", "M118", "M126", "M127", "M155", "M201", "M203", "M205", "M208", "M486", "M502", "M572", "M900",
+})
+# fmt: on
+SILENT_MACROS = frozenset(name for name, command in klipper.COMMANDS.items() if command.shows or command.tunes)
+# What may stand behind a command besides words with numbers: of G codes only these take letters alone, of M codes those that set
+# what the dry run counts with take none; firmwares differ in what they make of the rest.
+BARE_WORDS = frozenset({"G28", "G29", "G32", "G34"})
+VALUED = frozenset({"M82", "M83", "M104", "M109", "M140", "M190", "M200", "M204", "M207", "M220", "M221", "M568"})
+KEYED = frozenset({"MANUAL_STEPPER", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_VELOCITY_LIMIT"})
+MACROS = KEYED | SILENT_MACROS | {"TURN_OFF_HEATERS", "PAUSE"}
+
+
+def do_command(reader: Reader, name: str, words: Words) -> None:
     """Do one command. Raises GcodeError for motion codes that are not supported; other unknown codes are counted."""
     dialect = reader.dialect
     if reader.turning:
         flush(reader)
     if name in (dialect.follow_on, dialect.follow_off):
         _follow(reader, name)
-    elif name in CODES:
-        CODES[name](reader, name, words)
-    elif name in ("M2", "M30") and dialect.last:
-        reader.ended = True
-    elif name[0] == "T":
-        if dialect.serial and name not in ("T0", "T-1"):
-            raise GcodeError(f"{name} is not supported: this machine has one tool, T0")
-    elif name == "M98":
-        reader.own(name)
-    elif name[0] == "G":
-        raise GcodeError(
-            f"{name} is not supported: motion codes are G0 to G4, G10, G11, G28 and G92, modes G17, G20, "
-            f"G21, G90, G91{', G93, G94' if dialect.inverse_time else ''}{f', {dialect.follow_on}' if dialect.follow_on else ''}"
-        )
-    else:
-        reader.ignore(name)
+        return
+    match name:
+        case "G0" | "G1":
+            _straight(reader, name, words)
+        case "G2" | "G3":
+            _arc(reader, name, words)
+        case "G10" | "G11":
+            _retract(reader, name, words)
+        case "G28":
+            _at_home(reader, _axes(reader, words) or _axes(reader, reader.letters))
+        case "G29" | "G32" | "G34":  # levelling: moves that only the machine knows
+            reader.ignore(name)
+        case "G92":
+            _set(reader, words)
+        case "G93" if not dialect.inverse_time:
+            raise GcodeError(f"G93 is not supported: {dialect.firmware} has no inverse time feed")
+        case "M98":
+            reader.own(name)
+        case "M116":
+            _wait(reader)
+        case "M200":
+            _volumetric(reader, words)
+        case "M204":
+            _accelerate(reader, words)
+        case "M207":
+            _retraction(reader, words)
+        case "M220" | "M221":
+            _override(reader, name, words)
+        case "M568":
+            _tool_heat(reader, words)
+        case "M2" | "M30" if dialect.last:
+            reader.ended = True
+        case _ if name in MODES:
+            reader.modes.set(name)
+        case _ if name in NOTED:
+            _note(reader, name, words)
+        case _ if name in WITHOUT_EFFECT:
+            pass
+        case _ if name[0] == "T":
+            if dialect.serial and name not in ("T0", "T-1"):
+                raise GcodeError(f"{name} is not supported: this machine has one tool, T0")
+        case _ if name[0] == "G":
+            raise GcodeError(
+                f"{name} is not supported: motion codes are G0 to G4, G10, G11, G28 and G92, modes G17, G20, "
+                f"G21, G90, G91{', G93, G94' if dialect.inverse_time else ''}"
+                f"{f', {dialect.follow_on}' if dialect.follow_on else ''}"
+            )
+        case _:
+            reader.ignore(name)
+
+
+def do_macro(reader: Reader, code: str) -> bool:
+    """Do one line in capitals; False when its name is not known."""
+    name, _, rest = code.partition(" ")
+    if HOMES.fullmatch(name):
+        _home_turned(reader, name.removeprefix(HOME))
+        return True
+    if name not in MACROS:
+        return False
+    if name in KEYED and not KEYS(f" {rest}"):
+        raise GcodeError(f"{quote(code)}: behind {name} only KEY=VALUE is allowed")
+    if reader.turning and name != "MANUAL_STEPPER":
+        flush(reader)
+    values = read_values(rest)
+    match name:
+        case "MANUAL_STEPPER":
+            _turn(reader, values)
+        case "SET_HEATER_TEMPERATURE":
+            _heat(reader, values)
+        case "TEMPERATURE_WAIT":
+            _wait_for(reader, values)
+        case "TURN_OFF_HEATERS":
+            for set_target, _ in HEATERS.values():
+                reader.note(set_target, letters="S")
+        case "SET_VELOCITY_LIMIT":
+            _limit(reader, values)
+        case "PAUSE":
+            reader.note("M0")
+    return True
 
 
 def flush(reader: Reader) -> None:
@@ -121,20 +203,9 @@ def _arc(reader: Reader, name: str, words: Words) -> None:
         reader.row(row_before, feed)
 
 
-def _mode(reader: Reader, name: str, words: Words) -> None:
-    if name == "G93" and not reader.dialect.inverse_time:
-        raise GcodeError(f"G93 is not supported: {reader.dialect.firmware} has no inverse time feed")
-    reader.modes.set(name)
-
-
 def _axes(reader: Reader, words: Words) -> list[str]:
     """The letters of axes, filament left out."""
     return [letter for letter in words if reader.letters.get(letter, E_AXIS) != E_AXIS]
-
-
-def _home(reader: Reader, name: str, words: Words) -> None:
-    """G28: the named axes, or all."""
-    _at_home(reader, _axes(reader, words) or _axes(reader, reader.letters))
 
 
 def _at_home(reader: Reader, letters: list[str]) -> None:
@@ -146,9 +217,9 @@ def _at_home(reader: Reader, letters: list[str]) -> None:
         reader.at[reader.letters[letter]] = reader.home[reader.letters[letter]]
 
 
-def _set(reader: Reader, name: str, words: Words) -> None:
+def _set(reader: Reader, words: Words) -> None:
     """G92: the named axes stand at the given values from now on; E keeps its sum and changes its zero."""
-    _note(reader, name, words)
+    _note(reader, "G92", words)
     for axis, coordinate in reader.modes.named(words.items()):
         if axis == E_AXIS:
             reader.modes.offset[E_AXIS] = coordinate - reader.at[E_AXIS]
@@ -169,7 +240,7 @@ def _retract(reader: Reader, name: str, words: Words) -> None:
     """G10 pulls filament back as M207 has it, G11 pushes it again; with P G10 sets a tool's temperature (RepRapFirmware), with
     L20 a new zero (CNC)."""
     if name == "G10" and words.get("L") == 20.0:
-        _set(reader, "G92", {letter: value for letter, value in words.items() if letter in reader.letters})
+        _set(reader, {letter: value for letter, value in words.items() if letter in reader.letters})
     elif name == "G10" and "L" in words:
         raise GcodeError(f"G10 L{words['L']:g} is not supported: of the offsets only L20 is")
     elif name == "G10" and "P" in words:
@@ -183,7 +254,7 @@ def _retract(reader: Reader, name: str, words: Words) -> None:
         reader.row(before, reader.retraction_feed)
 
 
-def _retraction(reader: Reader, name: str, words: Words) -> None:
+def _retraction(reader: Reader, words: Words) -> None:
     """M207: how much G10 pulls (S, mm) and how fast (F, mm/min)."""
     if not reader.retracted:
         reader.retraction_mm = max(0.0, words.get("S", reader.retraction_mm))
@@ -191,21 +262,21 @@ def _retraction(reader: Reader, name: str, words: Words) -> None:
         reader.retraction_feed = words["F"]
 
 
-def _tool_heat(reader: Reader, name: str, words: Words) -> None:
+def _tool_heat(reader: Reader, words: Words) -> None:
     """M568 (RepRapFirmware): S sets the tool's temperature, A0 switches its heater off."""
     if "S" in words or words.get("A") == 0.0:
         reader.note("M104", 0.0 if words.get("A") == 0.0 else words["S"], "S")
 
 
-def _wait(reader: Reader, name: str, words: Words) -> None:
+def _wait(reader: Reader) -> None:
     """M116 (RepRapFirmware): wait for all heaters that are on."""
     for code, target in (("M190", reader.bed_c), ("M109", reader.nozzle_c)):
         if target > 0:
             reader.note(code, target, "S")
 
 
-def _accelerate(reader: Reader, name: str, words: Words) -> None:
-    """M204: P while filament moves, T while it stands still, S both; what is not above 0 changes nothing."""
+def _accelerate(reader: Reader, words: Words) -> None:
+    """M204: P for moves that push filament, T for others, S for both; values that are not above 0 change nothing."""
     for letter, value in words.items():
         if value > 0 and letter in "PS":
             reader.printing = value * reader.modes.unit_mm
@@ -214,7 +285,7 @@ def _accelerate(reader: Reader, name: str, words: Words) -> None:
 
 
 def _override(reader: Reader, name: str, words: Words) -> None:
-    """M220, M221: S percent of every feed, of all filament; what is not above 0 changes nothing."""
+    """M220, M221: S percent of every feed, of all filament; a value that is not above 0 changes nothing."""
     percent = words.get("S", 0.0)
     if percent > 0 and name == "M220":
         reader.feed_share = percent / 100.0
@@ -222,62 +293,11 @@ def _override(reader: Reader, name: str, words: Words) -> None:
         reader.flow = percent / 100.0
 
 
-def _volumetric(reader: Reader, name: str, words: Words) -> None:
+def _volumetric(reader: Reader, words: Words) -> None:
     """M200: with D, the filament's diameter, E words are mm3 from here on; D0 or S0: millimetres again."""
     if "D" in words or words.get("S") == 0.0:
         diameter = words.get("D", 0.0) * reader.modes.unit_mm
         reader.filament_mm2 = pi * max(diameter, 0.0) ** 2 / 4.0 if words.get("S") != 0.0 else 0.0
-
-
-def _nothing(reader: Reader, name: str, words: Words) -> None:
-    """Codes without a bearing on motion or heat."""
-
-
-def _probe(reader: Reader, name: str, words: Words) -> None:
-    """Levelling: moves that only the machine knows."""
-    reader.ignore(name)
-
-
-ACTIONS: tuple[tuple[Callable[[Reader, str, Words], None], str], ...] = (
-    (_straight, "G0 G1"),
-    (_arc, "G2 G3"),
-    (_mode, " ".join(MODES)),
-    (_note, "G4 M0 M1 M226 M600 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
-    (_nothing, "G17 G40 G43 G49 G53 G54 G61 G64 G80 G91.1 G92.1 G92.2 M6"),
-    (_nothing, "M17 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M126 M127 M208 M486 M502 M572 M900"),
-    (_accelerate, "M204"),
-    (_override, "M220 M221"),
-    (_volumetric, "M200"),
-    (_home, "G28"),
-    (_set, "G92"),
-    (_retract, "G10 G11"),
-    (_retraction, "M207"),
-    (_tool_heat, "M568"),
-    (_wait, "M116"),
-    (_probe, "G29 G32 G34"),
-)
-CODES = {code: action for action, codes in ACTIONS for code in codes.split()}
-# What may stand behind a command besides words with numbers: of G codes only these take letters alone, of M codes those that set
-# what the dry run counts with take none; firmwares differ in what they make of the rest.
-BARE_WORDS = frozenset({"G28", "G29", "G32", "G34"})
-VALUED = frozenset({"M82", "M83", "M104", "M109", "M140", "M190", "M200", "M204", "M207", "M220", "M221", "M568"})
-
-
-def macro(reader: Reader, code: str) -> bool:
-    """Do one line in capitals; False when its name is not known."""
-    name, _, rest = code.partition(" ")
-    action = MACROS.get(name)
-    if action is None:
-        homes = HOMES.fullmatch(name) is not None
-        if homes:
-            _home_turned(reader, name.removeprefix(HOME))
-        return homes
-    if name in KEYED and not KEYS(f" {rest}"):
-        raise GcodeError(f"{quote(code)}: behind {name} only KEY=VALUE is allowed")
-    if reader.turning and name != "MANUAL_STEPPER":
-        flush(reader)
-    action(reader, read_values(rest))
-    return True
 
 
 def _number(values: Values, key: str, default: float | None = None) -> float:
@@ -338,24 +358,7 @@ def _wait_for(reader: Reader, values: Values) -> None:
         reader.note(HEATERS[values["SENSOR"]][1], target, "S")
 
 
-def _off(reader: Reader, values: Values) -> None:
-    for code, _ in HEATERS.values():
-        reader.note(code, letters="S")
-
-
 def _limit(reader: Reader, values: Values) -> None:
     accel = _number(values, "ACCEL", inf)
     if 0 < accel < inf:
         reader.printing = reader.travelling = accel
-
-
-KEYED = frozenset({"MANUAL_STEPPER", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_VELOCITY_LIMIT"})
-MACROS: dict[str, Callable[[Reader, Values], None]] = {
-    "MANUAL_STEPPER": _turn,
-    "SET_HEATER_TEMPERATURE": _heat,
-    "TEMPERATURE_WAIT": _wait_for,
-    "TURN_OFF_HEATERS": _off,
-    "PAUSE": lambda reader, values: reader.note("M0"),
-    **{name: lambda reader, values: None for name, command in klipper.COMMANDS.items() if command.shows or command.tunes},
-    "SET_VELOCITY_LIMIT": _limit,
-}

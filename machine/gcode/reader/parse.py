@@ -11,7 +11,7 @@ from machine.gcode.commands import PATHS
 from machine.gcode.line_text import FREE_TEXT, begins_layer, begun_part, command_name, read_line, to_ascii
 from machine.gcode.lines import Lines
 from machine.gcode.modes import MODES
-from machine.gcode.reader.codes import BARE_WORDS, VALUED, dispatch, flush, macro
+from machine.gcode.reader.codes import BARE_WORDS, VALUED, do_command, do_macro, flush
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, Remarks, Unheld, pieces
 from machine.gcode.reader.plain_moves import read_plain_moves
 from machine.gcode.reader.state import Reader, reader_of
@@ -80,7 +80,7 @@ def _line(reader: Reader, line: str) -> None:
 
 
 def _remark(reader: Reader, text: str) -> None:
-    """What a comment says, the sign taken off: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
+    """Apply a comment, without its sign: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
     text = text.strip()
     if begins_layer(text):
         reader.layer += 1
@@ -116,7 +116,7 @@ def _positive(text: str) -> float:
 
 
 def _check_condition(reader: Reader, line: str, command: str) -> None:
-    """Refuse a move or a mode below `if`, `else` or `while`: only the firmware knows whether it is done, and how often."""
+    """Refuse a move or a mode below `if`, `else` or `while`: only the firmware knows whether and how often it runs."""
     spread, name = line.expandtabs(4), command_name(command)
     indent = len(spread) - len(spread.lstrip())
     if reader.condition is not None and indent <= reader.condition:
@@ -136,7 +136,7 @@ def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
     others = {letter: value for letter, value in words if letter not in "GMT"}
     goes_on = reader.motion != "" and not reader.dialect.serial and not reader.letters.keys().isdisjoint(others)
     if not named and goes_on:
-        dispatch(reader, reader.motion, others)
+        do_command(reader, reader.motion, others)
         return
     if not named and not reader.dialect.serial and words[0][0] == "F" and words[0][1] > 0:
         reader.modes.move(reader.at, words[:1])
@@ -146,17 +146,17 @@ def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
     if reader.dialect.serial and (second := next((_name(*word) for word in words[1:] if word[0] in "GM"), None)):
         raise GcodeError(f"{quote(text)} holds two commands, {named[0]} and {second}: write one a line")
     if len(named) == 1 or reader.dialect.serial:
-        dispatch(reader, named[0], dict(words[1:]))
+        do_command(reader, named[0], dict(words[1:]))
         return
     placed = [name for name in named if name in PLACED]
     if len(placed) > 1:
         raise GcodeError(f"{quote(text)} holds two motions, {placed[0]} and {placed[1]}")
     for name in [name for name in named if name not in (*placed, *STOPS)]:
-        dispatch(reader, name, {} if name[0] == "G" else others)
+        do_command(reader, name, {} if name[0] == "G" else others)
     if placed or goes_on:
-        dispatch(reader, placed[0] if placed else reader.motion, others)
+        do_command(reader, placed[0] if placed else reader.motion, others)
     for name in [name for name in named if name in STOPS]:
-        dispatch(reader, name, {})
+        do_command(reader, name, {})
 
 
 def _irregular(reader: Reader, code: str, text: str) -> None:
@@ -174,12 +174,12 @@ def _irregular(reader: Reader, code: str, text: str) -> None:
         if dialect.serial and name not in FREE_TEXT:
             _check_alone(name, rest, text)
         words = FLAG.findall(rest) if FLAGS.fullmatch(code) else []
-        dispatch(reader, name, {letter: float(value or 0.0) for letter, value in words})
+        do_command(reader, name, {letter: float(value or 0.0) for letter, value in words})
     elif MACRO.fullmatch(code) and text.isprintable():
         name, _, rest = code.partition(" ")
         if dialect.serial and not dialect.macros and name not in dialect.statements:
             _check_alone(name, rest, text)
-        if not dialect.macros or not macro(reader, code):
+        if not dialect.macros or not do_macro(reader, code):
             reader.own(name)
     elif re.match(r"O *[0-9<]|#|IF *\[|WHILE *\[", code):
         raise GcodeError(f"{quote(text)}: parameters and O words are not supported, only plain G-code is")
@@ -198,7 +198,7 @@ def _name(letter: str, value: float) -> str:
 
 
 def _program_of(reader: Reader) -> ParsedProgram:
-    """All that a reader has read."""
+    """The program that a reader has read."""
     columns, count = reader.columns, reader.rows
     begins, remark = columns.starts if len(columns.starts) else columns.places, columns.remark_rows[: reader.remarks].T
     program = ParsedProgram(
@@ -236,7 +236,7 @@ def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader
 
 
 def _feed_length(change: Floats, largest: bool = False) -> Floats:
-    """(n,) what F counts along (n, 6) changes, by the rule of NIST RS274.
+    """(n,) lengths that F refers to along (n, 6) changes, by the rule of NIST RS274.
 
     largest: of a pure turn only the axis that goes farthest (Klipper).
     """
@@ -258,7 +258,7 @@ def _feeds(given: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floa
 
 
 def _turn_starts(program: ParsedProgram, followed: Indices) -> NDArray[np.bool_]:
-    """(n,) False for a row that only goes on with the turn of the row before: the head stays, the direction too."""
+    """(n,) False for a row that continues the turn of the row before, with the head at rest and in the same direction."""
     start, end = program.start, program.end
     turn = end[:, 3:] - start[:, 3:]
     size = np.hypot(turn[:, 0], turn[:, 1])

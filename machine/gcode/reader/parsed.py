@@ -1,4 +1,4 @@
-"""Parsed: what a G-code text holds, as arrays with one row per move."""
+"""Parsed program: the moves, events and comments of a G-code text as arrays with one row per move."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ OWN = "macro"  # the code of an Event that is a macro the machine defines for it
 
 
 class MoveKind(IntEnum):
-    """What a straight move does; RETRACT: filament alone, back or forth; ROTATE: the table turns."""
+    """The kind of a straight move; RETRACT: filament alone, either way; ROTATE: the table turns."""
 
     TRAVEL = 0
     EXTRUDE = 1
@@ -33,7 +33,7 @@ class MoveKind(IntEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """Something that is not a move: code as written ("M104"), its S (or P) value, letters named; before row `row`."""
+    """A command that is not a move: code as written ("M104"), its S (or P) value, its letters; before row `row`."""
 
     line: int
     code: str
@@ -44,7 +44,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Unheld:
-    """What a comment tells of a place that no support could be given; layer 0 and an empty reason: not told."""
+    """An area without support, from an ;UNSUPPORTED: comment; layer 0 and an empty reason: not given."""
 
     line: int
     part: int
@@ -54,8 +54,8 @@ class Unheld:
 
 
 class Remarks(NamedTuple):
-    """What comments and M204 tell of the rows that follow, (k,) each: part, layer, type, width and height of a bead, mm/s2, inf
-    where the axes decide."""
+    """The state that comments and M204 set for the rows that follow, (k,) each: part, layer, type, width and height of a bead,
+    acceleration in mm/s2, inf where the axes' limits count."""
 
     part: Indices32
     layer: Indices32
@@ -73,7 +73,7 @@ class ParsedProgram:
     where G28 or G92 set a position. e_mm: filament pushed by the move. feed: F in units per minute. remark: which of remarks
     holds for the row. types: the ;TYPE: names. layers: number of layer changes. parts: their numbers in order. replaced: line
     number and command of every text with characters that a serial line does not carry. announced: how many parts `;PART:1 of 3`
-    tells, 0 where none does; part_totals: what comments tell of the parts' beads."""
+    announces, 0 without such a comment; part_totals: from ;CONTENTS: comments."""
 
     line: Indices32
     start: Floats
@@ -115,12 +115,12 @@ class ParsedProgram:
 
     @property
     def width_mm(self) -> Floats:
-        """(n,) from ;WIDTH:, 0 when not told."""
+        """(n,) from ;WIDTH:, 0 without one."""
         return self.remarks.width_mm[self.remark]
 
     @property
     def height_mm(self) -> Floats:
-        """(n,) from ;HEIGHT:, 0 when not told."""
+        """(n,) from ;HEIGHT:, 0 without one."""
         return self.remarks.height_mm[self.remark]
 
     @property
@@ -135,7 +135,7 @@ class ParsedProgram:
         return np.transpose([(axis.min(initial=np.inf), axis.max(initial=-np.inf)) for axis in self.end.T])
 
     def ways_mm(self, rows: Indices | slice = slice(None)) -> Floats:
-        """(m,) how far X Y Z go in some moves."""
+        """(m,) path lengths in X Y Z of some moves."""
         return _ways(self.start[rows], self.end[rows])
 
     def changes(self, rows: Indices | slice = slice(None)) -> Floats:
@@ -143,19 +143,19 @@ class ParsedProgram:
         return np.column_stack([self.end[rows] - self.start[rows], self.e_mm[rows]])
 
     def turned_between(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """(m - 1,) whether the table stands otherwise after the one than after the other of each two of (m,) rows."""
+        """(m - 1,) whether the table's pose changes between neighbours of (m,) rows."""
         tilt_deg, turn_deg = self.end[rows, 3], self.end[rows, 4]
         turned: NDArray[np.bool_] = (tilt_deg[1:] != tilt_deg[:-1]) | (turn_deg[1:] != turn_deg[:-1])
         return turned
 
     def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
-        """(m,) a number for the layer of each row, another in each part."""
+        """(m,) a number for the layer of each row, unique over all parts."""
         keys: NDArray[np.int64] = self._remark_keys[self.remark[rows]]
         return keys
 
     @property
     def layer_key_count(self) -> int:
-        """All layer_keys are below it."""
+        """Upper bound of the layer_keys, exclusive."""
         return int(self._remark_keys.max(initial=-1)) + 1
 
     @cached_property

@@ -34,7 +34,7 @@ WORDS = Texts.of([b"WIDTH:", b"HEIGHT:", b"TYPE:", b"LAYER_CHANGE", b"LAYER:", b
 
 
 class Meaning(NamedTuple):
-    """What words mean during a run. letters: (256,) axis, F or NONE of each byte; words: WORDS; types: the kinds that are known,
+    """The meaning of words during a run. letters: (256,) axis, F or NONE of each byte; words: WORDS; types: the known kinds,
     by number. units, steps, offset: (6,) as those of Modes. rapid: G0 is as fast as can be. accelerations: (2,) of moves that
     push filament, and of others.
     """
@@ -53,7 +53,7 @@ class Meaning(NamedTuple):
 def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
     """Rows of the plain lines from line `first`, counted from 0; returns the first line that is not plain.
 
-    Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row.
+    Nothing is read while M221, M200 or G93 change the meaning of a move's words, nor while a turn is still pending.
     """
     modes = reader.modes
     begin = lines.content[lines.start[first] : lines.start[first] + 2].tobytes()
@@ -153,7 +153,7 @@ def _is_blank(byte: int) -> bool:
 
 @no_nrt
 def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Floats) -> bool:
-    """Whether a comment is plain, its sign and the blanks behind it taken off: what it tells is in the state then."""
+    """Whether a comment is plain; if so, it is applied to the state. The sign and the blanks behind it are skipped."""
     while begin < end and _is_blank(text[begin]):
         begin += 1
     if begin == end:
@@ -217,7 +217,7 @@ def _begins(text: Bytes, begin: int, end: int, word: Bytes) -> bool:
 
 @no_nrt
 def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], words: Floats) -> int:
-    """How many words a plain move has, each what it stands for and its value; -1: the line is none."""
+    """Number of words of a plain move, with the axis and value of each; -1: the line is no plain move."""
     if end - begin < 5 or end - begin >= LONGEST or text[begin] != 71 or (text[begin + 1] != 48 and text[begin + 1] != 49):
         return -1
     at, count, named = begin + 2, 0, 0

@@ -1,4 +1,4 @@
-"""State: what the firmware knows while a text is read, and the rows and events so far, in columns that a kernel can write to."""
+"""State: the firmware's state while a text is read, and the rows and events so far, in columns that a kernel can write to."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -38,7 +38,7 @@ class Columns(NamedTuple):
 
 @dataclass(slots=True)
 class Reader:
-    """Position X Y Z tilt turn E, modes, what the comments said, and the rows so far.
+    """Position X Y Z tilt turn E, modes, the state set by comments, and the rows so far.
 
     at: X Y Z tilt turn as the program counts them, all filament pushed so far. A row's feed below 0 is one over its minutes
     (G93), inf: as fast as the axes can. Rows that follow each other often share a remark: what comments and M204 say of them."""
@@ -59,7 +59,7 @@ class Reader:
     printing: float = inf
     travelling: float = inf
     motion: str = ""
-    retraction_mm: float = 3.0  # of G10 until M207 tells: Marlin's default
+    retraction_mm: float = 3.0  # of G10 until M207 sets it: Marlin's default
     retraction_feed: float = 2700.0
     retracted: bool = False
     nozzle_c: float = 0.0
@@ -116,7 +116,7 @@ class Reader:
         self.rows += 1
 
     def note(self, code: str, value: float = 0.0, letters: str = "") -> None:
-        """Put an event on record, before the next row; targets of heaters are remembered."""
+        """Record an event before the next row; targets of heaters are remembered."""
         if code in NOZZLE:
             self.nozzle_c = value
         elif code in BED:
@@ -124,12 +124,12 @@ class Reader:
         self.events.append(Event(self.number, code, value, letters, self.rows))
 
     def ignore(self, code: str) -> None:
-        """Count what is not understood and does not move."""
+        """Count a command that is unknown and moves nothing."""
         first, count = self.ignored.get(code, (self.number, 0))
         self.ignored[code] = (first, count + 1)
 
     def own(self, code: str) -> None:
-        """Count a macro of the machine's own, which may home and heat unseen, and put it on record."""
+        """Count and record a macro of the machine's own, which may home and heat unseen."""
         self.ignore(code)
         self.note(OWN, letters=code)
 

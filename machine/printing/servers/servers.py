@@ -23,6 +23,7 @@ from machine.printing.servers.moonraker import Moonraker
 from machine.printing.servers.octoprint import OctoPrint
 from machine.printing.servers.server import PrintServer
 from profiles.errors import ServerError
+from profiles.messages import phrase
 from profiles.places import parse, shipped, tables
 
 KINDS: Mapping[str, type[PrintServer]] = {"octoprint": OctoPrint, "moonraker": Moonraker, "duet": Duet}

@@ -28,7 +28,7 @@ PAGE = """<!doctype html>
 
 @contextmanager
 def redirecting(address: str) -> Iterator[Path]:
-    """A file that this user alone can read, as long as the program goes on. Raises OSError where none can be written."""
+    """A redirecting page that this user alone can read, until the program ends. Raises OSError where none can be written."""
     folder = state_folder()
     remove_older(folder.glob(f"{PREFIX}*{SUFFIX}"), OLD_S)
     opened, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=folder)  # of mode 0600

@@ -1,4 +1,4 @@
-"""Guard: who is answered here: only pages of this server, under a name of this computer, by an address that holds the token.
+"""Guard: only pages of this server are answered, under a name of this computer, by an address that holds the token.
 
 Other users of this computer reach its ports too, so the address is secret. A page from elsewhere could reach the server by the
 person's own browser: its Origin is refused, and a name of its own that points here (DNS rebinding) is no name of this computer.
@@ -74,21 +74,20 @@ def refusal(headers: Headers, method: str, path: str, token: str, port: int) -> 
     return None
 
 
-class Guard:
+def guarded(app: "ASGIApp", token: str, port: int) -> "ASGIApp":
     """An ASGI application that lets through to another one what may pass, with headers that keep its answers to its pages."""
 
-    def __init__(self, app: "ASGIApp", token: str, port: int) -> None:
-        self._app, self._token, self._port = app, token, port
-
-    async def __call__(self, scope: "Scope", receive: "Receive", send: "Send") -> None:
+    async def guard(scope: "Scope", receive: "Receive", send: "Send") -> None:
         if scope["type"] == "lifespan":
-            await self._app(scope, receive, send)
+            await app(scope, receive, send)
             return
-        refused = refusal(scope["headers"], method_of(scope), scope["path"], self._token, self._port)
+        refused = refusal(scope["headers"], method_of(scope), scope["path"], token, port)
         if refused is None:
-            await self._app(scope, receive, with_headers(send))
+            await app(scope, receive, with_headers(send))
         else:
             await refuse(scope, send, *refused)
+
+    return guard
 
 
 async def refuse(scope: "Scope", send: "Send", status: int, sentence: str) -> None:

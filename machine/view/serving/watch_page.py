@@ -18,7 +18,7 @@ from machine.notices import say
 from machine.pipeline.programs import LoadedProgram
 from machine.view.page import print_page
 from machine.view.serving.browser import lead_browser
-from machine.view.serving.guard import HOST, UNKNOWN, Guard
+from machine.view.serving.guard import HOST, UNKNOWN, guarded
 from profiles.errors import OutputError, reason
 from profiles.messages import option
 
@@ -96,8 +96,8 @@ def serve(page: bytes, port: int = 0, control: Control | None = None) -> Iterato
         raise OutputError(f"{option('watch-port', port)} cannot be used: {reason(error)}") from None
     there = own.getsockname()[1]
     watched.address = f"http://{HOST}:{there}/{watched.token}/"
-    guarded = Guard(_application(watched, control), watched.token, there)
-    config = Config(guarded, log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=GRACE_S)
+    app = guarded(_application(watched, control), watched.token, there)
+    config = Config(app, log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=GRACE_S)
     server = Server(config)
     thread = Thread(target=server.run, args=([own],), daemon=True)
     thread.start()

@@ -19,7 +19,7 @@ from machine.notices import say
 from machine.pipeline.output import plain_name
 from machine.pipeline.profile_file import profile_text
 from machine.view.page import TEMPLATE, bundle, hash_source
-from machine.view.serving.guard import NAMES, Guard
+from machine.view.serving.guard import NAMES, guarded
 from machine.workbench.access.gate import Gate
 from machine.workbench.access.network import Lan
 from machine.workbench.access.pairing import Door
@@ -200,7 +200,7 @@ def application(served: Served, token: str, port: int, door: Door | None = None)
     """The server of this computer, below `/TOKEN/`; the number of a session follows. door: of the network, where it is open."""
     page = workbench_page((f"ws://{name}:{port}" for name in NAMES), "open" if door else "")
     of_door = [WebSocketRoute(BELOW + "devices", devices_line(door))] if door else []
-    return Guard(_router(served, page, of_door), token, port)
+    return guarded(_router(served, page, of_door), token, port)
 
 
 def lan_application(served: Served, door: Door, lan: Lan, port: int) -> ASGIApp:

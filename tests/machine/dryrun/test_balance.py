@@ -5,9 +5,9 @@ from math import cos, nextafter, pi, radians, sin, tan
 import numpy as np
 import pytest
 
-from machine.dryrun.balance.columns import NOTHING, Bars, inside_loops, laid, lattice_over, tops
-from machine.dryrun.balance.interfaces import Interface, interfaces
+from machine.dryrun.columns import NOTHING, Bars, inside_loops, laid, lattice_over, tops
 from machine.dryrun.dryrun import dry_run, summary
+from machine.dryrun.interfaces import InterfaceBalance, balance_of, interfaces
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import Lines, layers, on, word
 from tools.layer_balance import PartBalance, layer_balances, over_room, wall_edges
@@ -19,10 +19,9 @@ def bar(begin: tuple[float, ...], end: tuple[float, ...], up: tuple[float, ...],
     return Bars(*(np.array([v]) for v in (begin, end, up)), np.array([half]), np.array([height]))
 
 
-def faces(lines: Lines, machine: str = "generic_ac") -> list[Interface]:
+def faces(lines: Lines, machine: str = "generic_ac") -> list[InterfaceBalance]:
     profile, _, _ = bent(machine)
-    run = dry_run(lines, profile, known=())
-    return list(interfaces(run.program, run.deposited, profile))
+    return list(dry_run(lines, profile).interfaces)
 
 
 def balances(lines: Lines) -> list[PartBalance]:
@@ -115,10 +114,9 @@ def test_a_first_layer_with_another_flow_has_so_much_more_plastic_over_its_room(
 
 def test_the_dry_run_keeps_of_every_interface_what_the_columns_come_to() -> None:
     profile, _, lines = bent("generic_ac")
-    balances = dry_run(lines, profile).interfaces
-    assert [(face.part, face.area_mm2, face.contact, face.over_room, face.beads_over_room) for face in balances] == [
-        (face.part, face.area_mm2, face.contact, face.over_room, face.beads_over_room) for face in faces(list(lines))
-    ]
+    run = dry_run(lines, profile)
+    balances = run.interfaces
+    assert balances == tuple(map(balance_of, interfaces(run.program, run.deposited, profile)))
     told = summary(dry_run(richer(2, 1, 1.5), profile))["interfaces"]
     assert [face["part"] for face in told] == [2, 3]
     assert told[0]["plastic_over_room"] == pytest.approx(1.5 * balances[0].over_room, rel=0.06)
@@ -130,7 +128,9 @@ def test_other_axes_and_firmwares_show_the_same_interfaces() -> None:
 
 
 def test_outer_walls_of_blocks_on_each_other_lie_on_plastic() -> None:
-    held, inside_mm = wall_edges(faces(list(bent("generic_ac")[2]))[0])
+    profile, _, lines = bent("generic_ac")
+    run = dry_run(lines, profile, known=())
+    held, inside_mm = wall_edges(next(interfaces(run.program, run.deposited, profile)))
     assert held.mean() > 0.99
     assert np.quantile(inside_mm, 0.9) < 0.05
 

@@ -9,7 +9,7 @@ from shapely import LineString, MultiLineString, MultiPolygon, box
 from shapely.affinity import translate
 
 from machine.dryrun import DryRun, dry_run
-from machine.dryrun.conformity.filling import filled_share, in_beads, lattice
+from machine.dryrun.filling import fill, filled_share
 from machine.dryrun.height_field import CELL_MM, Field, depth_of, empty_field, highest_first, lay_bead
 from mdp.head import head_of
 from profiles.profile import load
@@ -157,14 +157,8 @@ def test_a_box_of_parallel_beads_fills_its_model_and_half_of_it_half() -> None:
         lines += rows
     whole, half = _run("\n".join(lines)), _run("\n".join(lines[: len(lines) // 2]))
     model = shapes.box(10.0, 10.0, 10.0)
-    assert filled_share(whole, model, load(), 20_000) == pytest.approx(1.0, abs=0.002)
-    assert filled_share(half, model, load(), 20_000) == pytest.approx(0.5, abs=0.02)
-
-
-def test_a_lattice_has_about_as_many_points_as_asked_all_inside() -> None:
-    points = lattice(shapes.ball(10.0), 5000)
-    assert len(points) == pytest.approx(5000, rel=0.05)
-    assert (np.linalg.norm(points - [0, 0, 10], axis=1) <= 10.0).all()
+    assert filled_share(whole, model, 20_000) == pytest.approx(1.0, abs=0.002)
+    assert filled_share(half, model, 20_000) == pytest.approx(0.5, abs=0.02)
 
 
 @settings(deadline=None)
@@ -172,6 +166,7 @@ def test_a_lattice_has_about_as_many_points_as_asked_all_inside() -> None:
 def test_a_place_is_in_a_bar_by_the_plain_inequalities(place: tuple[float, float, float]) -> None:
     x, y, z = place
     wanted = abs(y) <= 0.52 and -1.02 <= z <= 0.02 and -0.5 <= x <= 10.5 and (abs(y) <= 0.5)
-    args = (np.array([[[0.0, 0, 0], [10.0, 0, 0]]]), np.array([[0.0, 0, 1]]), np.array([1.0]), np.array([1.0]))
+    filled = np.zeros((1, 1, 1), np.bool_)
+    fill(filled, np.array(place), 1.0, np.array([[[0.0, 0, 0], [10.0, 0, 0]]]), np.array([[0.0, 0, 1]]), np.array([[1.0, 1.0]]))
     edge = min(abs(abs(y) - 0.5), abs(abs(y) - 0.52), abs(z - 0.02), abs(z + 1.02), abs(x + 0.5), abs(x - 10.5)) < 0.03
-    assert edge or bool(in_beads(np.array([place]), *args)[0]) == wanted
+    assert edge or bool(filled[0, 0, 0]) == wanted

@@ -2,8 +2,7 @@
 
 import pytest
 
-from machine.dryrun.dryrun import dry_run
-from machine.dryrun.timeline import Timeline
+from machine.dryrun.dryrun import Timeline, dry_run
 from profiles.profile import load
 
 PROFILE = load()

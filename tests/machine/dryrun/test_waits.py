@@ -3,7 +3,7 @@
 import pytest
 
 from machine.dryrun import dry_run
-from machine.dryrun.timeline import Timeline
+from machine.dryrun.dryrun import Timeline
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import before_turn
 

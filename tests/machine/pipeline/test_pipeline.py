@@ -6,7 +6,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
-from machine.dryrun.conformity.deposit import inside_share
+from machine.dryrun.agreement import agreement
 from machine.link.stream import print_lines
 from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.requests import ModelRequest
@@ -47,7 +47,7 @@ def test_the_simulated_printer_lays_the_plastic_where_the_model_is(machine: str,
     assert np.abs(segments - program.run.deposited.segments()).max() < 2e-3
     assert program.decomposition is not None
     assert (len(program.decomposition.parts) == 1) == (Path(model).name == WHOLE)
-    assert inside_share(program.run, program.decomposition.mesh, profile.process.line_width_mm).share >= 0.99
+    assert agreement(program.run, program.decomposition.mesh, profile)[0].outside <= 0.01
     assert (record.clamped, record.unknown, record.nozzle_target_c, record.bed_target_c) == (0, 0, 0.0, 0.0)
 
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from machine.dryrun.conformity.agreement import agreement
+from machine.dryrun.agreement import agreement
 from machine.pipeline.comparison import compare_with_one_part
 from machine.pipeline.pipeline import build
 from machine.pipeline.plate import on_one_plate

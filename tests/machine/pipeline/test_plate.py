@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from machine.dryrun.conformity.agreement import agreement
+from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import summary
 from machine.pipeline.given_plan import request_of_each
 from machine.pipeline.pipeline import build

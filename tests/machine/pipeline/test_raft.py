@@ -8,7 +8,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
-from machine.dryrun.conformity.agreement import agreement
+from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.pipeline.comparison import compare_with_one_part
 from machine.pipeline.pipeline import build

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from machine.dryrun.dryrun import dry_run
+from machine.dryrun.dryrun import DryRun, dry_run
 from machine.program import Alternative, Program, joints_of_print
-from machine.view.layers import layers_of
+from machine.view.layers import Layers, layers_of, sums_of_parts
 from machine.view.paths import end_times_s
 from machine.view.report import LAID, parts_report, print_report
 from mdp.joint import joints_of
@@ -23,10 +23,15 @@ def seconds(text: str) -> int:
     return sum(int(number) * UNITS[unit] for number, unit in re.findall(r"(\d+)([hms])", text))
 
 
+def sums_of(run: DryRun) -> tuple[Layers, list[dict[str, Any]]]:
+    layers = layers_of(run.program, 0.2)
+    return layers, sums_of_parts(run.program, layers, end_times_s(run))
+
+
 def tables(program: Program, alternatives: tuple[Alternative, ...] = ()) -> dict[str, Any]:
     profile = example()[0]
     run = program.run
-    report = print_report(program, profile, layers_of(run.program, 0.2), end_times_s(run), alternatives=alternatives)
+    report = print_report(program, profile, *sums_of(run), alternatives=alternatives)
     return {"facts": dict(report["facts"]), **{table["title"]: table for table in report["tables"]}}
 
 
@@ -86,8 +91,7 @@ def test_joints_of_a_sliced_model_tell_contact_and_plastic_those_of_g_code_nothi
     profile, program = example()
     (face,) = program.run.interfaces
     laid = [f"{100 * face.contact:.1f}", f"{100 * face.over_room:.0f}"]
-    named = (layers_of(program.run.program, 0.2), end_times_s(program.run))
-    report = print_report(program, profile, *named, joints=joints_of_print(program, profile))
+    report = print_report(program, profile, *sums_of(program.run), joints=joints_of_print(program, profile))
     joints = next(table for table in report["tables"] if table["title"] == "Joints")
     assert joints["head"][:5] == ["part", "mm²", "contact %", "plastic %", "seam mm"]
     assert joints["rows"][0][:4] == ["2", "100.0", *laid]
@@ -122,15 +126,14 @@ def test_parts_alone_have_no_layers_and_no_time() -> None:
 
 def test_every_row_is_as_long_as_its_head_and_all_is_text() -> None:
     profile, program = example()
-    report = print_report(program, profile, layers_of(program.run.program, 0.2), end_times_s(program.run))
+    report = print_report(program, profile, *sums_of(program.run))
     for table in report["tables"]:
         assert all(len(row) == len(table["head"]) and all(isinstance(cell, str) for cell in row) for row in table["rows"])
 
 
 def test_of_a_file_that_does_not_tell_its_machine_nothing_is_pretended() -> None:
     profile, program = example()
-    named = (layers_of(program.run.program, 0.2), end_times_s(program.run))
-    report = print_report(program, profile, *named, known=False, ours=False)
+    report = print_report(program, profile, *sums_of(program.run), known=False, ours=False)
     assert dict(report["facts"])["machine"].startswith("not told")
     assert dict(report["facts"])["material"] == "not told: weights as of PLA"
     assert report["tables"][1]["notes"][-1] == "times as on generic A/C table"

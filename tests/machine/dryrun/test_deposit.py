@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
-from machine.dryrun.conformity.deposit import inside_share, outside_mm
+from machine.dryrun.agreement import outside_mm, pieces_outside
 from profiles.profile import load
 from tests import shapes
 from tests.machine.hand import printed, text
@@ -34,16 +34,18 @@ def test_a_void_is_outside() -> None:
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
 def test_our_own_print_lies_inside_its_model(machine: str) -> None:
     profile, decomposition, _, _ = printed(machine)
-    found = inside_share(dry_run(text(machine), profile), decomposition.mesh, 0.0)
-    assert found.share == 1.0
-    assert found.total_mm == pytest.approx(2 * 3 * 4 * (9.55 + 8.65))
+    beyond_mm, length_mm, _ = pieces_outside(dry_run(text(machine), profile), decomposition.mesh, 0.0)
+    assert (beyond_mm == 0.0).all()
+    assert length_mm.sum() == pytest.approx(2 * 3 * 4 * (9.55 + 8.65))
 
 
 def test_a_line_half_outside_counts_half() -> None:
     program = "G28\nM83\nG0 Z10 F600\nG0 X-10\n;TYPE:Perimeter\nG1 X30 E1 F600\n;TYPE:Skirt/Brim\nG1 X60 E1"
-    found = inside_share(dry_run(program.splitlines(), load()), shapes.box(), 0.0)
-    assert (found.share, found.total_mm, found.farthest_mm) == (pytest.approx(0.5), 40.0, 1.0)
+    beyond_mm, length_mm, rows = pieces_outside(dry_run(program.splitlines(), load()), shapes.box(), 0.0)
+    assert (length_mm[beyond_mm > 0.0].sum(), length_mm.sum(), beyond_mm.max()) == (pytest.approx(20.0), 40.0, 1.0)
+    assert set(rows.tolist()) == {2}
 
 
-def test_nothing_extruded_is_all_inside() -> None:
-    assert inside_share(dry_run(["G28", "G0 X1 Y1 F600"], load()), shapes.box(), 0.4).share == 1.0
+def test_nothing_extruded_has_no_pieces() -> None:
+    beyond_mm, length_mm, rows = pieces_outside(dry_run(["G28", "G0 X1 Y1 F600"], load()), shapes.box(), 0.4)
+    assert (len(beyond_mm), len(length_mm), len(rows)) == (0, 0, 0)

@@ -1,4 +1,5 @@
-"""Columns: a lattice over a part's X and Y, what of each column beads take, and sums over windows of a square millimetre."""
+"""Columns: a lattice over X and Y, the plastic that beads lay into each of its columns, how high they reach there, and which
+columns lie inside loops. It shares no code with what gave each bead its volume."""
 
 from typing import NamedTuple
 
@@ -40,7 +41,7 @@ class Bars(NamedTuple):
 
 
 def lattice_over(points: Floats, cell_mm: float, margin_mm: float = 1.5) -> Lattice:
-    """A lattice over (n, 2) points and what is near them; its columns grow where there would be too many."""
+    """A lattice over (n, 2) points and a margin; its columns grow where there would be too many."""
     low, high = points.min(axis=0) - margin_mm, points.max(axis=0) + margin_mm
     cell = max(cell_mm, float(np.sqrt((high - low).prod() / MOST_COLUMNS)))
     return Lattice(low, cell, np.ceil((high - low) / cell).astype(np.int64))
@@ -68,7 +69,7 @@ def laid(bars: Bars, mm3: Floats, lattice: Lattice) -> Floats:
 
 @helper
 def _spread(a: Floats, b: Floats, half: float, mm3: float, lattice: Lattice, plastic: Floats) -> int:
-    """Add mm3 to every column whose middle lies within half of the line from a to b, and tell how many do."""
+    """Add mm3 to every column whose middle lies within half of the line from a to b; returns their number."""
     dx, dy, count = b[0] - a[0], b[1] - a[1], 0
     length = np.sqrt(dx * dx + dy * dy)
     if length <= 0.0:
@@ -89,7 +90,7 @@ def _spread(a: Floats, b: Floats, half: float, mm3: float, lattice: Lattice, pla
 
 @helper
 def _columns(middle: float, reach: float, axis: int, lattice: Lattice) -> tuple[int, int]:
-    """The first and the last column whose middle lies so near to a place along an axis."""
+    """The first and the last column whose middle lies within reach of a place along an axis."""
     first = int(np.ceil((middle - reach - lattice.origin[axis]) / lattice.cell - 0.5))
     last = int(np.floor((middle + reach - lattice.origin[axis]) / lattice.cell - 0.5))
     return max(first, 0), min(last, lattice.shape[axis] - 1)
@@ -163,7 +164,7 @@ def _leaves_end(x: float, y: float, up: Floats, half: float, height: float) -> f
 
 @helper
 def _leaves(x: float, y: float, slabs: tuple[tuple[float, float, float, float, float], ...]) -> float:
-    """Height at which an upright line leaves what is common to slabs, each the places p with least <= n . p <= most."""
+    """Height at which an upright line leaves the intersection of slabs, each the places p with least <= n . p <= most."""
     low, high = NOTHING, -NOTHING
     for nx, ny, nz, least, most in slabs:
         across = x * nx + y * ny

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trimesh.triangles import closest_point
 
-from machine.dryrun.conformity.agreement import fit_shift
-from machine.dryrun.conformity.deposit import inside, nearest_faces, outside_mm, signed
-from machine.dryrun.conformity.filling import ROUND_MM, in_beads, lattice
+from machine.dryrun.agreement import fit_shift, inside, outside_mm
+from machine.dryrun.filling import ROUND_MM, fill
 from mdp.mesh import Floats, Mesh
+from mdp.sweep.rays import nearest_faces
 from tests.mdp.solids import random_solid
 from tests.shapes import box, hollow
 
@@ -62,13 +62,12 @@ def test_points_are_as_far_from_a_solid_as_from_its_nearest_face(seed: int) -> N
     points = points_about(mesh, seed, 40)
     away = distances_mm(points, mesh)
     nearest = away.min(axis=1)
-    distances, faces = nearest_faces(points, mesh, MOST_MM)
+    distances, faces = nearest_faces(mesh, points, MOST_MM)
     near = nearest < MOST_MM
     assert distances == pytest.approx(np.minimum(nearest, MOST_MM), abs=1e-9)
     assert away[near, faces[near]] == pytest.approx(nearest[near], abs=1e-9)
     within = windings(points, mesh) > 0.5
     assert outside_mm(points, mesh, MOST_MM) == pytest.approx(np.where(within, 0.0, np.minimum(nearest, MOST_MM)), abs=1e-9)
-    assert signed(points, distances, mesh) == pytest.approx(np.where(within, -distances, distances))
 
 
 def test_no_points_have_no_distance() -> None:
@@ -87,8 +86,9 @@ def test_a_point_is_filled_where_it_lies_in_some_bar_below_its_segment(seed: int
     segments = np.stack([starts, starts + along * rng.uniform(0.0, 6.0, (count, 1))], axis=1)
     segments[0, 1] = segments[0, 0]  # of no length
     width, height = rng.uniform(0.3, 2.0, count), rng.uniform(0.1, 1.0, count)
-    places = rng.uniform(-9.0, 9.0, (4000, 3))
-    filled = np.zeros(len(places), np.bool_)
+    shape = (23, 24, 25)
+    places = -9.0 + 0.75 * np.indices(shape).reshape(3, -1).T
+    filled, marked = np.zeros(len(places), np.bool_), np.zeros(shape, np.bool_)
     for k in range(1, count):
         length = np.linalg.norm(segments[k, 1] - segments[k, 0])
         way = (segments[k, 1] - segments[k, 0]) / length
@@ -97,17 +97,8 @@ def test_a_point_is_filled_where_it_lies_in_some_bar_below_its_segment(seed: int
         ends = (own[:, 0] >= -0.5 * width[k]) & (own[:, 0] <= length + 0.5 * width[k])
         filled |= beside & ends & (below <= 0.5 * height[k] + ROUND_MM)
     assert filled.sum() > 20
-    assert np.array_equal(in_beads(places, segments, ups, width, height), filled)
-
-
-@settings(max_examples=10)
-@given(seeds, st.integers(20_000, 60_000))
-def test_the_lattice_has_about_so_many_points_evenly_in_the_solid(seed: int, count: int) -> None:
-    mesh = random_solid(seed)
-    points = lattice(mesh, count)
-    assert len(points) == pytest.approx(count, rel=0.1)
-    few = points[:: max(len(points) // 100, 1)]
-    assert (windings(few, mesh) > 0.5).all()
+    fill(marked, np.full(3, -9.0), 0.75, segments, ups, np.column_stack([width, height]))
+    assert np.array_equal(marked.ravel(), filled)
 
 
 @settings(max_examples=30)

@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.balance.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, tops
+from machine.dryrun.columns import NOTHING, Bars, Lattice, Mask, inside_loops, laid, lattice_over, tops
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.strokes import Beads, parts_on_plate, turned_box
 from machine.gcode.reader.parsed import ParsedProgram
@@ -46,33 +46,12 @@ class Interface:
     plastic: Floats
     walls: Bars
 
-    @property
-    def area_mm2(self) -> float:
-        """The area of the section."""
-        return float(self.section.sum()) * self.lattice.column_mm2
-
-    @property
-    def contact(self) -> float:
-        """Share of the section where a bead lies on an earlier part."""
-        return float((self.bead & self.touching).sum() / max(1, self.section.sum()))
-
-    @property
-    def over_room(self) -> float:
-        """Plastic over room of all of the section that has something below it."""
-        there = self.touching & self.section
-        return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
-
-    @property
-    def beads_over_room(self) -> float:
-        """Plastic over room where beads lie on something, whatever they leave open."""
-        there = self.touching & self.bead
-        return float(self.plastic[there].sum() / max(float(self.room[there].sum()), 1e-9))
-
 
 @dataclass(frozen=True)
 class InterfaceBalance:
-    """What an interface comes to, without its columns: area_mm2, contact, over_room, beads_over_room as there; touching_mm2: of
-    the section, where earlier parts reach up to it."""
+    """The sums over an interface. area_mm2: of its section; contact: share of the section where a bead lies on an earlier part;
+    over_room: plastic over room of all of the section that has something below it; beads_over_room: of the beads alone that lie
+    on something; touching_mm2: area of the section that earlier parts reach up to."""
 
     part: int
     row: int
@@ -82,11 +61,24 @@ class InterfaceBalance:
     beads_over_room: float
     touching_mm2: float
 
-    @classmethod
-    def of(cls, face: Interface) -> "InterfaceBalance":
-        """The balance of an interface."""
-        touching_mm2 = float((face.touching & face.section).sum()) * face.lattice.column_mm2
-        return cls(face.part, face.row, face.area_mm2, face.contact, face.over_room, face.beads_over_room, touching_mm2)
+
+def balance_of(face: Interface) -> InterfaceBalance:
+    """The sums over an interface."""
+    section, beads, column_mm2 = face.touching & face.section, face.touching & face.bead, face.lattice.column_mm2
+    return InterfaceBalance(
+        part=face.part,
+        row=face.row,
+        area_mm2=float(face.section.sum()) * column_mm2,
+        contact=float(beads.sum() / max(1, face.section.sum())),
+        over_room=_over_room(face, section),
+        beads_over_room=_over_room(face, beads),
+        touching_mm2=float(section.sum()) * column_mm2,
+    )
+
+
+def _over_room(face: Interface, there: Mask) -> float:
+    """Plastic over room of some columns."""
+    return float(face.plastic[there].sum() / max(float(face.room[there].sum()), 1e-9))
 
 
 def findings(program: ParsedProgram, balances: Sequence[InterfaceBalance], profile: Profile) -> Iterator[Finding]:
@@ -114,15 +106,6 @@ def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> It
         turn = rotation(profile.machine, Pose(*program.end[deposited.rows[first[0]], 3:].tolist()))
         earlier = (own & (part < index))[remark[: first[0]]]
         yield _interface(program, deposited, (first, earlier), turn, profile)
-
-
-def _printing_directions(program: ParsedProgram, rows: Indices, profile: Profile) -> Floats:
-    """(k, 3) direction in which the bead of each row was laid, workpiece frame."""
-    if not len(rows):
-        return np.zeros((0, 3))
-    begins = np.concatenate([[0], np.flatnonzero(program.turned_between(rows)) + 1])
-    poses = program.end[rows[begins], 3:].tolist()
-    return np.repeat([rotation(profile.machine, Pose(*pose))[2] for pose in poses], np.diff(begins, append=len(rows)), axis=0)
 
 
 def _interface(
@@ -183,7 +166,7 @@ def _bars(program: ParsedProgram, deposited: Beads, which: Indices, turn: Floats
     begin, end = (segments[:, side] @ turn.T for side in (0, 1))
     height, length = deposited.sizes[deposited.size[which], 1], np.maximum(deposited.length_mm[which], 1e-9)
     mm3 = program.e_mm[rows] * _filament_mm2(profile)
-    return Bars(begin, end, _printing_directions(program, rows, profile) @ turn.T, 0.5 * mm3 / length / height, height)
+    return Bars(begin, end, deposited.directions(which) @ turn.T, 0.5 * mm3 / length / height, height)
 
 
 def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:

@@ -1,0 +1,182 @@
+"""Agreement: the deposited plastic compared with the model it was made from: the share that is filled, that lies outside and that
+hangs in air; and by how much each part is shifted.
+
+An outer wall runs half its width inside the surface. Its further offset along the surface's normal is a
+constant (a compensation, the resolution) and the share of a shift along that normal: a least-squares fit over walls of all
+directions tells them apart (the point-to-plane step of Chen and Medioni 1992). Walls along cuts are on no surface and are left
+out by their distance; a shift in a direction in which no wall faces is not known.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.dryrun import DryRun
+from machine.dryrun.filling import filled_share, of_model
+from machine.dryrun.findings import Finding, at_row
+from machine.dryrun.placement import unsupported_mm
+from mdp.cut import mesh_of, solid_of
+from mdp.mesh import Floats, Indices, Mesh
+from mdp.sweep.rays import faces_met, nearest_faces, triangle_tree
+from mdp.zone import Modifier
+from profiles.part_settings import process_of_part
+from profiles.profile import Profile
+from slicer.paths import Kind
+from slicer.sectioning import reach_mm
+
+WALLS = (Kind.OUTER_WALL.value, "WALL-OUTER", "Outer wall")
+PIECE_MM = 1.0
+ASIDE_MM = np.array([3.1e-7, 1.7e-7, 0.0])  # keeps upright rays off the edges of CAD faces
+MOST_SHIFT_MM = 0.1
+NEAR_MM = 1.5  # walls farther from where they should be are not of this surface
+LEAST_MM = 0.2  # of a wall's piece
+PER_PART = 3000  # pieces
+FEWEST = 40
+INFORMATION = 0.04  # of the pieces: a shift in a direction in which fewer face is not known
+TRIMMED = 3.0  # times the usual deviation
+ROUNDS = 4
+MOST_OUTSIDE = 0.01  # of the extruded length, by more than half a line: seams, brims and thin walls stay far below
+LEAST_FILLED = 0.98  # of the model at 100 % infill
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Shares 0..1. filled: of the model's inside that lies in a bead; outside: of the extruded length (skirt and support
+    aside) that lies more than half a line outside the model, farthest_mm the worst of it; unsupported: of the extruded
+    length that hangs in air where the slicer has not said so, reported: where it has. shift_mm: by which the part that lies
+    farthest from its place does so.
+    """
+
+    filled: float
+    outside: float
+    farthest_mm: float
+    unsupported: float
+    reported: float
+    shift_mm: float
+
+
+def agreement(run: DryRun, mesh: Mesh, profile: Profile, modifiers: Sequence[Modifier] = ()) -> tuple[Agreement, DryRun]:
+    """The agreement of a dry run, made without known findings, with the closed model (workpiece frame); and the run with the
+    findings added. modifiers: where the print has other settings than the profile's.
+
+    Findings: outside and shift (errors), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
+    """
+    tolerance_mm = 0.5 * profile.process.line_width_mm + reach_mm(profile.process)
+    mesh = mesh_of(solid_of(mesh))  # in spatial order, which makes the search for near faces quick
+    beyond_mm, length_mm, rows = pieces_outside(run, mesh, tolerance_mm)
+    outside = beyond_mm > tolerance_mm
+    assert run.contacts is not None
+    length, loose, reported = unsupported_mm(run.program, run.deposited, run.contacts)
+    whole, shifted = max(length, 1e-9), shifts(run, mesh, profile)
+    result = Agreement(
+        filled=filled_share(run, mesh),
+        outside=float(length_mm[outside].sum() / max(length_mm.sum(), 1e-9)),
+        farthest_mm=float(beyond_mm.max(initial=0.0)),
+        unsupported=loose / whole,
+        reported=reported / whole,
+        shift_mm=max((float(np.linalg.norm(by_mm)) for _, by_mm in shifted.values()), default=0.0),
+    )
+    processes = [profile.of_part(int(part)).process for part in set(run.program.part.tolist())]
+    processes += [process_of_part(profile.process, modifier.process) for modifier in modifiers]
+    solid = all(process.infill_density >= 1.0 for process in processes)
+    problems = [*_findings(run, rows[outside], result, solid), *_shift_findings(run, shifted)]
+    return result, replace(run, findings=(*run.findings, *problems))
+
+
+def _findings(run: DryRun, outside: Indices, result: Agreement, solid: bool) -> Iterator[Finding]:
+    """outside: rows with plastic outside the model; solid: the model is to be filled."""
+    if result.outside > MOST_OUTSIDE:
+        message = (
+            f"{100 * result.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
+            f"{result.farthest_mm:.2f} mm and more at the worst"
+        )
+        yield at_row(run.program, int(outside[0]), "error", "outside", message)
+    if solid and result.filled < LEAST_FILLED:
+        message = (
+            f"the beads fill {100 * result.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
+        )
+        yield Finding("warning", "unfilled", 0, 0, 0, message)
+
+
+def _shift_findings(run: DryRun, shifted: Mapping[int, tuple[int, Floats]]) -> Iterator[Finding]:
+    """An error for every part that lies beside the model."""
+    for part, (row, by_mm) in shifted.items():
+        size_mm = float(np.linalg.norm(by_mm))
+        if size_mm > MOST_SHIFT_MM:
+            by = " ".join(f"{letter}{value:+.2f}" for letter, value in zip("XYZ", by_mm, strict=True))
+            message = f"part {part} lies {size_mm:.2f} mm beside the model, by {by}, {MOST_SHIFT_MM:g} mm are allowed"
+            yield at_row(run.program, row, "error", "shift", message)
+
+
+def pieces_outside(run: DryRun, mesh: Mesh, tolerance_mm: float) -> tuple[Floats, Floats, Indices]:
+    """The strokes, skirt and support aside, in k pieces of at most 1 mm: (k,) distances of their midpoints from the solid, 0
+    inside it, up to four tolerances and at least 1 mm; (k,) lengths and rows. mesh: the closed model in the workpiece frame."""
+    which = of_model(run)
+    segments, length_mm = run.deposited.segments(which), run.deposited.length_mm[which]
+    counts = np.maximum(np.ceil(length_mm / PIECE_MM), 1).astype(np.int64)
+    piece = np.repeat(np.arange(len(which)), counts)
+    share = (np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[piece]
+    middles = segments[piece, 0] + share[:, None] * (segments[:, 1] - segments[:, 0])[piece]
+    return outside_mm(middles, mesh, max(4.0 * tolerance_mm, 1.0)), (length_mm / counts)[piece], run.segment_row[which][piece]
+
+
+def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
+    """(n,) distances of (n, 3) points from a closed mesh's solid: 0 inside, at most most_mm (farther is not looked for)."""
+    distances, out = np.zeros(len(points)), np.flatnonzero(~inside(points, mesh))
+    distances[out] = nearest_faces(mesh, points[out], most_mm)[0]
+    return distances
+
+
+def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
+    """(n,) whether (n, 3) points lie in a closed mesh's solid: the first face straight above them is seen from inside."""
+    rays = np.stack([points + ASIDE_MM, np.broadcast_to([0.0, 0.0, 1.0], points.shape)], axis=1)
+    met = faces_met(triangle_tree(mesh), rays, np.inf)
+    within: NDArray[np.bool_] = (met >= 0) & (mesh.normals[met, 2] > 0.0)
+    return within
+
+
+def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> dict[int, tuple[int, Floats]]:
+    """For every part with enough outer walls the row of its first one, and (3,) mm, workpiece frame, by which it lies beside the
+    closed model."""
+    walls = np.flatnonzero(run.program.rows_of_types(*WALLS)[run.segment_row])
+    walls = walls[run.deposited.length_mm[walls] > LEAST_MM]
+    part, shifted = run.program.part[run.segment_row[walls]], dict[int, tuple[int, Floats]]()
+    for index in np.unique(part).tolist():
+        pieces = _evenly(walls[part == index])
+        ups = run.deposited.directions(pieces)
+        width, height = run.deposited.sizes[run.deposited.size[pieces]].T
+        points = run.deposited.segments(pieces).mean(axis=1) - 0.5 * height[:, None] * ups
+        distance, face = nearest_faces(mesh, points, NEAR_MM)
+        normals = mesh.normals[face]
+        lateral = np.sqrt(np.maximum(0.0, 1.0 - (normals * ups).sum(axis=1) ** 2))
+        beside = np.where(inside(points, mesh), -distance, distance) + 0.5 * width * lateral
+        use = (distance < NEAR_MM) & (np.abs(beside) < NEAR_MM) & (lateral > 0.5)
+        by_mm = fit_shift(normals[use], beside[use])
+        if by_mm is not None:
+            shifted[index] = (int(run.segment_row[pieces[0]]), by_mm)
+    return shifted
+
+
+def _evenly(which: NDArray[np.int64]) -> NDArray[np.int64]:
+    return which if len(which) <= PER_PART else which[np.linspace(0, len(which) - 1, PER_PART).astype(np.int64)]
+
+
+def fit_shift(normals: Floats, beside: Floats) -> Floats | None:
+    """(3,) shift that explains best how far (n,) walls lie outward along (n, 3) normals, beside a constant; None: too few."""
+    keep = np.ones(len(beside), dtype=np.bool_)
+    shift = np.zeros(3)
+    for _ in range(ROUNDS):
+        if keep.sum() < FEWEST:
+            return None
+        facing = normals[keep] - normals[keep].mean(axis=0)
+        value, axis = np.linalg.eigh(facing.T @ facing / keep.sum())
+        axes = axis[:, value > INFORMATION]
+        along, *_ = np.linalg.lstsq(facing @ axes, beside[keep] - beside[keep].mean(), rcond=None)
+        shift = axes @ along
+        left = beside - normals @ shift
+        left -= np.median(left[keep])
+        usual = 1.4826 * float(np.median(np.abs(left[keep]))) + 1e-3
+        keep = np.abs(left) < TRIMMED * usual + 0.02
+    return shift
