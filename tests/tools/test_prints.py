@@ -37,7 +37,7 @@ def test_the_table_counts_every_row_once_and_names_what_was_not_printed() -> Non
     rows = [
         {"run": "default", "model": name, "status": status, "core_s": "2", "sentence": sentence, "findings": findings}
         for name, status, sentence, findings in (
-            ("a.stl", "done", "", "overhang;uncalibrated"),
+            ("a.stl", "done", "", "overhang uncalibrated"),
             ("b.stl", "refused", "b.stl: is empty", ""),
         )
     ]

@@ -29,7 +29,9 @@ def bench(given: argparse.Namespace) -> None:
             folder = Path(name)
             file, ours, theirs = folder / "model.stl", folder / "ours.gcode", folder / "theirs.gcode"
             file.write_bytes(stl(mesh))
-            commands = [our_command(given, file, ours)]
+            same = [*harness.SAME, *([harness.OUR_SUPPORT] if given.support else [])] if given.do == "export" else []
+            further = {"export": ["--parts", "1", "--as-is", "-o", ours], "print": ["--port", "sim"]}.get(given.do, [])
+            commands = [[*OURS, given.do, file, *further, *(f"--set={setting}" for setting in (*same, *given.set))]]
             if given.do == "export" and (prusa := harness.prusa_command(file, theirs, given.support)) is not None:
                 commands.append(prusa)
             harness.command(commands[0])  # compiles what is not compiled yet
@@ -39,14 +41,6 @@ def bench(given: argparse.Namespace) -> None:
         own_cells = (Path(model).name, own.core_s, own.wall_s, round(own.memory_mb), lines[0])
         ratios = own.core_s / theirs_used.core_s, own.wall_s / theirs_used.wall_s
         row(*own_cells, theirs_used.core_s, theirs_used.wall_s, lines[1], *ratios)
-
-
-def our_command(given: argparse.Namespace, model: Path, out: Path) -> list[str | Path]:
-    """The command that is measured."""
-    same = [*harness.SAME, *([harness.OUR_SUPPORT] if given.support else [])] if given.do == "export" else []
-    settings = [f"--set={setting}" for setting in (*same, *given.set)]
-    further = {"export": ["--parts", "1", "--as-is", "-o", out], "print": ["--port", "sim"]}
-    return [*OURS, given.do, model, *further.get(given.do, ()), *settings]
 
 
 if __name__ == "__main__":

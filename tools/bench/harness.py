@@ -24,7 +24,6 @@ from mdp.read import read_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 OURS = (sys.executable, "-c", "import sys; from machine.cli.start import main; sys.exit(main())")
-PRUSA = "prusa-slicer"
 # Settings that make both slicers lay the same beads.
 SAME = (
     "process.layer_height_mm=0.2", "process.first_layer_height_mm=0.2", "process.walls=3", "process.top_layers=4",
@@ -79,7 +78,8 @@ def run(parser: argparse.ArgumentParser, bench: Callable[[argparse.Namespace], N
     if given.beside is None:
         bench(given)
         return
-    own_words = [word for word in sys.argv[1:] if word not in ("--beside", given.beside)]
+    words = (word for word in sys.argv[1:] if word not in ("--beside", given.beside))
+    own_words = [str(Path(word).resolve()) if Path(word).exists() else word for word in words]
     script = Path(sys.argv[0]).resolve().relative_to(ROOT)
     with older_checkout(given.beside) as older:
         for turn in range(given.turns):
@@ -154,5 +154,5 @@ def standing(model: str, height_mm: float) -> Mesh:
 def prusa_command(model: Path, out: Path, support: bool, further: str = "") -> list[str | Path] | None:
     """PrusaSlicer's command for a model with the same settings; None where it is not installed."""
     own = PRUSA_SUPPORT if support else ("--no-overhangs",)
-    found = shutil.which(PRUSA)
+    found = shutil.which("prusa-slicer")
     return found and [found, *PRUSA_SAME.split(), *further.split(), *own, "-o", out, model]

@@ -9,6 +9,8 @@ of each model.
 
 import argparse
 from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -35,11 +37,12 @@ def bench(given: argparse.Namespace) -> None:
     """Print a table a model or program."""
     profile = load(machine=given.machine, settings=given.set)
     quick = load(machine=given.machine, settings=["process.layer_height_mm=0.3"])
-    dry_run(print_in_stages("demo:bracket", 20.0, quick, lambda name, work: work()), quick)  # loads the kernels
+    with redirect_stdout(StringIO()):
+        check_in_stages(print_in_stages("demo:bracket", 20.0, quick), quick)  # loads the kernels
     for model in given.models if not given.gcode else ():
         print(f"\n{model}")
         heading("stage", "core s", "wall s", "memory so far MB")
-        lines = print_in_stages(model, given.height, profile, stage)
+        lines = print_in_stages(model, given.height, profile)
         if given.keep is not None:
             given.keep.mkdir(parents=True, exist_ok=True)
             (given.keep / f"{Path(model.removeprefix('demo:')).stem}.gcode").write_text("\n".join(lines) + "\n")
@@ -57,11 +60,9 @@ def stage(name: str, work: Callable[[], Result]) -> Result:
     return result
 
 
-def print_in_stages(
-    model: str, height_mm: float, profile: Profile, stage: Callable[[str, Callable[[], Result]], Result]
-) -> list[str]:
+def print_in_stages(model: str, height_mm: float, profile: Profile) -> list[str]:
     """The G-code of a model."""
-    mesh = stage("read", lambda: standing(model, height_mm or 0.0))
+    mesh = stage("read", lambda: standing(model, height_mm))
     stage("evaluate all candidates", lambda: evaluate(mesh, profile))
     request = SearchRequest(price=pricing(profile))
     decomposition = stage("search", lambda: decompose(mesh, model, profile, request))

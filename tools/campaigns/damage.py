@@ -35,7 +35,7 @@ from mdp.model_file import locate
 from mdp.read import read_mesh
 from profiles.errors import UserError
 from profiles.profile import load
-from tools.campaigns.harness import options_of, table, trials
+from tools.campaigns.harness import counts, options_of, table, trials
 
 MOST_S, MOST_BYTES = 20, 2 * 2**30
 DEMOS = ("bracket", "figure", "lattice", "tree")
@@ -197,9 +197,7 @@ def main() -> None:
         for count, seeds, read in ((given.models, models, read_mesh), (given.programs, programs, read_program)):
             if count:
                 done += trials(partial(trial, seeds(), read, folder), given.first, count, given.jobs)
-    columns = {
-        name: (lambda mine, name=name: sum(trial.became == name for trial in mine)) for name in (READ, REFUSED, CRASHED, LIMITED)
-    }
+    columns = counts((READ, REFUSED, CRASHED, LIMITED), lambda trial: trial.became)
     columns["longest s"] = lambda mine: f"{max(trial.took_s for trial in mine):.1f}"
     print(table(done, "files", lambda trial: trial.suffix, columns))
     wrong = [one for one in done if one.became in (CRASHED, LIMITED)]

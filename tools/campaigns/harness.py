@@ -3,14 +3,12 @@ interrupted campaign goes on from."""
 
 import argparse
 import json
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
 
-OURS = (sys.executable, "-c", "import sys; from machine.cli.start import main; sys.exit(main())")
 Result = TypeVar("Result")
 
 
@@ -38,6 +36,11 @@ def table(
         mine = [result for result in results if group_of(result) == name]
         rows.append(f"| {name} | {' | '.join(str(figure(mine)) for figure in columns.values())} |")
     return "\n".join(rows)
+
+
+def counts(ends: Sequence[str], end_of: Callable[[Any], str]) -> dict[str, Callable[[list[Any]], object]]:
+    """A column for each end that a trial can have: how many of a group had it."""
+    return {end: (lambda mine, end=end: sum(end_of(result) == end for result in mine)) for end in ends}
 
 
 def append_line(file: Path, record: dict[str, Any]) -> None:

@@ -17,7 +17,8 @@ from itertools import product
 from pathlib import Path
 from time import monotonic, sleep
 
-from tools.campaigns.harness import OURS, options_of, table
+from tools.bench.harness import OURS
+from tools.campaigns.harness import options_of, table
 
 MOST_S = 2.0
 SIGNALS = {"GROUP": signal.SIGINT, "INT": signal.SIGINT, "TERM": signal.SIGTERM, "KILL": signal.SIGKILL}

@@ -20,7 +20,7 @@ from PIL import Image, ImageDraw
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
 from mdp.save import stl
-from tools.campaigns.harness import OURS
+from tools.bench.harness import OURS
 
 WIDTH, HEIGHT, LINE = 1200, 600, 16  # of a picture on a sheet, and of the text above it, pixels
 VERDICTS = ("person", "doubtful", "wrong")

@@ -23,6 +23,7 @@ RANKERS = {  # and how each is trained
     "regret": ("--loss", "regret", "--ensemble", "6", "--columns", "paper"),
     "regret_cheap": ("--loss", "regret", "--ensemble", "6"),
 }
+COLLECTED = ("--terms", "paper", "--beam-width", "50", "--orientations", "4", "--faces", "2500", "--time-limit", "60")
 SEARCHES = ("--methods", "published", "--paper-terms", "--faces", "2500", "--set", "search.time_limit_s=120")
 
 
@@ -36,7 +37,7 @@ def main() -> None:
     options = parser.parse_args()
     options.models, options.manifest, options.out = (p.resolve() for p in (options.models, options.manifest, options.out))
     if not options.only_tables:
-        _collect(options)
+        _run("-m", "mdp.learning.collect", str(options.models), "-o", str(options.out / "paper"), *COLLECTED)
         _train(options)
         _search(options)
     _tables(options)
@@ -50,11 +51,6 @@ def _run(*arguments: str) -> None:
         sys.exit(130)
     if ended:
         sys.exit(ended)
-
-
-def _collect(options: argparse.Namespace) -> None:
-    wide = ("--terms", "paper", "--beam-width", "50", "--orientations", "4", "--faces", "2500", "--time-limit", "60")
-    _run("-m", "mdp.learning.collect", str(options.models), "-o", str(options.out / "paper"), *wide)
 
 
 def _train(options: argparse.Namespace) -> None:

@@ -26,7 +26,8 @@ from mdp.model_file import locate
 from mdp.save import stl
 from profiles.process import Process
 from profiles.profile import load
-from tools.campaigns.harness import OURS, options_of, table
+from tools.bench.harness import OURS
+from tools.campaigns.harness import counts, options_of, table
 
 DEMOS = ("bracket", "figure", "lattice", "tree")
 MESH_MM = 60.0  # longest side of the meshes
@@ -107,13 +108,10 @@ def drawn_options(number: int) -> list[str]:
 
 def report(rows: Sequence[Row]) -> str:
     """How the runs ended, then every model that was not printed, then the warnings."""
-    columns = {
-        status: (lambda mine, status=status: sum(row["status"] == status for row in mine))
-        for status in ("done", "refused", "failed")
-    }
+    columns = counts(("done", "refused", "failed"), lambda row: row["status"])
     columns |= {"core s: median, 95 %, most": lambda mine: spread([float(row["core_s"] or 0.0) for row in mine])}
     failures = [f"- {row['run']}/{row['model']}: {row['status']}: {row['sentence']}" for row in rows if row["status"] != "done"]
-    found = Counter(code for row in rows for code in row["findings"].split(";") if code)
+    found = Counter(code for row in rows for code in row["findings"].split())
     warnings = ", ".join(f"{code} {count}" for code, count in found.most_common())
     return "\n".join([table(rows, "run", lambda row: row["run"], columns), "", *failures, "", f"findings: {warnings or 'none'}"])
 

@@ -19,6 +19,7 @@ from functools import cache
 from itertools import product
 from pathlib import Path
 
+from machine.pipeline.output import check_writable
 from mdp.batch.rows import append_row, read_rows, write_rows
 from mdp.learning.collection import PAPER_TERMS
 from mdp.learning.command import Parser, check_range, run
@@ -116,6 +117,7 @@ def _search_models(options: argparse.Namespace) -> None:
     for method, width, ranker in kinds:  # errors are reported before anything is written
         _profile(settings, method, width)
         ranker_named(ranker)
+    check_writable(options.out)
     models = model_files(options.folder, options.only, options.every)
     if options.side is not None:
         sources = read_sources(options.manifest)

@@ -4,7 +4,6 @@ A panel a curve: core seconds or memory over what the rows of a table begin with
 which a test sees whether it is current. Needs the extra `train` for matplotlib.
 """
 
-import json
 import re
 from pathlib import Path
 from typing import NamedTuple
@@ -68,7 +67,7 @@ def draw(text: str, out: Path) -> None:
 def described(text: str) -> str:
     """The tables that the picture shows, as it holds them."""
     shown = tables(text)
-    return json.dumps({panel.table: shown[panel.table] for panel in PANELS}).replace('"', "'")
+    return str({panel.table: shown[panel.table] for panel in PANELS})
 
 
 if __name__ == "__main__":
