@@ -110,8 +110,9 @@ def heading(*columns: str) -> None:
 
 
 def row(*cells: object) -> None:
-    """A row of the table; a number has two decimals, None stands for what was not measured."""
-    texts = ("-" if cell is None else f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in cells)
+    """A row of the table; a number has two decimals, None and nan stand for what was not measured."""
+    texts = (f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in cells)
+    texts = ("-" if text in ("None", "nan") else text for text in texts)
     print(f"| {' | '.join(texts)} |", flush=True)
 
 

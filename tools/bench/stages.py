@@ -24,25 +24,27 @@ from machine.gcode.writer import write_gcode
 from machine.pipeline.pricing import pricing
 from machine.planning.plan import plan
 from mdp.mesh import Mesh
+from mdp.model_file import locate
 from mdp.overhang import risky_upright, threshold
 from mdp.ranking.candidates import bounds_of, directions, platform_disc
 from mdp.search.search import SearchRequest, decompose
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from slicer.slice import slice_parts
-from tools.bench.harness import Result, heading, options_of, row, run, standing, timed
+from tools.bench.harness import Result, heading, options_of, row, run, timed
+from tools.checks.harness import mesh_of
 
 
 def bench(given: argparse.Namespace) -> None:
     """Print a table a model or program."""
     profile = load(machine=given.machine, settings=given.set)
-    quick = load(machine=given.machine, settings=["process.layer_height_mm=0.3"])
+    quick = load(machine=given.machine, settings=["process.layer_height_mm=0.3", "process.scale=0.5"])
     with redirect_stdout(StringIO()):
-        check_in_stages(print_in_stages("demo:bracket", 20.0, quick), quick)  # loads the kernels
+        check_in_stages(print_in_stages("demo:bracket", quick), quick)  # loads the kernels
     for model in given.models if not given.gcode else ():
         print(f"\n{model}")
         heading("stage", "core s", "wall s", "memory so far MB")
-        lines = print_in_stages(model, given.height, profile)
+        lines = print_in_stages(model, profile)
         if given.keep is not None:
             given.keep.mkdir(parents=True, exist_ok=True)
             (given.keep / f"{Path(model.removeprefix('demo:')).stem}.gcode").write_text("\n".join(lines) + "\n")
@@ -60,9 +62,9 @@ def stage(name: str, work: Callable[[], Result]) -> Result:
     return result
 
 
-def print_in_stages(model: str, height_mm: float, profile: Profile) -> list[str]:
+def print_in_stages(model: str, profile: Profile) -> list[str]:
     """The G-code of a model."""
-    mesh = stage("read", lambda: standing(model, height_mm))
+    mesh = stage("read", lambda: mesh_of(locate(model), profile))
     stage("evaluate all candidates", lambda: evaluate(mesh, profile))
     request = SearchRequest(price=pricing(profile))
     decomposition = stage("search", lambda: decompose(mesh, model, profile, request))
