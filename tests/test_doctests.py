@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.draw_rooms import LAYERS
+from tools.docs.draw_rooms import LAYERS
 
 ROOT = Path(__file__).resolve().parents[1]
 

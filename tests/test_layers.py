@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tools import draw_rooms
-from tools.draw_rooms import LAYERS, PICTURE, draw, floors, import_graph, imports, room_graph, rooms_of
+from tools.docs.draw_rooms import LAYERS, PICTURE, draw, floors, import_graph, imports, room_graph, rooms_of
 
 ROOT = Path(__file__).resolve().parents[1]
 # Third party -> the beginnings of the module paths that may import it; nowhere else in the packages.
@@ -148,7 +148,7 @@ def test_the_command_line_starts_without_heavy_imports() -> None:
 
 
 def test_no_room_imports_one_above_it_and_the_picture_of_the_house_is_the_code_s() -> None:
-    assert PICTURE.read_text(encoding="utf-8") == draw(), "python tools/draw_rooms.py draws it anew"
+    assert PICTURE.read_text(encoding="utf-8") == draw(), "python tools/docs/draw_rooms.py draws it anew"
 
 
 def test_two_rooms_that_import_each_other_are_found() -> None:

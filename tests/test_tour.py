@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel
 
 from profiles.machine import Machine
-from tools.draw_rooms import modules
+from tools.docs.draw_rooms import modules
 
 ROOT = Path(__file__).resolve().parents[1]
 TOUR = "docs/tour.md"

@@ -23,23 +23,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 VERSION = f"python{sys.version_info.major}.{sys.version_info.minor}"
-LEFT_OUT = (
-    "test",
-    "idlelib",
-    "tkinter",
-    "turtledemo",
-    "lib2to3",
-    "ensurepip",
-    "_tkinter*",
-    "_test*",
-    "site-packages",
-    "__pycache__",
-    "config-*",
-    "*.a",
-)
-SYSTEM = re.compile(
-    r"^(linux-vdso|ld-linux|lib(c|m|dl|rt|util|pthread|resolv|nsl)\.so)"
-)  # what every Linux has, and has its own of
+LEFT_OUT = ["test", "idlelib", "tkinter", "turtledemo", "lib2to3", "ensurepip", "_tkinter*", "_test*", "site-packages"]
+LEFT_OUT += ["__pycache__", "config-*", "*.a"]
+# What every Linux has, and has its own of.
+SYSTEM = re.compile(r"^(linux-vdso|ld-linux|lib(c|m|dl|rt|util|pthread|resolv|nsl)\.so)")
 LICENCE = re.compile(r"(?i)(^|/)(licen[cs]e|copying|notice|authors)[^/]*$")
 LAUNCHER = f"""#!/bin/sh
 here=$(dirname "$(readlink -f "$0")")

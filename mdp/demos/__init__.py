@@ -1,1 +1,1 @@
-"""Demo models that ship with the program, made by tools/make_demos.py: `demo:NAME` reads NAME.ply of this folder."""
+"""Demo models that ship with the program, made by tools/docs/make_demos.py: `demo:NAME` reads NAME.ply of this folder."""

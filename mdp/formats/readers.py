@@ -3,7 +3,7 @@
 One module a format has `read(path) -> list[Surface]`, the one of 3MF, which slicers save, `read_build(path, plate) -> Build`.
 
 The six that printers know are read by our own: trimesh reads some valid files of them as other solids (tools/RESULTS.md,
-"Reading") and takes longer to import than these readers take for a model. What else it knows it reads.
+"Which files are read?") and takes longer to import than these readers take for a model. What else it knows it reads.
 """
 
 from collections.abc import Callable

@@ -4,7 +4,7 @@
     python -m mdp.learning.evaluate --figure7 TABLE.csv [--pictures DIR]
 
 Prints tables in Markdown. figure8-NAME.png: importance of a ranker's features, and their correlation; figure7.png: J and core
-time against the beam's width, from the table that tools/compare_widths.py writes.
+time against the beam's width, from the table that tools/campaigns/widths.py writes.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     leave = f"baselines to leave out, of {'; '.join(BASELINES)}"
     parser.add_argument("--without", type=split_names, default=(), metavar="NAME,...", help=leave)
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="where pictures go; here by default")
-    parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/compare_widths.py")
+    parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/campaigns/widths.py")
     parser.add_argument(
         "--least-removed", type=float, default=0.0, metavar="SHARE", help="of --figure7: the widest plain beam removes it"
     )

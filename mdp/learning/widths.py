@@ -1,6 +1,6 @@
 """Widths: what whole searches end with at several beam widths, plain and learned (Fig. 7 of the 2020 paper).
 
-The searches are rows of the table that tools/compare_widths.py writes. Plain is the ranking of the paper. J is what stays risky
+The searches are rows of the table that tools/campaigns/widths.py writes. Plain is the ranking of the paper. J is what stays risky
 as a share of what printing straight up leaves risky; where seams and stairs cost something, the cost.
 """
 

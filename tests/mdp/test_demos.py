@@ -14,7 +14,7 @@ from mdp.read import read_mesh
 from mdp.search.search import decompose
 from profiles.profile import load
 from tests.checks import assert_closed
-from tools.make_demos import DEMOS, LEANS, bar, cone_distance, main, smooth_union
+from tools.docs.make_demos import DEMOS, LEANS, bar, cone_distance, main, smooth_union
 
 NAMES = sorted(DEMOS)
 PIECES = sorted(LEANS)

@@ -15,9 +15,9 @@ from profiles.errors import ProfileError
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys
 from tests.machine.moves import program_of
-from tools.profile_tables import PAGE, page, table
+from tools.docs.make_tables import PROFILES, page, table
 
-TEXT = PAGE.read_text(encoding="utf-8")
+TEXT = PROFILES.read_text(encoding="utf-8")
 
 
 def test_the_tables_of_the_page_are_those_of_the_models() -> None:

@@ -1,9 +1,5 @@
 """Which alternatives are offered to a judge."""
 
-import importlib
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 
@@ -12,15 +8,9 @@ from mdp.plane import Plane
 from mdp.pose import turned_by
 from profiles.profile import load
 from tests.shapes import branch
+from tools.campaigns import offer_parts
 
-TOOLS = Path(__file__).parents[2] / "tools"
 UPRIGHT = np.eye(3)
-
-
-@pytest.fixture
-def offering(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(TOOLS))
-    return importlib.import_module("offer_parts")
 
 
 def plane(offset_mm: float, lean_deg: float = 0.0) -> Plane:
@@ -41,13 +31,13 @@ def plane(offset_mm: float, lean_deg: float = 0.0) -> Plane:
     ],
 )
 def test_an_alternative_that_a_person_sees_no_difference_to_is_like_another_one(
-    offering: ModuleType, rotation: Floats, planes: tuple[Plane, ...], like: bool
+    rotation: Floats, planes: tuple[Plane, ...], like: bool
 ) -> None:
-    assert offering.Offer(UPRIGHT, (plane(20.0),)).is_like(offering.Offer(rotation, planes), 60.0) is like
+    assert offer_parts.Offer(UPRIGHT, (plane(20.0),)).is_like(offer_parts.Offer(rotation, planes), 60.0) is like
 
 
-def test_a_branch_is_offered_whole_and_cut_and_no_two_alternatives_are_alike(offering: ModuleType) -> None:
-    offers = offering.offers_of(branch(), load(settings=["search.directions=60"]))
+def test_a_branch_is_offered_whole_and_cut_and_no_two_alternatives_are_alike() -> None:
+    offers = offer_parts.offers_of(branch(), load(settings=["search.directions=60"]))
     assert {bool(offer.planes) for offer in offers} == {False, True}
     assert [offer.today for offer in offers] == [True] + [False] * (len(offers) - 1)
-    assert len(offering.distinct([], offers, 50.0, 99)) == len(offers) >= offering.LEAST
+    assert len(offer_parts.distinct([], offers, 50.0, 99)) == len(offers) >= offer_parts.LEAST

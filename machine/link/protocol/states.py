@@ -1,7 +1,7 @@
 """The states of a conversation with a printer, and every transition between them in one table.
 
 All transitions live here; connection.py decides which signal an event amounts to, and what is done on entering a state.
-A signal that a state's row does not name leaves the state as it is. `python tools/draw_states.py` draws the table into
+A signal that a state's row does not name leaves the state as it is. `python tools/docs/make_tables.py` draws the table into
 docs/serial.md.
 """
 

@@ -10,7 +10,7 @@ from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.interfaces import InterfaceBalance, balance_of, interfaces
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import Lines, layers, on, word
-from tools.layer_balance import PartBalance, layer_balances, over_room, wall_edges
+from tools.checks.plastic import over_room, wall_edges
 
 FIELD = np.array([[-1.0, -1.0], [11.0, 11.0]])
 
@@ -22,12 +22,6 @@ def bar(begin: tuple[float, ...], end: tuple[float, ...], up: tuple[float, ...],
 def faces(lines: Lines, machine: str = "generic_ac") -> list[InterfaceBalance]:
     profile, _, _ = bent(machine)
     return list(dry_run(lines, profile).interfaces)
-
-
-def balances(lines: Lines) -> list[PartBalance]:
-    profile, _, _ = bent("generic_ac")
-    run = dry_run(lines, profile, known=())
-    return list(layer_balances(run.program, run.deposited, profile))
 
 
 def richer(part: int, layer: int, factor: float) -> Lines:
@@ -140,10 +134,3 @@ def test_the_first_layer_of_a_part_fits_its_room_and_touches_nearly_all_of_its_f
     for face in faces(list(bent(machine)[2]), machine):
         assert 0.95 < face.beads_over_room < 1.2
         assert face.contact > 0.95
-
-
-def test_layers_that_fit_have_what_they_need_and_one_that_does_not_is_named() -> None:
-    good, bad = (balances(lines)[1] for lines in (list(bent("generic_ac")[2]), richer(2, 5, 1.4)))
-    assert good.over_room == pytest.approx(1.0, abs=0.08)  # infill reaches into the walls
-    changed = [layer.layer for layer, was in zip(bad.layers, good.layers, strict=True) if layer.over_room > 1.2 * was.over_room]
-    assert changed == [5]

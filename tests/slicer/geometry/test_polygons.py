@@ -33,7 +33,7 @@ from slicer.geometry.polygons import (
 )
 from slicer.geometry.triangulation import resample
 from tests.slicer.hand import as_shapely, ragged
-from tools.draw_rooms import modules
+from tools.docs.draw_rooms import modules
 
 seeds = st.integers(0, 10**6)
 few = settings(deadline=None, max_examples=25)
