@@ -67,7 +67,9 @@ def _refuse_cuts(request: ModelRequest) -> None:
             f"{option('copies', request.copies)}: {request.model} is G-code, which is sliced already; it goes with a model"
         )
     for stop in request.stops:
-        raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
+        raise PlanError(
+            f"{option(stop.option, stop.at)}: {request.model} is G-code, which says itself where it stops; it goes with a model"
+        )
     for settings in request.profile.parts:
         raise PlanError(
             f"{option('part', settings.part)}: {request.model} is G-code, which is sliced already; it goes with a model"
