@@ -20,14 +20,14 @@ def key_name(key: str, shown: str = "") -> str:
     return _mark(key, "", shown or key)
 
 
-def option(name: str, value: object = "") -> str:
+def option(name: str, value: object = None) -> str:
     """An option as a noun: "--parts 4", on the page "the number of parts 4"."""
-    return _mark(f"--{name}", f"{value}", f"--{name} {value}".rstrip())
+    return _mark(f"--{name}", "" if value is None else f"{value}", _written(name, value))
 
 
-def advice(name: str, value: object = "", verb: str = "") -> str:
-    """An option that the person may give: "--parts 4", on the page "take 4 under In how many parts". verb: as "give" """
-    return _mark(f"advice --{name}", f"{value}", f"{verb} --{name} {value}".strip())
+def advice(name: str, value: object, verb: str = "") -> str:
+    """An option that the person may give: "--parts 4", on the page "take 4 under In how many parts". verb: before it."""
+    return _mark(f"advice --{name}", f"{value}", f"{verb} {_written(name, value)}" if verb else _written(name, value))
 
 
 def phrase(name: str, terminal: str, value: object = "") -> str:
@@ -50,6 +50,10 @@ def rendered(message: str, words: Callable[[str, str, str], str]) -> str:
     if _BEGIN not in message and _END not in message:
         return message
     return _LEFT_OVER.sub("", _MARK.sub(lambda mark: words(*mark.groups()), message))
+
+
+def _written(name: str, value: object) -> str:
+    return f"--{name}" if value is None else f"--{name} {value}"
 
 
 def _mark(name: str, value: str, terminal: str) -> str:

@@ -29,9 +29,8 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
     if request.profile.parts and len(models) > 1:
         part = request.profile.parts[0]
         raise PlanError(
-            f"{option('part', part.part)} goes with one model, and several are given, {', '.join(names)}: settings of a "
-            "part of one of "
-            f"them stand in its plan, as process = {{...}} of its [[part]], and {option('plan')} names that"
+            f"{option('part', part.part)} goes with one model, and several are given, {', '.join(names)}: settings of a part "
+            f"of one of them stand in its plan, as process = {{...}} of its [[part]], and {option('plan')} names that"
         )
     for file in request.plans:
         model = read_plan(file).model if len(models) > 1 else names[0]
@@ -70,21 +69,20 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     plan, planes, record = request.plan, request.planes, request.outputs.record
     if request.parts is not None:
         check_part_count(request.parts)
-    if plan is not None and planes is not None:
-        raise PlanError(
-            f"{option('planes', planes)}: {option('plan', plan)} exists, so nothing is searched; one of them is allowed"
-        )
-    if plan is not None and record is not None:
-        raise PlanError(
-            f"{option('record', record)}: {option('plan', plan)} exists, so nothing is searched that could be recorded"
-        )
-    if planes is not None and request.orient:
-        raise PlanError(
-            f"{option('orient')}: the planes of {planes} belong to the model as it lies; "
-            f"{key_name('process.rotate_deg')} turns it"
-        )
-    if plan is not None and request.orient:
-        raise PlanError(f"{option('orient')}: the plan {plan} says how the model lies; leave one of them out")
+    turned = key_name("process.rotate_deg")
+    unsearched = f"{option('plan', plan)} exists, so nothing is searched"
+    clashes = (
+        (plan and planes, f"{option('planes', planes)}: {unsearched}; one of them is allowed"),
+        (plan and record, f"{option('record', record)}: {unsearched} that could be recorded"),
+        (
+            planes and request.orient,
+            f"{option('orient')}: the planes of {planes} belong to the model as it lies; {turned} turns it",
+        ),
+        (plan and request.orient, f"{option('orient')}: the plan {plan} says how the model lies; leave one of them out"),
+    )
+    for given_both, sentence in clashes:
+        if given_both:
+            raise PlanError(sentence)
     file = plan or planes or _plan_of_demo(request)
     given = None if file is None else read_plan(file)
     if given is not None and given.orientation is not None and request.orient is False:

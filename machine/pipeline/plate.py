@@ -204,9 +204,8 @@ def _with_place_settings(part: Part, model: Decomposition, given: Sequence[PartS
     for key in process:
         if key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
             raise PlanError(
-                f"part 1 of {model.name}: {key_name(f'process.{key}')} holds for a whole part, and the first parts of "
-                "all models are one part "
-                f"of the plate: {phrase('for all', f'--set process.{key}=... sets it for all')}, "
+                f"part 1 of {model.name}: {key_name(f'process.{key}')} holds for a whole part, and the first parts of all models "
+                f"are one part of the plate: {phrase('for all', f'--set process.{key}=... sets it for all')}, "
                 f"{key_name('process.complete_objects')} = true prints each model alone"
             )
     room = _room(model.mesh)

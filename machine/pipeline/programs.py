@@ -56,22 +56,20 @@ def load_program(request: ModelRequest, pictures: bool = False) -> LoadedProgram
 
 
 def _refuse_cuts(request: ModelRequest) -> None:
-    """Raise PlanError where a G-code file is to be cut."""
-    for name, value in (("plan", request.plan), ("parts", request.parts)):
-        if value is not None:
-            raise PlanError(f"{option(name, value)}: {request.model} is G-code, which is cut already; it goes with a model")
+    """Raise PlanError where a G-code file is to be cut, sliced or set up anew."""
     if request.beside:
         raise PlanError(f"{request.model} is G-code, which is a plate of its own: {request.beside[0]} cannot go beside it")
-    if request.copies != 1:
-        raise PlanError(
-            f"{option('copies', request.copies)}: {request.model} is G-code, which is sliced already; it goes with a model"
-        )
-    for stop in request.stops:
-        raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
-    for settings in request.profile.parts:
-        raise PlanError(
-            f"{option('part', settings.part)}: {request.model} is G-code, which is sliced already; it goes with a model"
-        )
+    cut, sliced = "is cut already", "is sliced already"
+    given: list[tuple[str, object, str]] = [
+        ("plan", request.plan, cut),
+        ("parts", request.parts, cut),
+        ("copies", request.copies if request.copies != 1 else None, sliced),
+        *((stop.option, stop.at, "says itself where it stops") for stop in request.stops),
+        *(("part", settings.part, sliced) for settings in request.profile.parts),
+    ]
+    for name, value, why in given:
+        if value is not None:
+            raise PlanError(f"{option(name, value)}: {request.model} is G-code, which {why}; it goes with a model")
 
 
 def read_gcode_lines(path: Path) -> Lines:

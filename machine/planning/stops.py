@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from profiles.errors import SliceError
-from profiles.messages import option
+from profiles.messages import advice
 
 if TYPE_CHECKING:
     from slicer.paths import SlicedPart
@@ -25,8 +25,8 @@ class Stop:
 
     @property
     def option(self) -> str:
-        """The option that asks for it, for messages."""
-        return option("filament-change" if self.change else "pause", self.at)
+        """The name of the option that asks for it."""
+        return "filament-change" if self.change else "pause"
 
     @property
     def at(self) -> str:
@@ -41,7 +41,7 @@ def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ..
     for text, change in (*((text, False) for text in pauses), *((text, True) for text in changes)):
         match = WRITTEN.fullmatch(text.strip())
         if match is None or 0 in (int(match[1]), int(match[2] or 1)):
-            written = option("filament-change" if change else "pause", text)
+            written = advice("filament-change" if change else "pause", text)
             raise SliceError(f"{written}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
         part, layer, height = match.groups()
         stops.append(Stop(int(part), int(layer) if layer else None, float(height) if height else None, change))
@@ -57,7 +57,9 @@ def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
     """Raise SliceError for a stop in a part that does not exist. count: the number of parts."""
     for stop in stops:
         if stop.part > count:
-            raise SliceError(f"{stop.option}: there is no part {stop.part}, the parts are {parts_in_words(count)}")
+            raise SliceError(
+                f"{advice(stop.option, stop.at)}: there is no part {stop.part}, the parts are {parts_in_words(count)}"
+            )
 
 
 def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:
@@ -74,10 +76,11 @@ def _layer_of(stop: Stop, sliced: Sequence["SlicedPart"]) -> int:
     if stop.layer is not None:
         if not 1 <= stop.layer <= len(piece.layers):
             raise SliceError(
-                f"{stop.option}: part {stop.part} has no layer {stop.layer}, its layers are 1 to {len(piece.layers)}"
+                f"{advice(stop.option, stop.at)}: part {stop.part} has no layer {stop.layer}, its layers are 1 to "
+                f"{len(piece.layers)}"
             )
         return stop.layer
     for number, layer in enumerate(piece.layers, start=1):
         if layer.z_mm - layer.height_mm >= (stop.height_mm or 0.0) - 1e-6:
             return number
-    raise SliceError(f"{stop.option}: part {stop.part} is only {piece.layers[-1].z_mm:g} mm high")
+    raise SliceError(f"{advice(stop.option, stop.at)}: part {stop.part} is only {piece.layers[-1].z_mm:g} mm high")

@@ -7,6 +7,7 @@ import pytest
 
 from machine.cli.cli import main
 from profiles.errors import ProfileError
+from profiles.messages import terminal_words
 from profiles.places import known, own, own_folder, shipped, shipped_base
 from profiles.profile import check_file, load, load_one
 
@@ -103,7 +104,7 @@ silhouette_mm = [[1, 0], [0.5, 2], [3, 1]]
 [matrial]
 """,
     )
-    problems = check_file(file)
+    problems = [*map(terminal_words, check_file(file))]
     assert [problem.split(":")[0] for problem in problems[1:]] == [
         "machine.x.speed_mm_s is 0",
         "machine.lift is not a key of a profile",
@@ -121,7 +122,7 @@ silhouette_mm = [[1, 0], [0.5, 2], [3, 1]]
 def test_a_missing_parent_does_not_hide_the_other_problems() -> None:
     problems = check_file(keep("process", "bad", 'inherits = "nix"\n[process]\nwalls = -1\n'))
     assert "'nix' is not known" in problems[0]
-    assert problems[1:] == ["process.walls is -1: it must be a whole number from 0 to 50"]
+    assert [*map(terminal_words, problems[1:])] == ["process.walls is -1: it must be a whole number from 0 to 50"]
 
 
 def test_checking_a_machine_tells_every_block_that_cannot_be_filled_in(capsys: pytest.CaptureFixture[str]) -> None:

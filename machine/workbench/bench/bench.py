@@ -19,6 +19,7 @@ from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
 from profiles.effect import effect_of_change
 from profiles.frozen import Effect, Vector
+from profiles.messages import option as marked_option
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile
 
@@ -107,7 +108,7 @@ class History:
         before = self.now.bench if _have_one_model(self.now.bench, bench) else bench
         stops, gone = renumbered_stops(bench.stops, before.cuts or (), bench.cuts or ())
         after = bench if stops == bench.stops else replace(bench, stops=stops)
-        lost = [(stop.part, stop.option) for stop in gone] + [
+        lost = [(stop.part, marked_option(stop.option, stop.at)) for stop in gone] + [
             (own.part, f"its own {option(own).partition(':')[2]}") for own in _gone(self.now.bench, bench)
         ]
         return History(Step(word, after, gone_in_words(word, lost)), _nearest_steps((*self.before, self.now)[-MOST_STEPS:]))

@@ -23,8 +23,10 @@ OPTIONS = {
     "--plan": ("the plan", "the plan {}"),
     "--plate": ("the plate", "plate {}"),
     "--port": ("the port", "{}"),
-    "--ranker": ("the ranking", "ranked as {}"),
+    "--ranker": ("the ranking", "Ranked as {}"),
     "--sim-speed": ("the speed of the simulated printer", ""),
+    "advice --filament-change": ("a filament change", "{} under Copies and pauses"),
+    "advice --pause": ("a pause", "{} under Copies and pauses"),
     "advice --baud": ("choose the baud rate", "choose the baud rate {}"),
     "advice --parts": ("take another under In how many parts", "take {} under In how many parts"),
 }

@@ -18,7 +18,6 @@ from mdp.pose import turned_further
 from profiles.errors import ProfileError
 from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
 from profiles.machine import GCODE
-from profiles.messages import terminal_words
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
 from profiles.places import OF_KIND, known
 from profiles.profile import DEFAULTS, SECTIONS, Profile, load, with_part_settings
@@ -228,7 +227,7 @@ def export_command(bench: Bench) -> str:
             words += ["--part", option(own)]
     if bench.copies != 1:
         words += ["--copies", str(bench.copies)]
-    words += [word for stop in bench.stops for word in terminal_words(stop.option).split()]
+    words += [word for stop in bench.stops for word in (f"--{stop.option}", stop.at)]
     return join([*words, "-o", f"{stem}.gcode"])
 
 

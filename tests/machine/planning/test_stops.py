@@ -7,7 +7,6 @@ from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
 from machine.planning.stops import parse_stops
 from profiles.errors import SliceError
-from profiles.messages import terminal_words
 from profiles.profile import load
 from tests.machine.hand import post_and_arm, squares
 
@@ -73,4 +72,4 @@ def test_pressure_advance_is_set_in_the_words_of_the_firmware(dialect: str, line
 
 @pytest.mark.parametrize("typed", ["2:15", "1:8.4mm", "1:1234.56789mm", "1:0.00001mm", "3:20mm"])
 def test_a_stop_is_named_as_it_was_typed(typed: str) -> None:
-    assert [terminal_words(stop.option) for stop in parse_stops([typed], [])] == [f"--pause {typed}"]
+    assert [(stop.option, stop.at) for stop in parse_stops([typed], [])] == [("pause", typed)]

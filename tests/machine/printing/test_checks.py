@@ -16,6 +16,7 @@ from machine.printing import ports
 from machine.printing.checks import exceeded_limit, firmware_mismatch, machine_mismatch
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
+from profiles.messages import terminal_words
 from profiles.profile import load
 from tests.machine.peers import PATIENCE_S, behind_rfc2217, hear_out, on_terminal, scripted
 from tests.machine.peers import Answer as Words
@@ -213,7 +214,7 @@ def _machines() -> list[str]:
 
 def test_a_program_made_before_the_axes_were_measured_anew_is_refused() -> None:
     now = load(settings=["machine.tilt.point_mm=[0.0, 1.0, 2.5]"]).machine
-    sentence = machine_mismatch(MACHINE, now, "part.gcode")
+    sentence = terminal_words(machine_mismatch(MACHINE, now, "part.gcode"))
     assert sentence.startswith(f"part.gcode was made when machine.tilt.point_mm of {MACHINE.name} was ")
     assert sentence.endswith("but it is 0, 1, 2.5")
     assert machine_mismatch(now, now, "part.gcode") == ""

@@ -26,8 +26,8 @@ from tests.machine.workbench.models import model
 PAIRS = [
     (f"{option('copies')} is 0: 1 to 1000 is allowed", "Copies is 0: 1 to 1000 is allowed"),
     (f"{option('copies', 3)}: a.gcode is G-code", "3 copies: a.gcode is G-code"),
-    (f"{option('ranker', 'x')}: classic, learned or the name", "ranked as x: classic, learned or the name"),
-    (f"{option('filament-change', '1:x')}: PART:LAYER or", "the filament change at 1:x: PART:LAYER or"),
+    (f"{option('ranker', 'x')}: classic, learned or the name", "Ranked as x: classic, learned or the name"),
+    (f"{advice('filament-change', '1:x')}: PART:LAYER or", "1:x under Copies and pauses: PART:LAYER or"),
     (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 25.4"),
     (f"{option('set', 'process.walls=4')} and", "Walls = 4 and"),
     (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Go on all the same to print it nevertheless)"),

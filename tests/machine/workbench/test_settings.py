@@ -155,7 +155,7 @@ def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
 ) -> None:
     steps = History(Step("", replace(BENCH, stops=parse_stops(["1:3", "3:15"], ["9:1"]))))
     after = steps.do("cut", with_cuts(steps.now.bench, cuts))
-    assert " ".join(terminal_words(stop.option) for stop in after.now.bench.stops) == stops
+    assert " ".join(f"--{stop.option} {stop.at}" for stop in after.now.bench.stops) == stops
     assert terminal_words(after.now.lost) == lost
     assert after.undo().now.bench.stops == steps.now.bench.stops
 
@@ -177,7 +177,7 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
     assert own(after.undo().now.bench) == {1: {"walls": 5}, 3: {"ironing": True}}
     turned = changed(steps, "turn", axis="x", deg=90).now
     assert own(turned.bench) == {1: {"walls": 5}}
-    assert "--part 3:ironing=true" in turned.lost
+    assert "its own ironing=true" in turned.lost
     assert bench.model is not None
     assert own(with_model_turned_as_read(bench, bench.model, about(UP, 1.0))) == {1: {"walls": 5}}
     assert changed(steps, "reset_part", part=3).now.lost == ""

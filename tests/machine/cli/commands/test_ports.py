@@ -13,6 +13,7 @@ from machine.printing import ports as ports_module
 from machine.printing.ports import PortReport, announced, ask_port, describe, port_json
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.folders import state_folder
+from profiles.messages import terminal_words
 from profiles.profile import load
 from tests.machine.peers import hear_out, on_terminal, scripted
 
@@ -107,7 +108,7 @@ def test_asking_ends_when_it_is_called_off() -> None:
     (Kind.PRINTER, "", "a printer that does not name its firmware, at 9600 baud"),
 ])  # fmt: skip
 def test_every_kind_of_answer_has_its_words(kind: Kind, words: str, line: str) -> None:
-    assert describe(PortReport(MEGA, Answer(kind, words), 9600)).splitlines()[-1] == f"    {line}"
+    assert terminal_words(describe(PortReport(MEGA, Answer(kind, words), 9600))).splitlines()[-1] == f"    {line}"
 
 
 def test_the_list_for_programs_always_has_the_same_keys() -> None:

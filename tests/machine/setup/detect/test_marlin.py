@@ -134,7 +134,7 @@ def test_a_base_with_two_rotary_axes_is_not_put_over_a_machine_without() -> None
 def test_filament_in_mm3_is_left_and_said() -> None:
     told = found(LOG + "echo:  M200 S1 D1.75\n")
     assert "extruder_speed_mm_s" not in told.settings
-    assert "mm3" in told.remarks[0]
+    assert "mm³" in told.remarks[0]
 
 
 @pytest.mark.parametrize(

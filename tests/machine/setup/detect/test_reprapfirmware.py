@@ -9,6 +9,7 @@ from machine.setup.detect.marlin import recognise as is_marlin
 from machine.setup.detect.proposal import propose, read
 from machine.setup.detect.reprapfirmware import recognise
 from profiles.errors import ProfileError
+from profiles.messages import terminal_words
 
 CRADLE = """
 ; a cradle under a CoreXY head
@@ -122,7 +123,9 @@ def test_letters_that_m584_does_not_make_are_passed_over() -> None:
 def test_what_only_the_board_works_out_is_said() -> None:
     told = found(CRADLE.replace("S290", "S{global.hot}"))
     assert "nozzle_limit_c" not in told.settings
-    assert told.remarks == ["what it has in braces (1) only the board works out: --port duet:HOST asks it"]
+    assert [*map(terminal_words, told.remarks)] == [
+        "what it has in braces (1) only the board works out: --port duet:HOST asks it"
+    ]
 
 
 def model(**axis: object) -> str:

@@ -20,6 +20,7 @@ from machine.workbench.printing.process import carry_out
 from machine.workbench.work.slices import Sliced
 from profiles.errors import PlanError, PrinterError, UserError
 from profiles.folders import state_folder
+from profiles.messages import terminal_words
 from profiles.profile import Profile, load
 
 PROFILE = load()
@@ -71,7 +72,7 @@ def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_i
     silent: Any = Silent()
     load = Slices("box.stl", file(BAD), PROFILE)
     by_print, _ = carry_out(PrintJob(parse_destination("sim"), Does.PRINT, "box.stl", load, PROFILE), AtPage(silent))
-    assert (sentence, by_print.state) == (by_print.sentence, "refused")
+    assert (sentence, by_print.state) == (terminal_words(by_print.sentence), "refused")
     assert sentence.startswith("the dry run found ")
     assert "X goes to 500 mm" in sentence
     assert asyncio.run(job_of(session(BAD), parse_destination("/dev/no-such-port"), True)).force

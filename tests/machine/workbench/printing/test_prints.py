@@ -38,6 +38,7 @@ from machine.workbench.printing.process import carry_out
 from machine.workbench.printing.running_print import RunningPrint
 from mdp.kernels.workers import frame, listen
 from profiles.errors import PlanError, PrinterError, UserError
+from profiles.messages import terminal_words
 from profiles.profile import Profile, load
 from tests.machine.link.failing_disk import keep_notes_in
 from tests.machine.printing.servers.stand_ins import KEY, OctoPrintStandIn, stand_in
@@ -286,7 +287,7 @@ class Heard:
 def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintJob, sentence: str, forcible: bool) -> None:
     heard = Heard()
     end, goes_on = carry_out(wanted, AtPage(heard))  # type: ignore[arg-type]
-    assert end.sentence.startswith(sentence)
+    assert terminal_words(end.sentence).startswith(sentence)
     assert (end.state, goes_on) == ("refused", forcible)
     assert "state" not in heard.state  # nobody was asked
 
