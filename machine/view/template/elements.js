@@ -119,6 +119,12 @@ export function bells() {
   };
 }
 
+/** A finding as a button that goes there, where it has a place. */
+export function findingButton({ severity, code, message, part, layer, line }, onclick, { whole = "the whole file", ending = "", ...more } = {}) {
+  const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
+  return button("", onclick, { className: severity, ...more }, made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? where + ending : whole }));
+}
+
 /** An element put where a place of the picture is seen, in pixels; null: it is not. */
 export function putAt(element, place) {
   element.hidden = !place;

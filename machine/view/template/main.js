@@ -1,16 +1,13 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
 import { $, bells, duration, listen, notice, tell, themeSwitch, toggle } from "./elements.js";
-import { compileAll, pictureOf } from "./moves/picture.js";
+import { compileAll, pictureOf, standing } from "./moves/picture.js";
 import { printOf } from "./moves/rows.js";
 import { sceneOf } from "./moves/scene.js";
-import { standing } from "./moves/stage.js";
 import { controlsOf, readoutsOf } from "./panel/controls.js";
-import { courseOf, keysOf } from "./panel/course.js";
-import { findingsOf } from "./panel/findings.js";
-import { layerSliders, layerTimes } from "./panel/layers.js";
 import { follow, outsideOf } from "./panel/outside.js";
-import { frontOf, showReport } from "./panel/report.js";
+import { findingsOf, frontOf, showReport } from "./panel/report.js";
+import { courseOf, keysOf, layerSliders, layerTimes } from "./panel/sliders.js";
 import { textOf } from "./panel/text.js";
 import { cameraOf, CORNERS, handle, viewButtons } from "./picture/camera.js";
 import { cardOf, sizeOf } from "./picture/gl.js";

@@ -70,6 +70,7 @@ function kindEntries(rows) {
 
 const KINDS = ["travel", "", "retraction", "turning the table", "wipe", "prime"];
 
+/** Where the print is after the row shown, in the file's own numbers. */
 export function readoutsOf(print, scene, bells) {
   const { rows, header, flow } = print, letters = [header.machine.tilt.letter, header.machine.turn.letter];
   const axis = (k, digits) => () => scene.place[k].toFixed(digits);

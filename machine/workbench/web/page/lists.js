@@ -1,6 +1,6 @@
-// Elements: texts, lists and rows that several panels show in the same way.
+// Lists: texts, lists and rows of the panels, made anew only where what they tell is new.
 
-import { $, button, made, termsOf } from "../../../view/template/elements.js";
+import { $, button, made, rowOf, termsOf } from "../../../view/template/elements.js";
 
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 export const newtons = (force) => `${Number(force.toPrecision(2))} N`;
@@ -10,17 +10,23 @@ export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTi
 export const fill = (field, value) => { if (document.activeElement !== field) field.value = value; };
 
 /** A button of a row that takes away what it stands for. */
-export const cross = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
+export const removeButton = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
 
-/** Pairs of a name and a text, and of a class where the text has one; what has not changed stays, and what is selected in it. */
-export function tellIn(id, pairs) {
-  const told = JSON.stringify(pairs);
-  if ($(id).told === told) return;
-  $(id).told = told;
-  $(id).replaceChildren(...termsOf(pairs));
+/** Children of an element, made() where what they tell is new: what has not changed stays, and what is selected in it; a choice of a list
+ * that had the keyboard has it again. */
+export function putNew(element, told, made) {
+  const fresh = JSON.stringify(told), held = document.activeElement;
+  if (element.dataset.shown === fresh) return;
+  element.dataset.shown = fresh;
+  const name = held && element.contains(held) ? held.name : "";
+  element.replaceChildren(...made());
+  if (name) element.querySelector(`[name=${name}]:checked`)?.focus();
 }
 
-export const listIn = (id, sentences) => $(id).replaceChildren(...sentences.map((text) => made("li", { text })));
+/** Pairs of a name and a text, and of a class where the text has one. */
+export const tellIn = (id, pairs) => putNew($(id), pairs, () => termsOf(pairs));
+
+export const listIn = (id, sentences) => putNew($(id), sentences, () => sentences.map((text) => made("li", { text })));
 
 /** Rows {id, told, make()} put into a list: those that tell the same as before stay, so that the keyboard keeps its place, and so
  * do those that a person types in. */
@@ -42,20 +48,15 @@ export function putRows(rows, into) {
 /** A sentence whose options are not broken at their hyphens. */
 export const withWholeOptions = (text) => text.split(/(?<=\s)(--[\w-]+)/).map((piece, k) => (k % 2 ? made("span", { text: piece, className: "option" }) : piece));
 
-/** A table's head and rows(), where what they tell has changed: else the keyboard would lose its place, which it has again after. */
-export function putTable(table, told, head, rows) {
-  const fresh = JSON.stringify(told);
-  if (table.dataset.shown === fresh) return;
-  table.dataset.shown = fresh;
-  const name = table.contains(document.activeElement) ? document.activeElement.name : "", body = rows();
-  const titles = made("tr", {}, ...head.map(([text, className = ""]) => (text ? made("th", { text, scope: "col", className }) : made("td"))));
-  table.replaceChildren(...(body.length && head.length ? [made("thead", {}, titles)] : []), ...(body.length ? [made("tbody", {}, ...body)] : []));
-  if (name) table.querySelector(`[name=${name}]:checked`)?.focus();
-}
+/** A table's head and rows(), where what they tell has changed. */
+export const putTable = (table, told, head, rows) => putNew(table, told, () => {
+  const body = rows(), titles = made("tr", {}, ...head.map((text) => (text ? made("th", { text, scope: "col" }) : made("td"))));
+  return body.length ? [...(head.length ? [made("thead", {}, titles)] : []), made("tbody", {}, ...body)] : [];
+});
 
-/** A row that is chosen by its radio button, in the label of which its name stands, or by a click; cells: [content, class]. */
+/** A row that is chosen by its radio button, in the label of which its name stands, or by a click. */
 export function choiceRow(name, value, checked, label, cells, choose) {
-  const mark = made("input", { type: "radio", name, value, checked, onchange: choose });
-  const onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
-  return made("tr", { onclick }, made("td", {}, made("label", {}, mark, ...label)), ...cells.map(([content, className]) => made("td", { className }, content)));
+  const mark = made("input", { type: "radio", name, value, checked, onchange: choose }), row = rowOf([made("label", {}, mark, ...label), ...cells]);
+  row.onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
+  return row;
 }

@@ -1,21 +1,16 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, hide, listen, notice, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, disable, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
-import { modelPanel, sizePanel } from "./model/model-panel.js";
-import { fetchModel, modelOf, pedestalOf } from "./model/model.js";
-import { placePanel } from "./model/place-panel.js";
-import { facetsOf, thumbnailsOf } from "./model/resting.js";
+import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
+import { facetsOf, fetchModel, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
 import { ringsOf } from "./model/rings.js";
-import { handlesOf } from "./parts/handles.js";
 import { marksPanel } from "./parts/marks-panel.js";
-import { obstacleOf } from "./parts/obstacle.js";
-import { partsList } from "./parts/parts-list.js";
-import { partsPanel } from "./parts/parts-panel.js";
+import { partsList, partsPanel } from "./parts/parts-panel.js";
 import { apartPanel } from "./parts/pieces.js";
-import { planesPanel } from "./parts/planes-panel.js";
+import { handlesOf, obstacleOf, planesPanel } from "./parts/planes.js";
 import { printFrame } from "./print/print-frame.js";
 import { printPanel } from "./print/print-panel.js";
 import { titleOfModel } from "./print/print-shown.js";
@@ -24,8 +19,7 @@ import { clicksOf, press } from "./scene/clicks.js";
 import { pictureOf } from "./scene/picture.js";
 import { settingsPanel } from "./settings/settings-panel.js";
 import { saveMenu } from "./slice/save-menu.js";
-import { comparePanel, slicesPanel, stopsPanel } from "./slice/slices-panel.js";
-import { wallsOf } from "./slice/walls.js";
+import { comparePanel, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
 import { keptLook, onState, store, subscribe, update } from "./store.js";
 import { elapsedTimes, problemLine } from "./told.js";
 
@@ -35,7 +29,7 @@ function main() {
   const follow = async (state) => {
     update({ state, turning: null });
     await fetchModel(state.model, picture, () => follow(store.state));
-    look.restore();
+    restoreLook();
     if (store.state.version === state.version) root.dataset.version = state.version;
   };
   openLine(follow, (how) => {
@@ -43,7 +37,7 @@ function main() {
     notice(LINE_TOLD[how], "line");
   });
   tabsOf((tab) => update({ tab }));
-  const look = keptLook(camera, picture);
+  const restoreLook = keptLook(camera, picture);
   onState(tellState);
   onState(({ stopped }) => notice(stopped, "stopped"));
   slicesPanel(printFrame(camera, picture).showFinding);
@@ -58,11 +52,11 @@ function main() {
     viewButtons(camera, CORNERS[0], picture.ask);
     axesOf(camera, picture);
   } else {
-    document.body.classList.add("no-picture");
+    toggle("no-picture", true);
     $("show-rings").disabled = true;
   }
   keysOf(camera, picture);
-  for (const button of document.querySelectorAll("[data-do]")) button.addEventListener("click", () => send({ do: button.dataset.do }));
+  onData("do", ({ do: name }) => send({ do: name }));
   root.dataset.state = picture ? "ready" : "failed";
 }
 
@@ -76,10 +70,9 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
   toggle("has-model", model);
-  for (const [id, word] of [["undo", undo], ["redo", redo]]) {
-    $(id).disabled = !word;
-    $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);
-  }
+  disable({ undo: !undo, redo: !redo });
+  $("undo").ariaLabel = undo ? `undo: ${undo}` : "undo";
+  $("redo").ariaLabel = redo ? `redo: ${redo}` : "redo";
 }
 
 /** What keys do; undo and redo, but where what is typed has an undo of its own. */

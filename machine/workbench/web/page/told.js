@@ -1,22 +1,18 @@
 // Told: what the page says of its work: a title, what is under way and for how long, and what could not be done.
 
-import { $, button, duration } from "../../../view/template/elements.js";
+import { $, button, duration, hide } from "../../../view/template/elements.js";
 import { send } from "./line.js";
-import { withWholeOptions } from "./lists.js";
+import { putNew, withWholeOptions } from "./lists.js";
 import { onState } from "./store.js";
 
 /** Buttons, one a unit, that say what a model's coordinates are in. */
-export function unitButtons(row, words, choose) {
-  if (row.dataset.shown === `${words}`) return;
-  row.dataset.shown = words;
-  row.replaceChildren(...words.map((unit) => button(`in ${unit}`, () => choose(unit))));
-}
+export const unitButtons = (row, words, choose) => putNew(row, words, () => words.map((unit) => button(`in ${unit}`, () => choose(unit))));
 
+/** What could not be done last, for as long as it is so or until it is read. */
 export function problemLine() {
   onState(({ problem, refused, units }) => {
-    if ($("problem").textContent !== problem) $("problem").replaceChildren(...withWholeOptions(problem)); // read aloud once
-    $("problem").hidden = !problem;
-    $("put-near").hidden = !refused?.near;
+    putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
+    hide({ problem: !problem, "put-near": !refused?.near });
     unitButtons($("units"), units?.words || [], (unit) => send({ do: "unit", unit }));
   });
 }
@@ -27,6 +23,7 @@ const WORK = {
   "search-told": ({ search }) => (search ? "search" : ""), "slicing-told": ({ slicing }) => (slicing ? "slicing" : ""), "comparing-told": ({ comparing }) => (comparing ? "comparing" : ""),
 };
 
+/** How long work has been under way, beside what it tells of itself, as soon as that is longer than a moment. */
 export function elapsedTimes() {
   const begun = new Map(); // element -> {work, at}
   const tell = () => begun.forEach(({ work, at }, id) => {

@@ -1,8 +1,10 @@
-// Model panel: the file, how it is turned, what overhangs then, the ways it rests, and how large it stands on the platform.
+// Model panel: the file, how it is turned, what overhangs then, how large it is, and where on the plate it and its copies stand.
 
-import { $, alike, button, listen, sayIn } from "../../../../view/template/elements.js";
-import { send } from "../line.js";
-import { fill, listIn, mm2, tellIn } from "../lists.js";
+import { $, alike, button, hide, listen, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
+import { add, sub } from "../../../../view/template/picture/math.js";
+import { ask, send } from "../line.js";
+import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
+import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { unitButtons } from "../told.js";
@@ -18,25 +20,24 @@ export function modelPanel() {
   const by = () => TURNS.map((axis) => Number($(`turn-${axis}-typed`).value));
   const turn = () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); };
   for (const axis of TURNS) {
-    const slider = $(`turn-${axis}`), typed = $(`turn-${axis}-typed`);
-    const follow = (from, to) => () => { to.value = from.value; update({ turning: turnedFurther(store.state.rotation, by()) }); };
-    slider.addEventListener("input", follow(slider, typed));
-    typed.addEventListener("input", follow(typed, slider));
-    for (const input of [slider, typed]) input.addEventListener("change", turn);
+    const inputs = [$(`turn-${axis}`), $(`turn-${axis}-typed`)];
+    inputs.forEach((input, k) => {
+      input.addEventListener("input", () => { inputs[1 - k].value = input.value; update({ turning: turnedFurther(store.state.rotation, by()) }); });
+      input.addEventListener("change", turn);
+    });
   }
-  document.querySelectorAll("[data-turn]").forEach(({ dataset }, k, all) => all[k].addEventListener("click", () => send({ do: "turn", axis: dataset.turn, deg: Number(dataset.deg) })));
+  onData("turn", ({ turn: axis, deg }) => send({ do: "turn", axis, deg: Number(deg) }));
   listen("click", { "as-read": () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }) });
   dropping();
   offer("left");
   onNew(({ rotation }) => rotation, () => TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; }));
-  onState((state) => {
-    const { model, overhang_mm2: area } = state;
+  onState(({ model, overhang_mm2: area }) => {
     if (!model) return;
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
     listIn("model-notes", model.notes);
-    tellTiny(state);
+    tellTiny(model);
     tellFile(model);
-    if (area !== null) $("overhang").textContent = mm2(area);
+    if (area !== null) tell({ overhang: mm2(area) });
   });
   subscribe(tellModel);
 }
@@ -45,11 +46,11 @@ const TINY_MM = 10, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a
 const GLTF = /\.(glb|gltf)$/i; // its metres have y up
 
 /** Asks for the unit of a model that is very small. */
-function tellTiny({ model }) {
+function tellTiny(model) {
   const most = Math.max(...model.size_mm), known = GLTF.test(model.name) ? ["metres"] : Object.keys(UNITS);
   const words = known.filter((unit) => most * UNITS[unit] <= MOST_MM);
-  $("tiny").hidden = most >= TINY_MM || !words.length;
-  $("tiny-told").textContent = `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?`;
+  hide({ tiny: most >= TINY_MM || !words.length });
+  tell({ "tiny-told": `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?` });
   unitButtons($("tiny-units"), words, (unit) => {
     if (GLTF.test(model.name)) send({ do: "set", key: "process.rotate_deg", value: "[90, 0, 0]" });
     send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) });
@@ -59,10 +60,9 @@ function tellTiny({ model }) {
 /** The plates of a slicer file to choose from, and whether it keeps settings. */
 function tellFile({ plates, has_settings: has, settings_note: note }) {
   const shown = plates.length > 1 ? plates : [];
-  if ($("plates").dataset.shown !== JSON.stringify(shown)) $("plates").replaceChildren(...shown.map(({ number, name, taken }) =>
+  putNew($("plates"), shown, () => shown.map(({ number, name, taken }) =>
     button(`Plate ${number}${name && ` (${name})`}`, () => send({ do: "plate", plate: number }), { ariaPressed: String(taken), disabled: taken })));
-  $("plates").dataset.shown = JSON.stringify(shown);
-  $("inside").hidden = !has;
+  hide({ inside: !has });
   sayIn("file-settings-note", note);
 }
 
@@ -81,25 +81,25 @@ function dropping() {
 }
 
 /** Sides along the platform's axes as the model stands, or a hand turns it; as it is read where neither is known. */
-export const sizeOf = ({ standing, model }) => ((!store.turning && standing) || store.seen || model).size_mm;
+export const modelSize = ({ standing, model }) => ((!store.turning && standing) || store.seen || model).size_mm;
 
 function tellModel({ state: { model, standing } }) {
   if (model) tellIn("model-told", [
     ["name", model.name], ["faces", model.faces.toLocaleString("en")],
-    ["size", `${sizeOf({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
+    ["size", `${modelSize({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
   ]);
 }
 
 export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
+  let shown = null; // the standing that was told last
   const scale = (value) => send({ do: "set", key: "process.scale", value });
   listen("change", { scale: () => scale(scaleBy(Number($("scale").value) / 100 / store.state.scale)) });
+  listen("click", { "scale-as-read": () => scale(null) });
   sides.forEach((side, k) => side.addEventListener("change", () => {
     const { standing } = store.state;
     if (standing) scale(scaleBy(Number(side.value) / standing.size_mm[k]));
   }));
-  let shown = null; // the standing that was told last
-  listen("click", { "scale-as-read": () => scale(null) });
   onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;
     const fresh = problem !== before?.problem || !alike(standing, shown);
@@ -107,7 +107,72 @@ export function sizePanel() {
     const put = (input, value) => { if (fresh) input.value = value; else fill(input, value); };
     put($("scale"), Number((100 * factor).toPrecision(6)));
     sides.forEach((side, k) => put(side, standing.size_mm[k].toFixed(2)));
-    $("fit-told").textContent = standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.`;
+    tell({ "fit-told": standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.` });
     $("fit-told").classList.toggle("refused", Boolean(standing.problem));
+  });
+}
+
+const MIDDLE = [0, 0], STEP_MM = 1, LARGE_STEP_MM = 10; // the latter with Shift held
+const WAYS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+const placeNow = () => store.placing || store.state.place_mm;
+const rounded = (place, step) => place.map((x) => step * Math.round(x / step));
+
+/** Has the model stand somewhere else; the picture has it there until that is done or refused. */
+function put(place) {
+  if (alike(place, store.state.place_mm)) return update({ placing: null });
+  update({ placing: place });
+  ask({ do: "set", key: "process.place_mm", value: alike(place, MIDDLE) ? null : `[${place.join(", ")}]` }, () => { if (store.placing === place) update({ placing: null }); });
+}
+
+/** Where on the plate the model and its copies stand: dragged there in the picture, by arrow keys, or typed. */
+export function placePanel(picture) {
+  const fields = [$("place-x"), $("place-y")];
+  const putFar = (place) => {
+    put(place);
+    picture?.fit(); // it may be out of sight there
+  };
+  fields.forEach((field) => field.addEventListener("change", () => putFar(fields.map(({ value }) => Number(value)))));
+  $("place-middle").addEventListener("click", () => putFar(MIDDLE));
+  onState(({ machine: { table } }) => {
+    const [x, y] = table.size_mm || [2 * table.radius_mm, 2 * table.radius_mm];
+    $("place-told").textContent = `The plate goes from ${-x / 2} to ${x / 2} mm along x, from ${-y / 2} to ${y / 2} mm along y.`.replaceAll("-", "−");
+  });
+  let told = "", copies = [[...MIDDLE, 0]]; // where they stand; the first is the one that hands turn, cut and mark
+  subscribe(() => {
+    const now = JSON.stringify(placeNow());
+    if (store.state.copies_mm) copies = store.state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
+    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])));
+    if (now === told) return;
+    told = now;
+    fields.forEach((field, axis) => { field.value = placeNow()[axis]; });
+  });
+  if (picture) handleOf(picture);
+}
+
+/** The knob at the model's foot. */
+function handleOf(picture) {
+  const knob = $("hand-place");
+  /** Where a hand is on the plate, from the middle of the model as it stands now; null: it looks above the plate's horizon. */
+  const onPlate = (event) => {
+    const [eye, along] = picture.sight(event);
+    return along[2] * eye[2] < 0 ? [0, 1].map((axis) => eye[axis] - (along[axis] * eye[2]) / along[2] + placeNow()[axis]) : null;
+  };
+  gripOf(knob, {
+    take: (event) => {
+      const from = onPlate(event);
+      return from && { from, stood: placeNow() };
+    },
+    move: ({ from, stood }, event) => {
+      const to = onPlate(event);
+      if (to) update({ placing: rounded(stood.map((x, axis) => x + to[axis] - from[axis]), event.shiftKey ? LARGE_STEP_MM : STEP_MM) });
+    },
+    put: () => { if (store.placing) put(store.placing); },
+    drop: () => update({ placing: null }),
+    step: (sign, { key, shiftKey }) => update({ placing: WAYS[key].map((way, axis) => placeNow()[axis] + way * (shiftKey ? LARGE_STEP_MM : STEP_MM)) }),
+  });
+  picture.drawn.push(() => {
+    const shown = store.tab === "model" && store.state?.model && store.triangles && store.clicks !== "lay";
+    putAt(knob, shown ? picture.placeOf([0, 0, 0]) : null);
   });
 }

@@ -2,10 +2,11 @@
 
 import { $, alike, button, listen, made, putAt, swatch } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
-import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/solids.js";
+import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { wordOf } from "../../../../view/template/picture/solids.js";
 import { newest, send } from "../line.js";
-import { choiceRow, cross, fill, putTable } from "../lists.js";
-import { sizeOf } from "../model/model-panel.js";
+import { choiceRow, fill, putTable, removeButton } from "../lists.js";
+import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { onState, store, subscribe, update } from "../store.js";
 
@@ -44,7 +45,7 @@ const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
 const boxes = () => store.state.zones.filter((zone) => zone.min_mm).map((zone) => (sameMark(store.zoneHand, zone) ? store.zoneHand : zone));
 /** The boxes of modifiers as far as the model reaches. */
 function modifiers() {
-  const size = sizeOf(store.state), far = Math.hypot(...size) + BEYOND_MM;
+  const size = modelSize(store.state), far = Math.hypot(...size) + BEYOND_MM;
   const reach = (axes, axis) => (axes || axis === 2 ? far : size[axis] / 2 + BEYOND_MM);
   const within = (corner, axes) => corner.map((x, axis) => Math.max(-reach(axes, axis), Math.min(reach(axes, axis), x)));
   return store.state.modifiers.map((own) => ({ ...own, min_mm: within(own.min_mm, own.axes), max_mm: within(own.max_mm, own.axes) }));
@@ -92,7 +93,7 @@ export function marksPanel(picture) {
   listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: Number($("mark-angle").value) }); } });
   listen("click", { "mark-middle": () => {
     update({ clicks: "" });
-    const [x, y, z] = sizeOf(store.state), low = store.state.pedestal_mm;
+    const [x, y, z] = modelSize(store.state), low = store.state.pedestal_mm;
     addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
   } });
   const knobs = BOX_SIDES.map((side) => knobOf(side, picture)), numbers = BOX_SIDES.map(numberOf);
@@ -154,9 +155,9 @@ function knobOf(side, picture) {
 
 /** A field for one side of the chosen box. */
 function numberOf(side) {
-  const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${side.name}, mm` });
+  const { axis, end, name } = side, typed = (zone, value) => ({ ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) });
+  const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${name}, mm`, onchange: () => { if (boxNow()) putBox(typed(boxNow(), Number(input.value))); } });
   input.dataset.side = sideTitle(side);
-  input.addEventListener("change", () => { if (boxNow()) putBox({ ...boxNow(), [side.end]: boxNow()[side.end].map((x, k) => (k === side.axis ? Number(input.value) : x)) }); });
   return input;
 }
 
@@ -171,10 +172,10 @@ const modifierRow = ({ settings }) => made("tr", {}, made("td", {}, swatch(`rgb(
 
 function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
-  const remove = cross(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
+  const remove = removeButton(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
-  const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [[where], [remove]], () => chooseMark(zone));
+  const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [where, remove], () => chooseMark(zone));
   row.querySelector("input").ariaLabel = name;
   return row;
 }

@@ -3,7 +3,7 @@
 import { $, listen } from "../../../../view/template/elements.js";
 import { blockOf } from "../../../../view/template/moves/block.js";
 import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
-import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/model.js";
+import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/shapes.js";
 import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest } from "../line.js";
 import { mm2, newtons } from "../lists.js";

@@ -1,9 +1,16 @@
-// Planes: those that are looked at, as the bench has them or a hand holds one, and the chosen part's.
+// Planes: those that are looked at, as the bench has them or a hand holds one: their panel, the knobs in the picture, and what a refused one is in the way of.
 
-import { add, clamp, dot, RAD, scaled, sub } from "../../../../view/template/picture/math.js";
+import { $, alike, disable, hide, listen, onData, putAt, tell } from "../../../../view/template/elements.js";
+import { add, clamp, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
+import { beside, boxesOf, chained, circle, headOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { RED } from "../../../../view/template/picture/solids.js";
 import { ask, send } from "../line.js";
-import { cornersAt } from "../scene/triangles.js";
-import { store, update } from "../store.js";
+import { fill, mm2 } from "../lists.js";
+import { modelSize } from "../model/model-panel.js";
+import { alongWay, gripOf } from "../scene/grip.js";
+import { cornersAt, sectionOf } from "../scene/triangles.js";
+import { onState, store, subscribe, update } from "../store.js";
+import { apartNow } from "./pieces.js";
 
 const TOP = 1e-9; // of the length of what is left of a direction across z, below which it points nowhere
 const SAME = 1e-9; // mm, or of a direction
@@ -17,7 +24,7 @@ const alikeBut = (planes, others, but) => planes.length === others.length && pla
 export const planesNow = () => store.state.cuts.map((plane, k) => (store.hand?.part === k + 2 ? store.hand.plane : plane));
 
 /** The plane of the chosen part; null where it has none. */
-export const planeNow = () => planesNow()[store.part - 2] || null;
+const planeNow = () => planesNow()[store.part - 2] || null;
 
 export const isLocked = (part = store.part) => store.state.locked[part - 2];
 
@@ -43,7 +50,7 @@ function handNow() {
 }
 
 /** The plane in a hand somewhere else, to look at: its figures come when they are known. */
-export function holdPlane(wanted) {
+function holdPlane(wanted) {
   const hand = handNow();
   send({ do: "try", part: hand.part, ...wanted });
   update({ hand: { ...hand, wanted, plane: hand.why ? hand.plane : wanted, put: false, since_ms: performance.now() } });
@@ -58,7 +65,7 @@ export function afterTrial(hand, trial) {
 }
 
 /** A new state with a plane in the hand. */
-export function followHand(state, before) {
+function followHand(state, before) {
   const { hand } = store, { trial } = state;
   if (!alikeBut(state.cuts, before?.cuts || [])) return update({ hand: null });
   if (hand.put || !trial || trial === before?.trial || !alikeBut(trial.cuts, state.cuts, hand.part - 2)) return;
@@ -68,7 +75,7 @@ export function followHand(state, before) {
 }
 
 /** The plane there for good, or, where it cannot be cut there, at the last place where it can. */
-export function putPlane(plane) {
+function putPlane(plane) {
   const { allowed, ...hand } = handNow(), put = { ...hand, allowed, plane, put: true }, here = store.state.cuts[hand.part - 2];
   if (alikePlanes(plane, here)) return leavePlane();
   update({ hand: put });
@@ -80,21 +87,10 @@ export function putPlane(plane) {
 }
 
 /** The plane in the hand back where it was. */
-export function leavePlane() {
+function leavePlane() {
   const here = store.hand && store.state.cuts[store.hand.part - 2];
   if (here) send({ do: "try", part: store.hand.part, ...here });
   update({ hand: null });
-}
-
-/** A plane put where it is wanted or at the nearest place where it can be cut; moved(plane wanted, plane there): it stands. */
-export function putNear(command, moved) {
-  const before = store.state.cuts;
-  ask({ ...command, near: true }, (refusal) => {
-    const { cuts } = store.state, k = cuts.findIndex((plane) => !before.some((other) => alikePlanes(plane, other)));
-    if (refusal || k < 0) return;
-    choosePart(k + 2);
-    moved(command, cuts[k]);
-  });
 }
 
 export const removePart = (part) => send({ do: "remove", part });
@@ -119,4 +115,173 @@ export function snapTo(face, picture) {
   const seen = picture.carried(corner), out = sub(picture.carried(add(corner, normal)), seen);
   const way = dot(out, planeNow().normal) < 0 ? scaled(out, -1) : out;
   putPlane({ normal: way, offset_mm: dot(way, seen) });
+}
+
+const REACH = 1.12; // of a section's radius at which the knobs of the tilt stand, as wide as its disc
+const STEP_MM = 0.5, STEP_DEG = 1;
+const KNOBS = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
+
+let last = { of: "", triangles: null, section: null }; // of a large model it takes a moment, and most news change nothing of it
+
+/** Middle and reach of what the chosen plane cuts, where planes are looked at; null: nothing. */
+function sectionNow(picture) {
+  const plane = store.tab === "parts" && !apartNow() && store.triangles && store.state.model && picture ? planeNow() : null;
+  if (!plane) return null;
+  const of = JSON.stringify([plane, planesNow().slice(store.part - 1), picture.matrix()]);
+  if (of !== last.of || store.triangles !== last.triangles) {
+    last = { of, triangles: store.triangles, section: sectionOf(store.triangles, plane, planesNow().slice(store.part - 1), picture.matrix()) };
+  }
+  return last.section;
+}
+
+/** Three knobs at the chosen plane: one moves it along its normal, two tilt it; by hand, finger or arrow keys. */
+export function handlesOf(picture) {
+  let section = null; // of the chosen plane
+  const placeOf = ({ tilts }) => {
+    const { centre_mm: centre, radius_mm: radius } = section, { normal } = planeNow();
+    return add(centre, tilts === null ? scaled(normal, 0.6 * radius) : scaled(beside(normal)[tilts], REACH * radius));
+  };
+  /** The plane moved by so many mm at a knob, from how it was when it was taken. */
+  const moved = ({ plane, about: { centre_mm: centre, radius_mm: radius }, tilts }, mm) => {
+    if (tilts === null) return { normal: plane.normal, offset_mm: plane.offset_mm + mm };
+    const axes = beside(plane.normal), angle = Math.atan2(mm, REACH * radius);
+    const normal = unit(turned(rotated(cross(axes[tilts], plane.normal), angle), plane.normal));
+    return { normal, offset_mm: dot(normal, centre) };
+  };
+  const taken = ({ tilts }) => ({ plane: store.hand?.wanted || planeNow(), about: section, tilts });
+  const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * section.radius_mm);
+  KNOBS.forEach((knob) => gripOf($(knob.id), {
+    take: (event) => {
+      const along = alongWay(picture, placeOf(knob), planeNow().normal, event);
+      return along && { ...taken(knob), along };
+    },
+    move: (held, event) => holdPlane(moved(held, held.along(event))),
+    put: () => { if (store.hand) putPlane(store.hand.plane); },
+    drop: leavePlane,
+    step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
+  }));
+  picture.drawn.push(() => {
+    $("handles").hidden = !section || !planeNow() || isLocked();
+    if (!$("handles").hidden) for (const knob of KNOBS) putAt($(knob.id), picture.placeOf(placeOf(knob)));
+  });
+  subscribe(() => {
+    const before = section;
+    section = sectionNow(picture);
+    if (section !== before) picture.plane(section && { ...planeNow(), ...section });
+    if (!section) $("handles").hidden = true;
+  });
+}
+
+const MOVED_MM = 0.01, MOVED_DEG = 0.05; // less is not told
+
+/** The chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand. */
+export function planesPanel(picture) {
+  let moved = { text: "", cuts: [] }; // what is told of a plane that was put near, as long as the planes are these
+  const byPlane = (event, acts) => Object.entries(acts).forEach(([id, act]) => listen(event, { [id]: () => { if (planeNow()) act(store.part); } }));
+  /** The chosen plane with another normal, turned about the middle of its cut. */
+  const lean = (tilt, towards) => {
+    const plane = planeNow(), about = sectionNow(picture)?.centre_mm || scaled(plane.normal, plane.offset_mm), across = Math.sin(tilt * RAD);
+    const normal = [across * Math.cos(towards * RAD), across * Math.sin(towards * RAD), Math.cos(tilt * RAD)];
+    putPlane({ normal, offset_mm: dot(normal, about) });
+  };
+  /** A plane put where it is wanted or at the nearest place where it can be cut. */
+  const near = (command) => {
+    const before = store.state.cuts;
+    ask({ ...command, near: true }, (refusal) => {
+      const { cuts } = store.state, k = cuts.findIndex((plane) => !before.some((other) => alikePlanes(plane, other)));
+      if (refusal || k < 0) return;
+      choosePart(k + 2);
+      moved = { text: movedInWords(command, cuts[k]), cuts };
+      tellPlane();
+    });
+  };
+  const tellPlane = () => tellAll(alike(moved.cuts, store.state.cuts) ? moved.text : "");
+  const leanAsTyped = () => lean(Number($("plane-tilt").value), Number($("plane-towards").value));
+  byPlane("click", {
+    remove: removePart, neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
+  });
+  byPlane("change", {
+    "plane-offset": () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
+  });
+  onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), Number($("plane-towards").value)); });
+  listen("click", {
+    "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(store.state.refused.near),
+  });
+  onState((state, before) => {
+    const { hand, part } = store, { trial, cuts, model } = state;
+    if (part > Math.max(state.parts, 1) || !model) update({ part: 0 });
+    if (trial && trial !== before?.trial && !trial.refused && alike(trial.cuts, cuts)) update({ figures: trial });
+    if (hand) followHand(state, before);
+  });
+  subscribe(tellPlane);
+}
+
+/** The command for a level plane half way up, for a part printed after the one that is chosen. */
+function newPlane(picture) {
+  const { state, part } = store, low = state.pedestal_mm, [least, most] = picture ? picture.box() : [[0, 0, low], add(modelSize(state), [0, 0, low])];
+  return { do: "add", after: planeNow() ? part : Math.max(state.parts, 1), normal: [0, 0, 1], offset_mm: Math.round((least[2] + most[2]) * 5) / 10 };
+}
+
+/** How far from where it was wanted a plane stands. */
+function movedInWords({ normal, offset_mm: wanted }, there) {
+  const far = there.offset_mm - wanted, leans = Math.acos(Math.min(dot(normal, there.normal) / Math.hypot(...normal), 1)) / RAD;
+  if (leans > MOVED_DEG) return `It leans by ${leans.toFixed(0)}°: nowhere along its own direction can it be cut.`;
+  return Math.abs(far) < MOVED_MM ? "" : `It stands ${Math.abs(far).toFixed(2)} mm ${far > 0 ? "farther up" : "farther down"} than asked for: the nearest place where it can be cut.`;
+}
+
+function tellAll(moved) {
+  const { state: { locked, search, cuts }, hand, part } = store, plane = planeNow(), figures = figuresNow(), why = hand?.why;
+  disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
+  hide({ plane: !plane });
+  if (plane) {
+    const [tilt, towards] = anglesOf(plane.normal);
+    Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));
+    document.querySelectorAll("#plane input, #plane button").forEach((control) => { control.disabled = isLocked(); });
+    hide({ limb: Boolean(plane.limbs_mm), "all-above": !plane.limbs_mm });
+    $("earlier").disabled ||= part === 2;
+    $("later").disabled ||= part === cuts.length + 1;
+  }
+  $("plane-told").classList.toggle("refused", Boolean(why));
+  const told = why ? `Part ${why.refused_part} cannot be cut off there: ${why.refused}.` : !figures || !cuts.length ? ""
+    : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
+  tell({ "plane-told": told, "plane-moved": moved });
+}
+
+const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked
+const TOUCH_COLOUR = [255, 221, 70, 255]; // seen on the red body and on the table
+const RING_SHARES = [1, 0.5]; // of that mark's size: rings on the table where the head would touch it
+
+/** What a refused plane is in the way of: the head where it would touch the table, or the places that are meant. */
+export function obstacleOf(picture) {
+  subscribe(({ state, triangles, tab, hand }) => {
+    if (!triangles || !state.model) return;
+    const obstacle = tab === "parts" ? (hand?.why || state.refused)?.obstacle : null;
+    picture.extra("obstacle", JSON.stringify([obstacle, state.machine.name]), () => {
+      const size = PLACE_SHARE * length(sub(...picture.box())), { places_mm: places = [], touch } = obstacle || {};
+      return [...places.map((place) => placeDrawn(place, size)), ...(touch ? [...headDrawn(touch, state.machine.head), ...touchDrawn(touch, 2 * size)] : [])];
+    });
+    document.documentElement.dataset.obstacle = obstacle ? (obstacle.touch ? "head" : "places") : "";
+  });
+}
+
+/** The head where it would touch, the body that does in red. */
+function headDrawn({ body, tip_mm: tip, rotation }, head) {
+  const frame = [150, 158, 170, 255], edge = [60, 66, 76, 200], red = [...RED, 255], matrix = [...rotation.flatMap((row) => [...row, 0]), ...tip, 1];
+  const touching = head.boxes.filter(({ name }) => name === body), others = head.boxes.filter(({ name }) => name !== body);
+  const { nozzle, hotEnd, boxes } = headOf({ ...head, boxes: others }, frame, edge), box = boxesOf(touching, red, edge);
+  const hot = touching.length ? hotEnd : headOf({ ...head, boxes: [] }, red, edge).hotEnd;
+  return [nozzle, { ...hot, strength: touching.length ? 0.5 : 0.75 }, { ...boxes, strength: 0.35 }, { ...box, strength: 0.75 }].map((thing) => ({ ...thing, matrix }));
+}
+
+/** Rings on the table where the head would touch it. */
+function touchDrawn({ touched_mm: [x, y, z] }, size) {
+  const rings = RING_SHARES.flatMap((share) => chained(circle(share * size, z, 32)).map(([a, b, c]) => [a + x, b + y, c]));
+  return [{ lines: trianglesOf([{ corners: rings, colour: TOUCH_COLOUR }]), over: true }];
+}
+
+/** A small octahedron that nothing hides. */
+function placeDrawn([x, y, z], size) {
+  const tips = [[size, 0, 0], [0, size, 0], [-size, 0, 0], [0, -size, 0]].map(([a, b]) => [x + a, y + b, z]);
+  const corners = tips.flatMap((tip, k) => [z + size, z - size].flatMap((end) => [tip, tips[(k + 1) % 4], [x, y, end]]));
+  return { solid: trianglesOf([{ corners, colour: [...RED, 255] }]), over: true };
 }

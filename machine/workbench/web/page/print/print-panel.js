@@ -1,14 +1,66 @@
 // Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
 // whatever becomes of this page.
 
-import { $, listen, needsKey, notice, sayIn } from "../../../../view/template/elements.js";
-import { withWholeOptions } from "../lists.js";
+import { $, alike, disable, hide, listen, made, needsKey, notice, onData, sayIn, tell } from "../../../../view/template/elements.js";
+import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
+import { putNew, withWholeOptions } from "../lists.js";
 import { onNew, onState, update } from "../store.js";
-import { handPanel, keepHeats, showHand, showHeats, webcamPanel } from "./at-printer.js";
 import { followIn } from "./print-frame.js";
-import { askToNotify, hear, notifyOver, showBar, showPrint, showProgress, showWhich, silence, sure, titleOfPrints } from "./print-shown.js";
-import { OWN_PAGE, printsLine, stopsAsked } from "./prints-line.js";
-import { chosenOr, port, printerChosen, printerIsChosen, SERVERS, showJournals, showPort, showPorts, unforce } from "./where-to-print.js";
+import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
+
+/** What is chosen of a list whose last entry is another one, typed. */
+function chosenOr(name, typed) {
+  const chosen = document.querySelector(`.ports input[name=${name}]:checked`);
+  return chosen ? chosen.value || $(typed).value.trim() : "";
+}
+
+const port = () => chosenOr("port", "port-typed");
+
+let known = false; // the printer is chosen by a person, now or the last time, or because no other one was found
+
+function choosePort({ port: name, baud = $("baud").value, sim_speed: speed = $("sim-speed").value }) {
+  $("baud").value = baud;
+  $("sim-speed").value = speed;
+  const listed = [...$("ports").querySelectorAll("input[name=port]")].find(({ value }) => value && value === name);
+  if (!listed) $("port-typed").value = name;
+  (listed || $("port-other")).checked = true;
+  known = true;
+  showPort();
+}
+
+const SERVERS = /^(octoprint|moonraker|duet):/i;
+
+/** What the chosen port is asked for besides. */
+function showPort() {
+  const simulated = port() === "sim", server = SERVERS.test(port());
+  hide({ "sim-speed-line": !simulated, "baud-line": simulated || server, "follow-server": !server, "send-only-line": !server, "port-hint": !$("port-other").checked });
+}
+
+function unforce() {
+  $("force").checked = false;
+  hide({ "force-line": true });
+}
+
+function showPorts({ ports, asking, last_printer: last }, before) {
+  if (last && !known) choosePort(last);
+  disable({ "ask-ports": asking });
+  tell({ "ports-told": asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "" });
+  if (alike(ports, before.ports) && $("ports-found").children.length) return;
+  offer("port", port(), (ports || []).map((device) => [device.port, device.port, [device.description, device.words].filter(Boolean).join(": ")]));
+  if (ports?.length === 1 && !known) choosePort({ port: ports[0].port });
+}
+
+/** Prints that were cut off, those of the last run of the program among them. */
+function showJournals(journals, before) {
+  if (alike(journals, before)) return;
+  tell({ "journals-told": journals && !journals.length ? "No print of this computer was cut off or cancelled." : "" });
+  offer("journal", chosenOr("journal", "journal-typed"), (journals || []).map(({ path, name, machine, line, written_s }) => (
+    [path, name, `on ${machine}, up to line ${line}, ${new Date(1000 * written_s).toLocaleString()}`])));
+}
+
+/** A list of rows [value, name, words], of which one can be chosen; now: the one that is. */
+const offer = (name, now, rows) => $(`${name}s-found`).replaceChildren(...rows.map(([value, title, words]) => made("label", { className: "port" },
+  made("input", { type: "radio", name, value, checked: value === now }), made("span", {}, made("b", { text: title }), made("small", { text: words })))));
 
 const STOP_KEY = "e";
 
@@ -20,7 +72,8 @@ export function printPanel() {
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
   const print = () => state.prints.find((job) => job.number === chosen) || null;
   const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => !job.over);
-  const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
+  /** A command to the print that is looked at, if there is one. */
+  const toldTo = (command) => { if (print()) send({ ...command, print: print().number }); };
 
   function show(before) {
     const known = before.prints.map((job) => job.number), fresh = state.prints.findLast((job) => !known.includes(job.number));
@@ -62,9 +115,9 @@ export function printPanel() {
   const toPrint = () => {
     update({ looking: false });
     $("tab-printing").click();
-    if (printerIsChosen() && !state.prints.some((job) => !job.over && job.port === port())) check();
+    if (known && port() && !state.prints.some((job) => !job.over && job.port === port())) check();
   };
-  for (const event of ["change", "input"]) listen(event, { ports: () => { printerChosen(); showPort(); unforce(); } });
+  for (const event of ["change", "input"]) listen(event, { ports: () => { known = true; showPort(); unforce(); } });
   listen("focus", {
     "port-typed": () => { $("port-other").checked = true; $("ports").dispatchEvent(new Event("change")); },
     "journal-typed": () => { $("journal-other").checked = true; },
@@ -76,17 +129,17 @@ export function printPanel() {
     "go-on-with": () => send({ do: "go_on", ...where(), journal: chosenOr("journal", "journal-typed"), machine: $("rest-machine").value.trim() }),
     cancel: () => { sure(true); $("go-on").focus(); }, "go-on": () => sure(false), begin: askToNotify,
   });
-  for (const button of $("run").querySelectorAll("[data-print]")) button.addEventListener("click", () => { sure(false); command(button.dataset.print); });
+  onData("print", ({ print: name }) => { sure(false); toldTo({ do: name }); }, $("run"));
   webcamPanel(print);
-  handPanel((asked) => command("by_hand", asked));
+  handPanel((asked) => toldTo({ do: "by_hand", ...asked }));
   listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });
   listen("change", { which: () => { chosen = Number($("which").value); sure(false); show(state); } });
   for (const id of ["feed", "flow"]) {
     const letGo = () => delete $(id).dataset.held;
-    listen("input", { [id]: () => { $(id).dataset.held = true; $(`${id}-told`).textContent = `${$(id).value} %`; } });
+    listen("input", { [id]: () => { $(id).dataset.held = true; tell({ [`${id}-told`]: `${$(id).value} %` }); } });
     for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first, if any
     listen("blur", { [id]: letGo });
-    listen("change", { [id]: () => { letGo(); command(id, { percent: Number($(id).value) }); } });
+    listen("change", { [id]: () => { letGo(); toldTo({ do: id, percent: Number($(id).value) }); } });
   }
   const stop = () => stops.press(Number($("emergency").dataset.print));
   listen("click", { emergency: stop });
@@ -100,18 +153,54 @@ export function printPanel() {
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
   onNew(({ sliced }) => sliced && [sliced.key, sliced.stale], () => { unforce(); problem(""); }); // what was found of others
   onState(({ lacking: { slices: why } }) => {
-    $("check").disabled = Boolean(why);
+    disable({ check: Boolean(why) });
     sayIn("unsliced", why && `Nothing to print: ${why}.`);
     follow();
   });
 }
 
 function problem(text) {
-  $("print-problem").replaceChildren(...withWholeOptions(text));
-  $("print-problem").hidden = !text;
+  putNew($("print-problem"), text, () => withWholeOptions(text));
+  hide({ "print-problem": !text });
 }
 
 function refused({ problem: text, forcible }) {
   problem(text);
-  if (forcible) $("force-line").hidden = false;
+  if (forcible) hide({ "force-line": false });
+}
+
+const SAME_PRESS_MS = 1000; // who presses twice in a fright means the print of the first time
+
+/** Emergency stops, and in the bar at the foot, which nothing covers, what has become of them, until a person has noted it. */
+function stopsAsked(prints, send, isOpen) {
+  let asked = new Set(), late = 0, pressed = { number: 0, at: -Infinity };
+  const going = ({ over }) => !over;
+  const stopped = () => prints().filter(({ number }) => asked.has(number));
+  const say = (text) => {
+    sayIn("stop-words", text);
+    hide({ "stop-told": !text, "print-bar": !text && $("emergency").hidden });
+  };
+  const doubt = () => {
+    if (stopped().length ? !stopped().some(going) : isOpen()) return;
+    say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
+  };
+  const ask = (number) => {
+    if (prints().some((job) => going(job) && job.number === number)) asked.add(number);
+    send({ do: "emergency", print: number });
+    if (!isOpen()) doubt();
+    clearTimeout(late);
+    late = setTimeout(doubt, ANSWER_MS);
+  };
+  listen("click", { "stop-noted": () => { if (!stopped().some(going)) asked = new Set(); say(""); } });
+  return {
+    /** number: of a print. */
+    press: (number) => {
+      const now = performance.now();
+      pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
+      ask(pressed.number);
+    },
+    /** One has waited too long for a line, or its print is not there any more. */
+    expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },
+    told: () => { if (stopped().length && !stopped().some(going)) say(stopped().map(({ name, sentence }) => `${name}: ${sentence}.`).join(" ")); },
+  };
 }

@@ -1,11 +1,10 @@
 // Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
 // changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
-import { $, alike, button, disable, hide, listen, made, pressed, tell } from "../../../../view/template/elements.js";
+import { $, button, disable, hide, listen, made, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
-import { putRows } from "../lists.js";
-import { keptInTab, onState, store } from "../store.js";
-import { settingRow } from "./setting-row.js";
+import { putNew, putRows } from "../lists.js";
+import { keptInTab, onNew, onState, store } from "../store.js";
 
 const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
 const KINDS = ["machine", "material", "process"];
@@ -31,7 +30,7 @@ export function settingsPanel() {
   /** What is refused stands beside its field, whatever is told next. */
   const tellBeside = () => {
     const beside = [...wrongs.values()].some(({ text }) => text === store.state.problem);
-    if (beside && store.tab === "settings") $("problem").hidden = true;
+    if (beside && store.tab === "settings") hide({ problem: true });
   };
   const sought = () => $("search-settings").value.toLowerCase().split(/\s+/).filter(Boolean).map(stem);
   const shown = (setting) => {
@@ -46,7 +45,7 @@ export function settingsPanel() {
     disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
     tellTakeBack(changed, part());
     for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
-    const groups = groupedBy(rows, ({ group }) => group);
+    const groups = Map.groupBy(rows, ({ group }) => group);
     putRows([...groups].flatMap(([group, own]) => {
       const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
       const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key)]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
@@ -69,8 +68,8 @@ export function settingsPanel() {
     const told = await answer.json();
     settings = told.settings;
     showProfiles(told.profiles);
-    $("command-line").replaceChildren(...told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
-    $("command-field").hidden = !told.command;
+    putNew($("command-line"), told.command, () => told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
+    hide({ "command-field": !told.command });
     list();
   };
   const partsToChoose = ({ parts, part_settings: own, model }) => {
@@ -78,8 +77,7 @@ export function settingsPanel() {
       const keys = own.find((ofPart) => ofPart.part === k + 1)?.keys.length || 0;
       return `part ${k + 1}${keys ? ` (${keys} of its own)` : ""}`;
     })];
-    const chosen = part() < names.length ? part() : 0;
-    $("settings-part").replaceChildren(...names.map((text, k) => made("option", { text, value: k, selected: k === chosen })));
+    $("settings-part").replaceChildren(...optionsOf([...names.entries()], part() < names.length ? part() : 0));
   };
   listen("input", { "search-settings": list });
   listen("change", { "settings-part": () => { wrongs.clear(); fetchAll(); } });
@@ -89,19 +87,20 @@ export function settingsPanel() {
   });
   for (const level of LEVELS) listen("click", { [`level-${level}`]: () => { kept.keep({ level }); list(); } });
   for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
-  const ofSettings = ({ given, part_settings: own, parts, model, rotation, stops, copies } = {}) => [given, own, parts, model?.name, rotation, stops, copies];
-  onState((state, before) => {
-    const fresh = !before || !alike(ofSettings(state), ofSettings(before));
-    if (fresh) partsToChoose(state);
+  onNew(({ given, part_settings: own, parts, model, rotation, stops, copies }) => [given, own, parts, model?.name, rotation, stops, copies], () => {
+    partsToChoose(store.state);
+    fetchAll();
+  });
+  onState(() => {
     tellBeside();
-    if (fresh || missed) fetchAll();
+    if (missed) fetchAll();
   });
 }
 
 function showProfiles(profiles) {
   const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
-    const select = made("select", {}, ...names.map((text) => made("option", { text, value: text, selected: text === name })));
-    select.addEventListener("change", () => ask({ do: "profile", kind, name: select.value }, (refusal) => { if (refusal) select.value = name; }));
+    const onchange = ({ target }) => ask({ do: "profile", kind, name: target.value }, (refusal) => { if (refusal) target.value = name; });
+    const select = made("select", { onchange }, ...optionsOf(names.map((text) => [text, text]), name));
     return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
   });
   putRows(rows, $("profiles-list"));
@@ -120,15 +119,9 @@ function farFrom(setting, words) {
   return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));
 }
 
-function groupedBy(rows, nameOf) {
-  const groups = new Map();
-  for (const row of rows) groups.set(nameOf(row), [...(groups.get(nameOf(row)) || []), row]);
-  return groups;
-}
-
 /** Whose changes there are, with a button for each profile that has some, and one for all. */
 function tellTakeBack(changed, part) {
-  const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
+  const counts = Map.groupBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
   for (const kind of KINDS) {
     const count = counts.get(kind)?.length || 0;
     tell({ [`reset-${kind}`]: `Those of the ${kind} (${count})` });
@@ -153,4 +146,70 @@ async function copyText(element, button) {
   const copied = await navigator.clipboard?.writeText(element.textContent).then(() => true, () => false);
   button.textContent = copied ? "Copied" : "Marked: copy it by Ctrl+C";
   setTimeout(() => { button.textContent = "Copy"; }, 3000);
+}
+
+/** A key that is broken between its words where it is too long for a line. */
+const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
+
+/** wrong: {text, typed}, what was refused last; set(key, value, typed) asks for a value, null: as it was; again(): called when a person
+ * leaves what was typed in, for what has been told meanwhile; explained: the keys whose meaning is shown. */
+function settingRow(setting, { wrong, set, again, explained }) {
+  const { key, label, unit, kind, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
+  const meaning = made("small", { text: meaningOf(setting), id: `meaning-${key}`, hidden: !explained.has(key) });
+  const refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
+  input.setAttribute("aria-describedby", meaning.id);
+  input.setAttribute("aria-invalid", Boolean(wrong));
+  const was = wasOf(setting), back = button("↺", () => set(key, null), { title: was, ariaLabel: `${label}: ${was}`, hidden: !changed && !wrong });
+  const turn = () => {
+    meaning.hidden = !meaning.hidden;
+    explain.ariaExpanded = String(!meaning.hidden);
+    explained[meaning.hidden ? "delete" : "add"](key);
+  };
+  const explain = button("?", turn, { title: meaning.textContent, ariaLabel: `${label}: what it means`, ariaExpanded: String(explained.has(key)) });
+  const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
+  const words = made("span", {}, label, made("small", { className: "key" }, ...breakable(key)));
+  const typed = made("div", { className: "typed" }, made("label", {}, words, input, made("span", { className: "unit", text: unit })), explain, back);
+  const row = made("div", { className: changed ? "setting changed" : "setting" }, typed, refused, made("small", { className: "was", text: was, hidden: !changed }), meaning, named);
+  const left = () => {
+    const begun = Boolean(row.dataset.typing);
+    delete row.dataset.typing;
+    return begun;
+  };
+  row.dataset.key = key;
+  input.addEventListener("input", () => { row.dataset.typing = kind; });
+  input.addEventListener("change", () => { set(key, typedIn(input, kind, optional), kind === "boolean" ? input.checked : input.value); left(); });
+  input.addEventListener("blur", () => { if (left()) again(); });
+  return row;
+}
+
+/** What a key means and what it may be, as a sentence. */
+function meaningOf({ meaning, least, most }) {
+  const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
+  return `${meaning.charAt(0).toUpperCase()}${meaning.slice(1)}${range}.`;
+}
+
+/** What a key has without the change, where that is short enough to be read. */
+function wasOf({ unchanged, unit, kind }) {
+  if (kind === "block" || kind === "rows") return "Take the profile's own back";
+  const value = unchanged === null || unchanged === "" ? "nothing" : unchanged === true ? "on" : unchanged === false ? "off" : `${unchanged} ${unit}`.trim();
+  return `The profile has ${value}`;
+}
+
+function inputOf({ kind, choices, least, most }, value) {
+  const typed = value ?? "";
+  if (kind === "choice") return made("select", {}, ...optionsOf(choices.map((text) => [String(text), text]), String(value)));
+  if (kind === "boolean") return made("input", { type: "checkbox", checked: value });
+  if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: typed });
+  if (kind === "block" || kind === "rows") return made("textarea", { value: typed, rows: Math.min(Math.max(String(typed).split("\n").length, 2), 14), spellcheck: false, wrap: kind === "block" ? "off" : "soft" });
+  const limits = { ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) };
+  return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: typed, ...limits });
+}
+
+/** What a person has typed or chosen, as --set takes it; null, for nothing where there must be something: as the profile has it. */
+function typedIn(input, kind, optional) {
+  if (kind === "boolean") return `${input.checked}`;
+  const text = kind === "block" ? input.value : input.value.trim();
+  if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // which TOML reads, too
+  if (!text) return optional ? "" : null;
+  return kind === "numbers" ? `[${text}]` : text;
 }

@@ -1,6 +1,6 @@
 // Save menu: all that is saved of a bench, in one place; what is not there yet says why.
 
-import { $, listen } from "../../../../view/template/elements.js";
+import { $, disable, listen, onData, tell } from "../../../../view/template/elements.js";
 import { save } from "../line.js";
 import { listIn } from "../lists.js";
 import { onNew, store } from "../store.js";
@@ -32,19 +32,19 @@ export function saveMenu() {
   const close = () => { if (!menu.hidden) { show(false); button.focus(); } };
   const confirm = () => {
     const { errors } = store.state.sliced;
-    $("errors-title").textContent = `The dry run found ${errors.length} error${errors.length === 1 ? "" : "s"}`;
+    tell({ "errors-title": `The dry run found ${errors.length} error${errors.length === 1 ? "" : "s"}` });
     listIn("errors-list", errors.slice(0, 3));
     $("save-anyway").showModal();
   };
   menu.addEventListener("keydown", (event) => { if (event.key === "Escape") { event.stopPropagation(); close(); } });
   addEventListener("pointerdown", (event) => { if (!menu.hidden && !menu.contains(event.target) && event.target !== button) show(false); });
-  for (const entry of menu.querySelectorAll("[data-save]")) entry.addEventListener("click", () => { close(); save(entry.dataset.save); });
+  onData("save", ({ save: address }) => { close(); save(address); });
   listen("click", {
     save: () => show(menu.hidden), "save-gcode": () => { close(); if (store.state.sliced.errors.length) confirm(); else save("print.gcode"); },
     "save-errors": () => save("print.gcode?force=yes"),
   });
   onNew(entriesOf, (entries) => Object.entries(entries).forEach(([name, [why, words]]) => {
-    $(`save-${name}`).disabled = Boolean(why);
+    disable({ [`save-${name}`]: Boolean(why) });
     $(`save-${name}`).querySelector("small").textContent = why || words;
   }));
 }

@@ -1,28 +1,31 @@
-// Slices panel: copies and pauses, the parts sliced, what the print takes, what the dry run complains of, and what one piece would cost.
+// Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, and what one piece would cost.
 
-import { $, alike, button, disable, hide, listen, made, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, disable, findingButton, hide, listen, made, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
+import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
 import { send } from "../line.js";
-import { cross, listIn, putTable, tellIn } from "../lists.js";
-import { onState, store, update } from "../store.js";
+import { listIn, putTable, removeButton, tellIn } from "../lists.js";
+import { onNew, onState, store, subscribe, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
   listen("click", {
     again: () => { update({ looking: false }); $("tab-slices").click(); send({ do: "slice" }); },
     look: () => update({ looking: !store.looking }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
   });
-  onState((state, before) => {
-    const { slicing, sliced } = state;
+  onState(({ slicing, sliced, colours }) => {
     disable({ slice: Boolean(slicing) });
     hide({ "stop-slicing": !slicing, "slicing-bar": !slicing });
     tell({ "slicing-told": slicing ? slicing.text : "" });
-    showShares(slicing, state.colours);
+    showShares(slicing, colours);
     toggle("no-slices", !sliced);
     toggle("stale", sliced?.stale);
-    if (alike(sliced, before?.sliced)) return;
+  });
+  onNew(({ sliced }) => sliced, (sliced) => {
+    const { told = [], joints = [], verdict } = sliced || {};
     if (!sliced) update({ looking: false });
-    tellIn("sliced-told", sliced?.told || []);
-    if (sliced) showVerdict(sliced.verdict, showFinding);
-    putTable($("joints"), sliced?.joints || [], JOINT_HEAD, () => (sliced?.joints || []).map(([part, ...texts]) => rowOf(part, texts)));
+    else showVerdict(verdict, showFinding);
+    tellIn("sliced-told", told);
+    putTable($("joints"), joints, JOINT_HEAD, () => joints.map(figuresRow));
     showFindings(sliced, showFinding);
   });
 }
@@ -50,20 +53,16 @@ function showShares(slicing, colours) {
   }));
 }
 
-const JOINT_HEAD = [["joint of part"], ["area"], ["contact"], ["plastic"], ["seam"], ["breaks at"]];
+const JOINT_HEAD = ["joint of part", "area", "contact", "plastic", "seam", "breaks at"];
 
-const rowOf = (title, texts) => made("tr", {}, made("th", { text: title, scope: "row" }), ...texts.map((text) => made("td", { text })));
+/** A row of figures after their title. */
+const figuresRow = ([title, ...texts]) => made("tr", {}, made("th", { text: title, scope: "row" }), ...texts.map((text) => made("td", { text })));
 
 function showFindings(sliced, showFinding) {
   const { findings = [], more_findings: more = 0 } = sliced || {};
-  $("no-findings").hidden = !sliced || findings.length > 0;
-  const rows = findings.map((finding, k) => {
-    const { severity, code, message, part, layer, line } = finding;
-    const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
-    return made("li", {}, button("", () => showFinding(k), { className: severity },
-      made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? `${where}: show it` : "the whole print" })));
-  });
-  $("sliced-findings").replaceChildren(...rows, ...(more ? [made("li", { text: `and ${more} more, in the page of the print` })] : []));
+  hide({ "no-findings": !sliced || findings.length > 0 });
+  const rows = findings.map((finding, k) => findingButton(finding, () => showFinding(k), { whole: "the whole print", ending: ": show it" }));
+  $("sliced-findings").replaceChildren(...[...rows, ...(more ? [`and ${more} more, in the page of the print`] : [])].map((row) => made("li", {}, row)));
 }
 
 export function stopsPanel() {
@@ -74,32 +73,73 @@ export function stopsPanel() {
     adding = true;
     send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
   } });
-  onState(({ copies, copies_told: told, stops, problem }, before) => {
-    $("copies-told").textContent = told;
+  onState(({ copies, copies_told: told, problem }, before) => {
+    tell({ "copies-told": told });
     if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
-    if (alike(stops, before?.stops)) return;
+  });
+  onNew(({ stops }) => stops, (stops) => {
     if (adding) $("stop-at").value = "";
     adding = false;
     const held = $("stops").contains(document.activeElement);
-    $("stops").replaceChildren(made("tbody", {}, ...stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 })))));
+    putTable($("stops"), stops, [], () => stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 }))));
     if (held) $("stop-at").focus(); // the row that had the focus is gone
   });
 }
 
 function stopRow({ part, layer, height_mm: height, change }, remove) {
   const kind = change ? "filament change" : "pause", where = layer === null ? `part ${part}, at ${height} mm` : `part ${part}, before layer ${layer}`;
-  return made("tr", {}, made("td", { text: kind }), made("td", { text: where }), made("td", {}, cross(`Remove the ${kind} of ${where}`, remove)));
+  return rowOf([kind, where, removeButton(`Remove the ${kind} of ${where}`, remove)]);
 }
 
 export function comparePanel() {
-  onState(({ comparing, compared, sliced }, before) => {
+  onState(({ comparing, compared, sliced }) => {
     disable({ compare: Boolean(comparing || compared.length || !sliced || sliced.stale) });
     hide({ "stop-comparing": !comparing });
     tell({ "comparing-told": comparing });
-    if (alike(compared, before?.compared)) return;
     const [, standing, lying] = compared, shown = compared.filter((alternative) => alternative !== lying || lying.note !== standing.note);
-    putTable($("compared"), shown, [[""], ...shown.map(({ name }) => [name])], () => (
-      standing ? standing.figures.map(([title], k) => rowOf(title, shown.map(({ figures }) => figures[k][1]))) : []));
+    putTable($("compared"), shown, ["", ...shown.map(({ name }) => name)], () => (
+      standing ? standing.figures.map(([title], k) => figuresRow([title, ...shown.map(({ figures }) => figures[k][1])])) : []));
     listIn("compared-notes", shown.filter(({ note }) => note).map(({ name, note }) => `${name}: ${note}`));
+  });
+}
+
+const PIECE = 7; // numbers of a straight piece: two ends and its height
+const BROAD = 1.1; // half the width of a bead, by its height
+
+/** Triangles {places, colours} of a part's walls: an upright band along every piece and a level one on it, as broad as a bead, so
+ * that a slope has no gaps. bytes: as the server gives them. */
+function bandsOf(bytes, colour) {
+  const values = new Float32Array(bytes), way = [...values.subarray(0, 3)], count = (values.length - 3) / PIECE;
+  const places = new Float32Array(36 * count), colours = new Uint32Array(12 * count).fill(wordOf(rgb(colour), 254));
+  for (let k = 0, at = 0; k < count; k++) {
+    const from = 3 + PIECE * k, begin = [...values.subarray(from, from + 3)], end = [...values.subarray(from + 3, from + 6)];
+    const up = scaled(way, values[from + 6] / 2), side = scaled(unit(cross(way, sub(end, begin))), BROAD * values[from + 6]);
+    for (const [middle, half] of [[[0, 0, 0], up], [up, side]])
+      for (const [place, sign] of [[begin, -1], [end, -1], [end, 1], [begin, -1], [end, 1], [begin, 1]])
+        for (let axis = 0; axis < 3; axis++) places[at++] = place[axis] + middle[axis] + sign * half[axis];
+  }
+  return { places, colours: new Uint8Array(colours.buffer) };
+}
+
+/** What is seen of the parts that are sliced, as they become ready or while they are not out of date, over the faint model and its copies. */
+export function wallsOf(picture) {
+  let number = 0, asked = new Set(); // of the slices whose walls are there, or asked for
+  const fetchPart = async (part, of) => {
+    asked.add(part);
+    const answer = await fetch(`walls/${of}/${part}`).catch(() => null);
+    if (number !== of) return;
+    if (!answer) asked.delete(part); // the line is lost: the next state asks again
+    if (answer?.ok) update({ walls: new Map(store.walls).set(part, bandsOf(await answer.arrayBuffer(), store.state.colours[part - 1] || PLAIN)) });
+  };
+  subscribe(({ state: { slicing, sliced }, tab, triangles }) => {
+    const slices = tab !== "slices" ? null : slicing || (sliced && !sliced.stale ? sliced : null);
+    if (slices && slices.number !== number) {
+      [number, asked] = [slices.number, new Set()];
+      return update({ walls: new Map() });
+    }
+    slices?.ready.filter((part) => !asked.has(part)).forEach((part) => fetchPart(part, number));
+    const shown = slices && triangles && store.walls.size > 0;
+    picture.walls(shown ? store.walls : null);
+    document.documentElement.dataset.walls = shown ? [...store.walls.keys()].sort((a, b) => a - b).join(" ") : "";
   });
 }

@@ -1,0 +1,184 @@
+// Sliders: the one over the whole print, with playing and keys, and the two that limit the layers, with a bar for the time of every layer.
+
+import { $, duration, hide, listen, onKeys, optionsOf, tell } from "../elements.js";
+import { viewKeys } from "../picture/camera.js";
+import { density } from "../picture/gl.js";
+import { clamp } from "../picture/math.js";
+
+const PLAYING = [1, 5, 20, 100, 300, 1000];
+const USUAL = 100;
+
+/** {start, stop, toggle, playing, go(row), step(rows)}: the latter two stop the playing. */
+export function courseOf(print, scene, bells) {
+  const { rows, header } = print, position = $("position"), total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
+  position.max = Math.max(rows.count - 1, 0);
+  $("speed").append(...optionsOf(PLAYING.map((speed) => [speed, `${speed}×`]), USUAL));
+  const player = playerOf(scene, bells, total);
+  listen("input", { position: (event) => {
+    player.go(Number(position.value));
+    if (event.isTrusted) bells.ring("moving");
+  } });
+  listen("click", { play: player.toggle, back: () => player.step(-1), forth: () => player.step(1) });
+  bells.on("row", () => {
+    if (Number(position.value) !== scene.row) position.value = scene.row;
+    position.setAttribute("aria-valuetext", `${duration(scene.time())} of ${duration(total)}`);
+    tell({ clock: `${duration(scene.time())} / ${duration(total)}` });
+  });
+  paintStrip($("strip"), header.parts, rows.count);
+  return player;
+}
+
+function playerOf(scene, bells, total) {
+  const player = { playing: false };
+  let before = 0;
+  const step = (now) => {
+    if (!player.playing) return;
+    const next = scene.time() + (Math.min(now - before, 250) / 1000) * Number($("speed").value);
+    before = now;
+    scene.goToTime(Math.min(next, total));
+    bells.ring("moving");
+    if (next >= total) player.stop(); else requestAnimationFrame(step);
+  };
+  const show = () => {
+    $("play").textContent = player.playing ? "❚❚" : "▶";
+    $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
+    bells.ring("look");
+  };
+  player.start = () => {
+    if (player.playing) return;
+    if (scene.time() >= total) scene.goToTime(0);
+    player.playing = true;
+    before = performance.now();
+    requestAnimationFrame(step);
+    show();
+  };
+  player.stop = () => { if (player.playing) { player.playing = false; show(); } };
+  player.toggle = () => (player.playing ? player.stop() : player.start());
+  player.go = (row) => {
+    player.stop();
+    scene.go(row);
+  };
+  player.step = (rows) => player.go(scene.row + rows);
+  return player;
+}
+
+/** Each part's rows as a piece of its colour. */
+function paintStrip(strip, parts, count) {
+  const share = (row) => `${((100 * row) / Math.max(count, 1)).toFixed(3)}%`;
+  const pieces = parts.filter((part) => part.rows).flatMap(({ colour, first_row: first, rows }) => [
+    `transparent ${share(first)}`, `${colour} ${share(first)}`, `${colour} ${share(first + rows)}`, `transparent ${share(first + rows)}`,
+  ]);
+  if (pieces.length) strip.style.backgroundImage = `linear-gradient(to right, ${pieces.join(", ")})`;
+}
+
+export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
+  const press = (id) => () => $(id).click();
+  const layer = (by) => (event) => {
+    if (event.shiftKey) scene.chooseLayers(Math.min(scene.low + by, scene.high), scene.high);
+    else scene.chooseLayers(Math.min(scene.low, scene.high + by), scene.high + by);
+  };
+  const keys = {
+    ...viewKeys(camera, look), " ": () => player.toggle(), ",": () => player.step(-1), ".": () => player.step(1),
+    "[": layer(-1), "]": layer(1), "{": layer(-1), "}": layer(1),
+    PageUp: () => scene.goLayer(1), PageDown: () => scene.goLayer(-1), Home: () => scene.go(0), End: () => scene.go(Infinity),
+    t: press("show-travels"), s: press("show-seams"), m: press("show-machine"), b: press("show-beads"),
+    r: () => { $("frame").value = scene.riding ? "machine" : "workpiece"; $("frame").dispatchEvent(new Event("change")); },
+    f: fit, d: () => chooseTheme(!scene.dark), "?": () => $("help").showModal(),
+  };
+  onKeys(keys, () => $("help").open);
+  listen("click", { "help-button": keys["?"] });
+}
+
+export function layerSliders({ header: { parts } }, scene, bells) {
+  const limits = {
+    low: (value) => scene.chooseLayers(value, Math.max(value, scene.high)),
+    high: (value) => scene.chooseLayers(Math.min(value, scene.low), value),
+  };
+  const typed = (end, field, of) => () => {
+    const { value } = $(`layer-${end}-${field}`);
+    if (value === "" || !Number.isFinite(Number(value))) return show();
+    limits[end](nearestLayer(scene.layers(), Number($(`layer-${end}`).value), Number(value), of));
+    return scene.goTo(scene.layers()[scene[end]]);
+  };
+  for (const end of Object.keys(limits)) {
+    listen("input", { [`layer-${end}`]: ({ target }) => limits[end](Number(target.value)) });
+    listen("change", { [`layer-${end}-number`]: typed(end, "number", ({ number }) => number), [`layer-${end}-mm`]: typed(end, "mm", ({ z }) => z) });
+  }
+  $("part").append(...optionsOf(parts.filter(({ rows }) => rows).map(({ index }) => [index, index ? `part ${index}` : "the file"])));
+  listen("change", { part: () => scene.choosePart($("part").value === "" ? null : Number($("part").value)) });
+  const show = () => {
+    const layers = scene.layers();
+    hide({ layers: layers.length < 2 });
+    for (const end of Object.keys(limits)) {
+      const layer = layers[scene[end]], slider = $(`layer-${end}`);
+      slider.max = Math.max(layers.length - 1, 0);
+      slider.value = scene[end];
+      if (!layer) continue;
+      slider.setAttribute("aria-valuetext", layerInWords(layer));
+      tell({ [`layer-${end}-part`]: parts.length > 1 && scene.part === null ? `part ${layer.part}` : "" });
+      $(`layer-${end}-number`).value = layer.number;
+      $(`layer-${end}-mm`).value = layer.z.toFixed(2);
+    }
+  };
+  bells.on("layers", show);
+  show();
+}
+
+const layerInWords = (layer) => `${layer.part ? `part ${layer.part}, ` : ""}layer ${layer.number}, ${layer.z.toFixed(2)} mm, takes ${duration(layer.time)}`;
+
+/** The place of the layer that comes nearest to a value, among those of the same part as the layer at a place. */
+function nearestLayer(layers, place, value, of) {
+  const { part } = layers[place], off = (k) => Math.abs(of(layers[k]) - value);
+  return layers.reduce((best, layer, k) => (layer.part === part && off(k) < off(best) ? k : best), place);
+}
+
+const THUMB_PX = 13; // of the slider: half of it lies beyond its first and last place
+
+/** A bar for every layer beside the slider of the layers, as long as the layer takes; a click goes to the layer. */
+export function layerTimes(scene, bells) {
+  const canvas = $("layer-times"), pen = canvas.getContext("2d");
+  const draw = () => {
+    const layers = scene.layers(), dense = density();
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.round(x * dense));
+    if (!width || !height) return;
+    [canvas.width, canvas.height] = [width, height];
+    const style = getComputedStyle(canvas), [shown, others] = ["--accent", "--soft"].map((name) => style.getPropertyValue(name));
+    const times = Float32Array.from(layers, ({ time }) => time).sort(), usual = times[Math.ceil(0.98 * (times.length - 1))] || 1; // the longest would leave the others no length
+    const lines = longestAt(layers, (k) => Math.floor(height - (THUMB_PX / 2 + (k / Math.max(layers.length - 1, 1)) * (height / dense - THUMB_PX)) * dense));
+    const pitch = (height - THUMB_PX * dense) / Math.max(layers.length - 1, 1), thick = pitch < 3 ? Math.ceil(pitch) : Math.floor(pitch) - 1;
+    for (const [y, k] of lines) {
+      const long = clamp((layers[k].time / usual) * width, 1, width), drawn = scene.low <= k && k <= scene.high;
+      pen.globalAlpha = drawn ? 1 : 0.45;
+      pen.fillStyle = drawn ? shown : others;
+      pen.fillRect(width - long, y - Math.floor(thick / 2), long, thick);
+    }
+  };
+  const point = ({ clientY }) => {
+    const { top, height } = canvas.getBoundingClientRect(), share = (height - THUMB_PX / 2 - (clientY - top)) / Math.max(height - THUMB_PX, 1);
+    return Math.round(clamp(share, 0, 1) * Math.max(scene.layers().length - 1, 0));
+  };
+  const go = (event) => {
+    const place = point(event);
+    scene.chooseLayers(Math.min(scene.low, place), place);
+    scene.goTo(scene.layers()[place]);
+    bells.ring("moving");
+  };
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); go(event); });
+  canvas.addEventListener("pointermove", (event) => {
+    const layer = scene.layers()[point(event)];
+    canvas.title = layer ? layerInWords(layer) : "";
+    if (event.buttons) go(event);
+  });
+  bells.on("layers theme", draw);
+  new ResizeObserver(draw).observe(canvas);
+}
+
+/** Of the layers that share a line of pixels, the one that takes longest: line of pixels to place. */
+function longestAt(layers, lineOf) {
+  const longest = new Map();
+  layers.forEach(({ time }, k) => {
+    const y = lineOf(k), other = longest.get(y);
+    if (other === undefined || layers[other].time < time) longest.set(y, k);
+  });
+  return longest;
+}
