@@ -1,4 +1,4 @@
-"""What the page says to its server: every command that a script or a button gives is one of the server's, with fields that it has."""
+"""What the page says to its server: every command of a script or a button is one of the server's, with fields that it has."""
 
 import re
 from typing import get_args
