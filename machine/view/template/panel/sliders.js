@@ -1,6 +1,6 @@
 // Sliders: the one over the whole print, with playing and keys, and the two that limit the layers, with a bar for the time of every layer.
 
-import { $, duration, hide, listen, onKeys, optionsOf, tell } from "../elements.js";
+import { $, duration, hide, listen, numberIn, onKeys, optionsOf, tell } from "../elements.js";
 import { viewKeys } from "../picture/camera.js";
 import { density } from "../picture/gl.js";
 import { clamp } from "../picture/math.js";
@@ -33,7 +33,7 @@ function playerOf(scene, bells, total) {
   let before = 0;
   const step = (now) => {
     if (!player.playing) return;
-    const next = scene.time() + (Math.min(now - before, 250) / 1000) * Number($("speed").value);
+    const next = scene.time() + (Math.min(now - before, 250) / 1000) * numberIn("speed");
     before = now;
     scene.goToTime(Math.min(next, total));
     bells.ring("moving");
@@ -97,7 +97,7 @@ export function layerSliders({ header: { parts } }, scene, bells) {
   const typed = (end, field, of) => () => {
     const { value } = $(`layer-${end}-${field}`);
     if (value === "" || !Number.isFinite(Number(value))) return show();
-    limits[end](nearestLayer(scene.layers(), Number($(`layer-${end}`).value), Number(value), of));
+    limits[end](nearestLayer(scene.layers(), numberIn(`layer-${end}`), Number(value), of));
     return scene.goTo(scene.layers()[scene[end]]);
   };
   for (const end of Object.keys(limits)) {
@@ -105,7 +105,7 @@ export function layerSliders({ header: { parts } }, scene, bells) {
     listen("change", { [`layer-${end}-number`]: typed(end, "number", ({ number }) => number), [`layer-${end}-mm`]: typed(end, "mm", ({ z }) => z) });
   }
   $("part").append(...optionsOf(parts.filter(({ rows }) => rows).map(({ index }) => [index, index ? `part ${index}` : "the file"])));
-  listen("change", { part: () => scene.choosePart($("part").value === "" ? null : Number($("part").value)) });
+  listen("change", { part: () => scene.choosePart($("part").value === "" ? null : numberIn("part")) });
   const show = () => {
     const layers = scene.layers();
     hide({ layers: layers.length < 2 });

@@ -40,7 +40,7 @@ function main() {
   const restoreLook = keptLook(camera, picture);
   onState(tellState);
   onState(({ stopped }) => notice(stopped, "stopped"));
-  slicesPanel(printFrame(camera, picture).showFinding);
+  slicesPanel(printFrame(camera, picture));
   const panels = [problemLine, elapsedTimes, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
   if (picture) {

@@ -32,12 +32,6 @@ export async function takeFiles(files) {
   for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
 }
 
-/** The list of the open benches, where there are several. */
-function showBenches(benches) {
-  hide({ benches: benches.length < 2 });
-  putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
-}
-
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
   const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
@@ -47,7 +41,10 @@ function benchRow({ number, name, parts, work }) {
 export function benchesPanel() {
   listen("click", { another: () => openBench() });
   offer("kept");
-  onNew(({ benches }) => benches, showBenches);
+  onNew(({ benches }) => benches, (benches) => {
+    hide({ benches: benches.length < 2 });
+    putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
+  });
 }
 
 const OFFERS = {
@@ -62,10 +59,10 @@ function moment(seconds) {
 
 /** What is there from earlier: work that was kept, or files that a workbench has left which was killed. */
 export async function offer(what) {
-  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, tell] = OFFERS[what];
+  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, inWords] = OFFERS[what];
   hide({ [`${what}-field`]: !found.length });
   $(list).replaceChildren(...found.map((one) => {
-    const [name, title, words] = tell(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
+    const [name, title, words] = inWords(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
     return button("", open, {}, made("span", { text: title }), made("small", { text: words }));
   }));
 }

@@ -1,6 +1,6 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal; and the ways in which it can lie.
 
-import { $, alike, button, made, notice, swatches } from "../../../../view/template/elements.js";
+import { $, alike, button, hide, made, notice, swatches, tell } from "../../../../view/template/elements.js";
 import { add, dot, scaled, sub } from "../../../../view/template/picture/math.js";
 import { trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { AGAIN_MS, newest, send } from "../line.js";
@@ -50,7 +50,7 @@ export function modelOf(picture) {
       stood = how;
       const found = overhanging(triangles, rotation[2], limit, platform);
       red = found.red;
-      if (turning || area === null) $("overhang").textContent = mm2(found.area);
+      if (turning || area === null) tell({ overhang: mm2(found.area) });
       const stands = standingBy(rotation, triangles.vertices, lift), [least, most] = stands.box;
       picture?.stand(stands);
       update({ seen: { size_mm: sub(most, least) } });
@@ -127,41 +127,31 @@ function facetDrawn({ normal, corners }, lit, picture) {
   return { solid: trianglesOf([{ corners: places, colour: COLOUR }]), matrix: picture.matrix(), strength: lit ? LIT : FAINT };
 }
 
-const SIZE = { width: 112, height: 84 };
+let wanted = []; // [rotation, canvas] of small pictures that are drawn as soon as nothing else is to be done
 
-const small = () => made("canvas", { ...SIZE, className: "thumbnail" });
+/** A small picture of the model as it would stand by a rotation; "" without a picture. */
+function thumbnail(picture, rotation) {
+  if (!picture) return "";
+  const into = made("canvas", { width: 112, height: 84, className: "thumbnail" });
+  if (wanted.push([rotation, into]) === 1) setTimeout(() => {
+    if (store.triangles) picture.thumbnails(wanted.filter(([, canvas]) => canvas.isConnected));
+    wanted = [];
+  });
+  return into;
+}
 
 /** The ways in which the model rests, and how a search has laid it down; without a picture in words alone. */
 export function thumbnailsOf(picture) {
   let told = "", model = null; // of what there are small pictures
   subscribe(({ state: { resting, laid }, triangles }) => {
-    const now = JSON.stringify([resting, laid]);
+    const now = JSON.stringify([resting, laid]), drawn = triangles && picture, views = laid && drawn ? [["as it stood", laid.before], ["as it lies now", laid.after]] : [];
     if (now === told && triangles === model) return;
     [told, model] = [now, triangles];
-    showResting(resting, triangles && picture);
-    showLaid(laid, triangles && picture);
+    $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
+      const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
+      return button("", lay, {}, thumbnail(drawn, rotation), made("span", { text: words }), made("small", { text: mm2(area) }));
+    }));
+    hide({ laid: !views.length });
+    $("laid").replaceChildren(...views.map(([words, rotation]) => made("figure", {}, thumbnail(drawn, rotation), made("figcaption", { text: words }))));
   });
-}
-
-/** Small pictures drawn when nothing else is to be done. */
-function drawLater(picture, wanted) {
-  if (wanted.length) setTimeout(() => { if (store.triangles) picture.thumbnails(wanted.filter(([, into]) => into.isConnected)); });
-}
-
-function showResting(resting, picture) {
-  const drawn = [];
-  $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
-    const into = picture ? small() : "";
-    if (into) drawn.push([rotation, into]);
-    return button("", () => { update({ clicks: "" }); send({ do: "stand", rotation }); }, {}, into, made("span", { text: words }), made("small", { text: mm2(area) }));
-  }));
-  if (picture) drawLater(picture, drawn);
-}
-
-function showLaid(laid, picture) {
-  $("laid").hidden = !laid || !picture;
-  if ($("laid").hidden) return;
-  const views = [["as it stood", laid.before], ["as it lies now", laid.after]].map(([words, rotation]) => ({ words, rotation, into: small() }));
-  $("laid").replaceChildren(...views.map(({ words, into }) => made("figure", {}, into, made("figcaption", { text: words }))));
-  drawLater(picture, views.map(({ rotation, into }) => [rotation, into]));
 }

@@ -1,6 +1,6 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, button, listen, made, putAt, swatch } from "../../../../view/template/elements.js";
+import { $, alike, button, listen, made, numberIn, putAt, swatch } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
 import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { wordOf } from "../../../../view/template/picture/solids.js";
@@ -55,7 +55,7 @@ const facesNow = () => store.state.zones.find((zone) => sameMark(zone, store.zon
 
 /** A click on the model where faces or a corner of a box are marked. */
 export function markAt(place) {
-  if (store.clicks === "faces") return send({ do: "mark", kind: kindNow(), point_mm: fine(place), angle_deg: Number($("mark-angle").value) });
+  if (store.clicks === "faces") return send({ do: "mark", kind: kindNow(), point_mm: fine(place), angle_deg: numberIn("mark-angle") });
   if (!store.corner) return update({ corner: place });
   const [least, most] = bounds([...store.corner, ...place]);
   update({ clicks: "", corner: null });
@@ -90,7 +90,7 @@ function chooseMark(zone) {
 }
 
 export function marksPanel(picture) {
-  listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: Number($("mark-angle").value) }); } });
+  listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: numberIn("mark-angle") }); } });
   listen("click", { "mark-middle": () => {
     update({ clicks: "" });
     const [x, y, z] = modelSize(store.state), low = store.state.pedestal_mm;

@@ -1,6 +1,6 @@
 // Planes: those that are looked at, as the bench has them or a hand holds one: their panel, the knobs in the picture, and what a refused one is in the way of.
 
-import { $, alike, disable, hide, listen, onData, putAt, tell } from "../../../../view/template/elements.js";
+import { $, alike, disable, hide, listen, numberIn, onData, putAt, tell } from "../../../../view/template/elements.js";
 import { add, clamp, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
 import { beside, boxesOf, chained, circle, headOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { RED } from "../../../../view/template/picture/solids.js";
@@ -196,14 +196,14 @@ export function planesPanel(picture) {
     });
   };
   const tellPlane = () => tellAll(alike(moved.cuts, store.state.cuts) ? moved.text : "");
-  const leanAsTyped = () => lean(Number($("plane-tilt").value), Number($("plane-towards").value));
+  const leanAsTyped = () => lean(numberIn("plane-tilt"), numberIn("plane-towards"));
   byPlane("click", {
     remove: removePart, neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
   });
   byPlane("change", {
-    "plane-offset": () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
+    "plane-offset": () => putPlane({ ...planeNow(), offset_mm: numberIn("plane-offset") }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
   });
-  onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), Number($("plane-towards").value)); });
+  onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), numberIn("plane-towards")); });
   listen("click", {
     "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(store.state.refused.near),
   });

@@ -1,7 +1,7 @@
 // Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
 // whatever becomes of this page.
 
-import { $, alike, disable, hide, listen, made, needsKey, notice, onData, sayIn, tell } from "../../../../view/template/elements.js";
+import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, sayIn, tell } from "../../../../view/template/elements.js";
 import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
 import { putNew, withWholeOptions } from "../lists.js";
 import { onNew, onState, update } from "../store.js";
@@ -106,7 +106,7 @@ export function printPanel() {
     showPrint(print(), commands());
     showBar(running(), print());
   }, 1000);
-  const where = () => ({ port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value) });
+  const where = () => ({ port: port(), baud: numberIn("baud"), sim_speed: numberIn("sim-speed") });
   const check = () => {
     send({ do: "check", ...where(), send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
     unforce();
@@ -133,13 +133,13 @@ export function printPanel() {
   webcamPanel(print);
   handPanel((asked) => toldTo({ do: "by_hand", ...asked }));
   listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });
-  listen("change", { which: () => { chosen = Number($("which").value); sure(false); show(state); } });
+  listen("change", { which: () => { chosen = numberIn("which"); sure(false); show(state); } });
   for (const id of ["feed", "flow"]) {
     const letGo = () => delete $(id).dataset.held;
     listen("input", { [id]: () => { $(id).dataset.held = true; tell({ [`${id}-told`]: `${$(id).value} %` }); } });
     for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first, if any
     listen("blur", { [id]: letGo });
-    listen("change", { [id]: () => { letGo(); toldTo({ do: id, percent: Number($(id).value) }); } });
+    listen("change", { [id]: () => { letGo(); toldTo({ do: id, percent: numberIn(id) }); } });
   }
   const stop = () => stops.press(Number($("emergency").dataset.print));
   listen("click", { emergency: stop });

@@ -1,7 +1,7 @@
 // Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
 // changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
-import { $, button, disable, hide, listen, made, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
+import { $, button, disable, hide, listen, made, numberIn, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
 import { putNew, putRows } from "../lists.js";
 import { keptInTab, onNew, onState, store } from "../store.js";
@@ -15,7 +15,7 @@ export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   const explained = new Set();
   let settings = [], missed = false, changedOnly = false; // missed: they have not come
-  const part = () => Number($("settings-part").value) || 0;
+  const part = () => numberIn("settings-part") || 0;
   const set = (key, value, typed) => {
     const of = part();
     ask(of ? { do: "set_part", part: of, key, value } : { do: "set", key, value }, (refusal) => {

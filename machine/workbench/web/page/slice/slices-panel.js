@@ -1,6 +1,6 @@
 // Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, and what one piece would cost.
 
-import { $, disable, findingButton, hide, listen, made, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, disable, findingButton, hide, listen, made, numberIn, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
 import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
 import { send } from "../line.js";
@@ -67,7 +67,7 @@ function showFindings(sliced, showFinding) {
 
 export function stopsPanel() {
   let adding = false; // what was typed stays until it is taken
-  listen("change", { copies: () => send({ do: "copies", count: Number($("copies").value) }) });
+  listen("change", { copies: () => send({ do: "copies", count: numberIn("copies") }) });
   listen("submit", { "add-stop": (event) => {
     event.preventDefault();
     adding = true;
