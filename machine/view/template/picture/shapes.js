@@ -34,7 +34,7 @@ export const circle = (radius, z, steps) => Array.from({ length: steps }, (_, k)
 });
 
 /** The surface of an outline [radius, z] turned about z. */
-export function revolved(outline, steps = 64) {
+function revolved(outline, steps = 64) {
   const rings = outline.map(([radius, z]) => circle(radius, z, steps));
   return rings.slice(1).flatMap((ring, i) => ring.flatMap((_, k) => {
     const next = (k + 1) % steps;

@@ -1,8 +1,9 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, disable, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, disable, duration, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
+import { putNew, unitButtons, withWholeOptions } from "./lists.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
 import { facetsOf, fetchModel, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
@@ -21,7 +22,6 @@ import { settingsPanel } from "./settings/settings-panel.js";
 import { saveMenu } from "./slice/save-menu.js";
 import { comparePanel, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
 import { keptLook, onState, store, subscribe, update } from "./store.js";
-import { elapsedTimes, problemLine } from "./told.js";
 
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
@@ -73,6 +73,35 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   disable({ undo: !undo, redo: !redo });
   $("undo").ariaLabel = undo ? `undo: ${undo}` : "undo";
   $("redo").ariaLabel = redo ? `redo: ${redo}` : "redo";
+}
+
+/** What could not be done last, for as long as it is so or until it is read. */
+function problemLine() {
+  onState(({ problem, refused, units }) => {
+    putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
+    hide({ problem: !problem, "put-near": !refused?.near });
+    unitButtons($("units"), units?.words || [], (unit) => send({ do: "unit", unit }));
+  });
+}
+
+const MOMENT_S = 2;
+const WORK = {
+  "summary": ({ busy, search, slicing, preparing }) => busy || (search ? "search" : slicing ? "slicing" : preparing ? "planes" : ""),
+  "search-told": ({ search }) => (search ? "search" : ""), "slicing-told": ({ slicing }) => (slicing ? "slicing" : ""), "comparing-told": ({ comparing }) => (comparing ? "comparing" : ""),
+};
+
+/** How long work has been under way, beside what it tells of itself, as soon as that is longer than a moment. */
+function elapsedTimes() {
+  const begun = new Map(); // element -> {work, at}
+  const show = () => begun.forEach(({ work, at }, id) => {
+    const seconds = (performance.now() - at) / 1000;
+    $(id).dataset.elapsed = work && seconds >= MOMENT_S ? ` ${duration(seconds)}` : "";
+  });
+  onState((state) => {
+    for (const [id, of] of Object.entries(WORK)) if (begun.get(id)?.work !== of(state)) begun.set(id, { work: of(state), at: performance.now() });
+    show();
+  });
+  setInterval(show, 1000);
 }
 
 /** What keys do; undo and redo, but where what is typed has an undo of its own. */

@@ -3,11 +3,10 @@
 import { $, alike, button, hide, listen, numberIn, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask, send } from "../line.js";
-import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
+import { fill, listIn, mm2, putNew, tellIn, unitButtons } from "../lists.js";
 import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
-import { unitButtons } from "../told.js";
 import { offer, takeFiles } from "./benches.js";
 
 const TURNS = ["x", "y", "z"];

@@ -57,7 +57,7 @@ function holdPlane(wanted) {
 }
 
 /** What a hand holds after a trial of its plane: where it cannot be cut, it stays at the last place where it can. */
-export function afterTrial(hand, trial) {
+function afterTrial(hand, trial) {
   const plane = trial.cuts[hand.part - 2], here = { plane, figures: trial };
   if (!trial.refused) return { ...hand, allowed: here, checked: trial.unchecked ? hand.checked : here, why: null, plane: hand.wanted };
   const allowed = alikePlanes(plane, hand.allowed.plane) ? hand.checked : hand.allowed;

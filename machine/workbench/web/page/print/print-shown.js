@@ -9,7 +9,7 @@ const FEW = 8;
 const HEARD = new Map(); // by the number of a print: what was heard of it last, and when
 let shownState = "";
 
-export const IN_HAND = "in hand";
+const IN_HAND = "in hand";
 /** States in which a print is under way, and in which the tip is away from it. */
 const LIVE = ["printing", "pausing", "paused", "resuming", "reconnecting", "finishing", "cancelling"];
 const AWAY = ["pausing", "paused"], COMMANDED = LIVE.filter((state) => state !== "cancelling");
