@@ -330,10 +330,10 @@ def test_a_printer_is_heated_homed_and_moved_by_hand_from_the_page_and_let_go_of
         browser.click("[data-jog='X-']")
         browser.wait("$('run-state').textContent === 'in hand · X would be -169.00 mm: -160 to 160 are allowed'")
         browser.wait("!$('heat').hidden && $('heat-nozzle').getAttribute('d').split('L').length > 2")
-        began = browser.value("modules['print/at-printer'].SAMPLES.get(Number($('which').value)).at(0).at_s")
+        began = browser.value("modules['print/print-shown'].SAMPLES.get(Number($('which').value)).at(0).at_s")
         browser.open(sliced.address)
         browser.wait("!$('heat').hidden")
-        assert browser.value("modules['print/at-printer'].SAMPLES.get(Number($('which').value)).at(0).at_s") == began
+        assert browser.value("modules['print/print-shown'].SAMPLES.get(Number($('which').value)).at(0).at_s") == began
         browser.click("#take")
         browser.wait("$('held').hidden")
         browser.click("[data-hand=let_go]")

@@ -18,6 +18,9 @@ export const button = (text, onclick, more = {}, ...children) => made("button", 
 /** A row of a table; cells: texts and elements. */
 export const rowOf = (cells, tag = "td") => made("tr", {}, ...cells.map((cell) => made(tag, {}, cell)));
 
+/** The number that a field, a slider or a list has. */
+export const numberIn = (id) => Number($(id).value);
+
 /** Entries of a list of choices: [value, text]. */
 export const optionsOf = (entries, chosen) => entries.map(([value, text]) => made("option", { value, text, selected: value === chosen }));
 

@@ -273,6 +273,7 @@ def test_a_script_imports_what_the_others_export_and_uses_it(script: Path) -> No
         assert [name for name in names.split(", ") if name not in body] == []
 
 
-def test_every_script_is_part_of_a_page() -> None:
+def test_every_script_has_a_name_of_its_own_and_is_part_of_a_page() -> None:
+    assert len({(file.parent.name, file.stem) for file in SCRIPTS}) == len(SCRIPTS)
     pages = bundle(TEMPLATE / "main.js") + bundle(OWN / "main.js")
     assert [file for file in SCRIPTS if f'modules["{file.parent.name}/{file.stem}"] = ' not in pages] == []

@@ -7,7 +7,7 @@ PAGE = """
     globalThis.Notification = class { constructor(text) { said.push(text); } static requestPermission() { said.push("asked"); } };
     Notification.permission = "granted";
     printPanel();
-    const known = { name: "box", port: "sim", checks: [], words: [], said: [], holder: modules["print/prints-line"].OWN_PAGE };
+    const known = { name: "box", port: "sim", checks: [], words: [], said: [], holder: modules["page/line"].OWN_PAGE };
     const heats = { nozzle_c: 200, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, at: {}, elapsed_s: 5 };
     const tell = (state, share, more = {}) => {
       const print = { ...known, number: 1, state, progress: { state: "printing", share, heat_s: 0, ...heats }, ...more };
@@ -43,7 +43,7 @@ def test_the_browser_is_asked_whether_it_may_only_when_a_print_begins() -> None:
 @needs_node
 def test_temperatures_of_ten_minutes_are_lines_with_the_newest_at_the_right_edge() -> None:
     samples = "[{ at_s: 0, nozzle: 0, bed: null }, { at_s: 300, nozzle: 100, bed: 60, nozzleTarget: 200 }]"
-    lines = on_fake_page(f"return modules['print/at-printer'].heatLines({samples}, 300);")
+    lines = on_fake_page(f"return modules['print/print-shown'].heatLines({samples}, 300);")
     assert lines["most"] == 200
     assert lines["lines"] == {
         "nozzle": "M150.0 80.0L300.0 40.0",

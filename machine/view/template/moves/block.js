@@ -3,24 +3,15 @@
 const MAGIC = "TILTVW01";
 const HOLDS = { u8: Uint8Array, u16: Uint16Array, i32: Int32Array, f32: Float32Array, f64: Float64Array };
 
+/** The block of the letters that stand in the page. */
+export const openBlock = (text) => blockOf(Uint8Array.fromBase64 ? Uint8Array.fromBase64(text) : Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)));
+
 /** {header, array}; array(name) decodes a column list: one typed array a column, in whole multiples of the scale. */
-export const openBlock = (text) => blockOf(unlettered(text));
-
 export async function blockOf(pressed) {
-  const bytes = await inflated(pressed);
-  const magic = new TextDecoder().decode(bytes.subarray(0, 8));
+  const bytes = await inflated(pressed), decoder = new TextDecoder(), magic = decoder.decode(bytes.subarray(0, 8));
   if (magic !== MAGIC) throw new Error(`the page's data begin with ${magic}, not ${MAGIC}`);
-  const size = new DataView(bytes.buffer).getUint32(8, true);
-  const header = JSON.parse(new TextDecoder().decode(bytes.subarray(12, 12 + size)));
-  const array = (name) => columnsOf(bytes.buffer, 12 + size, header.arrays[name]);
-  return { header, array };
-}
-
-function unlettered(text) {
-  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-  const letters = atob(text), bytes = new Uint8Array(letters.length);
-  for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
-  return bytes;
+  const end = 12 + new DataView(bytes.buffer).getUint32(8, true), header = JSON.parse(decoder.decode(bytes.subarray(12, end)));
+  return { header, array: (name) => columnsOf(bytes.buffer, end, header.arrays[name]) };
 }
 
 async function inflated(bytes) {

@@ -10,10 +10,8 @@ const TOPS = /top|ironing/i; // they close the model whatever layer they lie in
 const BEND_MM = 0.04; // by which a coarse bead may leave the path, a layer
 const AT_MOST = 12; // rows in one bead
 
-/**
- * A path as beadsOf draws it, {slots, texels, points, sizes, verticals}, and of each slot the rows that it stands for, from first to
- * last: the last ones rise. Slots of no size lie between strokes.
- */
+/** A path as beadsOf draws it, {slots, texels, points, sizes, verticals}, and of each slot the rows that it stands for, from first to
+ * last: the last ones rise. Slots of no size lie between strokes. */
 export function coarseOf(rows, path, k) {
   const kept = keptRows(rows, k), bend = (k * BEND_MM) ** 2, points = [], first = [], last = [];
   let slot = -1;
@@ -91,10 +89,8 @@ export function coarseColours(coarse, path, colours) {
   return new Uint8Array(own.buffer);
 }
 
-/**
- * What of ranges of rows is drawn coarse and what fine, as ranges of slots: the layer that the slider has reached, and those after
- * the last coarse one, are drawn as they are.
- */
+/** What of ranges of rows is drawn coarse and what fine, as ranges of slots: the layer that the slider has reached, and those after
+ * the last coarse one, are drawn as they are. */
 export function dividedRanges({ rows, path }, coarse, ranges) {
   const rough = [], fine = [];
   for (const range of ranges) {

@@ -19,9 +19,8 @@ function ramp(share) {
 }
 const STEPS = Array.from({ length: 256 }, (_, k) => wordOf(ramp(k / 255)));
 
-const bySpeed = (rows) => (i) => rows.speed[i] / 1000;
 const SCALES = {
-  speed: { unit: "mm/s", digits: 0, of: bySpeed },
+  speed: { unit: "mm/s", digits: 0, of: (rows) => (i) => rows.speed[i] / 1000 },
   flow: { unit: "mm³/s", digits: 1, of: (rows, { flow }) => flow },
   fan: { unit: "%", digits: 0, of: (rows) => (i) => rows.fan[i] / 2.55 },
   layer: { unit: "s", digits: 1, logarithmic: true, of: (rows, { layerTime }) => (i) => layerTime[i] },
@@ -67,8 +66,7 @@ function typesOf(rows) {
 }
 
 function partsOf(rows, { parts }) {
-  const words = new Map(parts.map((part) => [part.index, wordOf(rgb(part.colour))])), plain = wordOf(rgb(PLAIN));
-  const known = new Uint32Array(Math.max(0, ...parts.map((part) => part.index)) + 1).fill(plain);
-  for (const [index, word] of words) known[index] = word;
-  return { colour: (i) => known[rows.part[i]], legend: null };
+  const words = new Uint32Array(Math.max(0, ...parts.map(({ index }) => index)) + 1).fill(wordOf(rgb(PLAIN)));
+  parts.forEach(({ index, colour }) => { words[index] = wordOf(rgb(colour)); });
+  return { colour: (i) => words[rows.part[i]], legend: null };
 }

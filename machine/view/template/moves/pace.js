@@ -18,7 +18,7 @@ export function paceOf(gl, painter, count) {
   const { dataset } = document.documentElement;
   let state = "idle", timer = 0; // the timer runs while eye or slider move
   let stale = false, hasty = false, unbegun = false; // changed since; by a movement; only a coarse picture is there
-  let level = Math.max(doublings(count / COARSE_ROWS), 2), piece = AT_FIRST / 4, spent = 0, whole = { ms: 0, rows: 1 };
+  let level = 2 ** Math.max(Math.ceil(Math.log2(count / COARSE_ROWS)), 1), piece = AT_FIRST / 4, spent = 0, whole = { ms: 0, rows: 1 };
   const tell = (now) => { state = dataset.picture = now; };
   const expectedMs = () => whole.ms * Math.max(painter.rows() / whole.rows, 1);
   const slow = () => {
@@ -53,7 +53,7 @@ export function paceOf(gl, painter, count) {
       dataset.pictureMs = spent.toFixed(0);
       dataset.wholeMs ||= performance.now().toFixed(0);
     }
-    progress(left && expectedMs() + spent > TOLD_MS ? 1 - left / Math.max(rows, 1) : 1);
+    notice(left && expectedMs() + spent > TOLD_MS ? `Drawing every move: ${Math.floor(100 * (1 - left / Math.max(rows, 1)))} %` : "", "drawing");
   };
   const next = () => {
     if (stale) return queue();
@@ -98,8 +98,3 @@ function finished(gl, then) {
   };
   setTimeout(look, 1);
 }
-
-const progress = (share) => notice(share < 1 ? `Drawing every move: ${Math.floor(100 * share)} %` : "", "drawing");
-
-/** The next power of two, from 1 on. */
-const doublings = (x) => 2 ** Math.ceil(Math.log2(Math.max(x, 1)));

@@ -2,11 +2,10 @@
 
 import { $ } from "../elements.js";
 import { showLegend } from "../panel/controls.js";
-import { bodiesOf, FROM_BELOW, ON_PLATE } from "../picture/bodies.js";
 import { HALF_HEIGHT, placeOn } from "../picture/camera.js";
 import { density, frameOf, outgrown, outlive, programOf, sizeOf } from "../picture/gl.js";
-import { carried, clamp, countUpTo, IDENTITY, moved, multiply, scaled, sub, undone } from "../picture/math.js";
-import { arrowsOf, based, cutsOf, ownInk, planesOf, surfaceColours } from "../picture/model.js";
+import { carried, clamp, IDENTITY, moved, multiply, scaled, sub, undone } from "../picture/math.js";
+import { arrowsOf, based, bodiesOf, cutsOf, FROM_BELOW, ON_PLATE, ownInk, planesOf, surfaceColours } from "../picture/shapes.js";
 import { bodyOf, LINE_FRAGMENT, LINE_VERTEX, linesOf, rgb, SOLID_FRAGMENT, SOLID_VERTEX, solidOf } from "../picture/solids.js";
 import { BEAD_FAR, BEAD_NEAR, beadsOf, PAINT_FAR, PAINT_NEAR, shapesOf } from "./beads.js";
 import { coarseColours, coarseOf, dividedRanges } from "./coarse.js";
@@ -14,20 +13,19 @@ import { coloured } from "./colours.js";
 import { paceOf } from "./pace.js";
 import { once } from "./rows.js";
 import { drawnRanges, PLAIN_TINT } from "./scene.js";
-import { MARK_FRAGMENT, MARK_VERTEX, MARKS, marksAt, waysOf } from "./ways.js";
+import { MARK_FRAGMENT, MARK_VERTEX, MARKS, marksOn, waysOn } from "./ways.js";
 
 const BEAD_MM = 0.4; // a usual bead, by which is told how near the eye is
 
 /** Everything on the graphics card; made anew when the context was lost. */
 function stageOf(gl, print, dark) {
-  const { rows, path, chain, header, marks, surfaces, span } = print, { parts } = header;
+  const { rows, path, header, marks, surfaces, span } = print, { parts } = header;
   const partColour = (part) => rgb(part.colour), planes = planesOf(parts, partColour), shapes = shapesOf(gl);
-  const marksOn = ([name, look]) => [name, once(() => marksAt(gl, marks()[name], path, look))];
+  const marked = Object.entries(MARKS).map(([name, look]) => [name, once(() => marksOn(gl, marks()[name], path, look))]);
   return {
     beads: rows.count ? beadsOf(gl, shapes, path) : null,
     coarse: coarseOn(gl, shapes, print),
-    ways: once(() => waysOn(gl, waysOf(rows, path, chain))),
-    marks: Object.fromEntries(Object.entries(MARKS).map(marksOn)),
+    signs: { travels: once(() => waysOn(gl, print)), ...Object.fromEntries(marked) },
     model: surfaces && solidOf(gl, { places: surfaces.places, colours: surfaceColours(surfaces, ownInk, "printed") }),
     planes: solidOf(gl, planes.discs),
     rims: linesOf(gl, planes.rims),
@@ -35,8 +33,6 @@ function stageOf(gl, print, dark) {
     bodies: bodiesOn(gl, header.machine, dark),
   };
 }
-
-const waysOn = (gl, ways) => ({ row: ways.row, lines: linesOf(gl, ways) });
 
 /** {at(k): the path of every k-th layer with its drawing, made when first asked for, painted by paint(colours of all slots)}. */
 function coarseOn(gl, shapes, print) {
@@ -122,17 +118,12 @@ function paintRest(stage, print, scene, seen) {
   bodies.boxes.draw(head, { ghost: 0.14, strength: 0.5 });
 }
 
-function paintPath({ ways, marks }, ranges, on, seen, lift, size) {
-  for (const { firstRow, endRow, tint } of ranges) {
-    if (tint !== PLAIN_TINT) continue;
-    if (on.travels) {
-      const { row, lines } = ways();
-      lines.draw(seen, { range: [firstRow, endRow].map((edge) => 2 * countUpTo(row, edge - 1)) });
-    }
-    const draw = (name, larger) => marks[name]().draw(seen.toClip, firstRow, endRow, size + larger, lift);
-    if (on.seams) draw("seams", 0);
-    if (on.retractions) ["retracts", "primes"].forEach((name) => draw(name, 2));
-  }
+const SIGNS = { travels: ["travels"], seams: ["seams"], retractions: ["retracts", "primes"] }; // by what is switched on
+
+function paintPath({ signs }, ranges, on, seen, lift, size) {
+  for (const { firstRow, endRow, tint } of ranges)
+    for (const [name, drawn] of Object.entries(SIGNS))
+      if (tint === PLAIN_TINT && on[name]) drawn.forEach((sign) => signs[sign]().draw(seen, firstRow, endRow, size, lift));
 }
 
 /** seenAt: the work shifted by a vector, as the eye sees it. */

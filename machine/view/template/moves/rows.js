@@ -1,7 +1,7 @@
 // Rows: the moves of the print, one row a straight move, and all that is worked out of them once, when the page is opened.
 
 import { bounds, countUpTo, IDENTITY, length, mix, moved, multiply, RAD, rotated, sub, undone, unit } from "../picture/math.js";
-import { surfacesOf } from "../picture/model.js";
+import { surfacesOf } from "../picture/shapes.js";
 import { openBlock } from "./block.js";
 
 /** Chain: how the table stands for values of its two rotary axes, and where the tip is on it.
@@ -69,10 +69,8 @@ export function placeAt(rows, row, share) {
   });
 }
 
-/**
- * The path on the workpiece for drawing: slots, one a row, and an empty one before every row that begins elsewhere than the
- * row before has ended. Slot s goes from points[s] to points[s + 1]; slot(row) tells a row's.
- */
+/** The path on the workpiece for drawing: slots, one a row, and an empty one before every row that begins elsewhere than the
+ * row before has ended. Slot s goes from points[s] to points[s + 1]; slot(row) tells a row's. */
 function pathOf(rows, chain) {
   const jumps = rows.jumpRow.filter((row) => row > 0), slots = rows.count + jumps.length;
   const texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS; // whole lines of a texture
@@ -135,26 +133,13 @@ export async function printOf(text) {
   const chain = chainOf(header.machine), rows = rowsOf(block), path = pathOf(rows, chain), surfaces = surfacesOf(block);
   const layerTime = new Float32Array(rows.count);
   for (const layer of rows.layers) layerTime.fill(layer.time, layer.first, layer.last + 1);
-  const box = boxOf(rows, path, surfaces, header), area = (Math.PI * header.filament.diameter_mm ** 2) / 4;
+  const box = boxOf(path, surfaces, header.machine), area = (Math.PI * header.filament.diameter_mm ** 2) / 4;
   const worked = { box, span: length(sub(box[1], box[0])), flow: flowOf(rows, path, area), marks: once(() => marksOf(rows)) };
   return { header, chain, rows, path, surfaces, layerTime, patternOf: block.array("text")[0], ...worked };
 }
 
 /** What is to be seen of the work: plastic and surfaces, else the room over the table. */
-function boxOf(rows, path, surfaces, { machine }) {
-  const corners = surfaces ? bounds(surfaces.places).flat() : [];
-  let [x0, y0, z0, x1, y1, z1] = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-  for (let slot = 0, p = path.points; slot < path.slots; slot++) {
-    if (!path.sizes[2 * slot]) continue;
-    const at = 3 * slot + 3, x = p[at], y = p[at + 1], z = p[at + 2];
-    if (x < x0) x0 = x;
-    if (x > x1) x1 = x;
-    if (y < y0) y0 = y;
-    if (y > y1) y1 = y;
-    if (z < z0) z0 = z;
-    if (z > z1) z1 = z;
-  }
-  if (x0 <= x1) corners.push(x0, y0, z0, x1, y1, z1);
-  const { radius_mm: r, thickness_mm: t } = machine.table;
-  return bounds(corners.length ? corners : [-r, -r, -t, r, r, r]);
+function boxOf({ points, sizes }, surfaces, { table: { radius_mm: r, thickness_mm: t } }) {
+  const laid = bounds(points, (place) => place > 0 && sizes[2 * place - 2] > 0), seen = [...laid, ...(surfaces ? bounds(surfaces.places) : [])].flat();
+  return bounds(seen.length ? seen : [-r, -r, -t, r, r, r]);
 }

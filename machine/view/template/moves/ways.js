@@ -2,15 +2,16 @@
 
 import { cornersOn, programOf } from "../picture/gl.js";
 import { clamp, countUpTo, length, mix, sub } from "../picture/math.js";
+import { linesOf } from "../picture/solids.js";
 import { KIND, placeAt, workpieceOf } from "./rows.js";
 
 const PLAIN_WAY = [76, 126, 196, 200];
 const WAYS = { [KIND.rotate]: [224, 122, 32, 235], [KIND.wipe]: [140, 112, 190, 200] };
 const TURN_STEP_DEG = 3;
 
-/** Pairs of places for every row that moves and lays nothing; turns of the table are arcs. row: of each pair, rising. */
-export function waysOf(rows, path, chain) {
-  const places = [], colours = [], row = [], p = path.points;
+/** Drawing, for ranges of rows, of the ways of all that move and lay nothing; turns of the table are arcs. */
+export function waysOn(gl, { rows, path, chain }) {
+  const places = [], colours = [], row = [], p = path.points; // row: of each pair of places, rising
   const pair = (i, a, b) => {
     const colour = WAYS[rows.kind[i]] || PLAIN_WAY;
     places.push(a[0], a[1], a[2], b[0], b[1], b[2]);
@@ -23,7 +24,8 @@ export function waysOf(rows, path, chain) {
     const way = rows.kind[i] === KIND.rotate ? arcOf(rows, i, chain) : [first, end];
     for (let k = 1; k < way.length; k++) if (length(sub(way[k], way[k - 1])) > 0) pair(i, way[k - 1], way[k]);
   }
-  return { places: new Float32Array(places), colours: new Uint8Array(colours), row: Int32Array.from(row) };
+  const lines = linesOf(gl, { places: new Float32Array(places), colours: new Uint8Array(colours) });
+  return { draw: (seen, firstRow, endRow) => lines.draw(seen, { range: [firstRow, endRow].map((edge) => 2 * countUpTo(row, edge - 1)) }) };
 }
 
 /** The tip's places on the work while the table turns. */
@@ -66,18 +68,18 @@ void main() {
 
 export const MARKS = {
   seams: { fill: [0.07, 0.08, 0.1], shape: 0 },
-  retracts: { fill: [0.84, 0.37, 0.0], shape: 1 },
-  primes: { fill: [0.34, 0.71, 0.91], shape: 2 },
+  retracts: { fill: [0.84, 0.37, 0.0], shape: 1, larger: 2 },
+  primes: { fill: [0.34, 0.71, 0.91], shape: 2, larger: 2 },
 };
 
 /** Marks of one kind at the beginnings of rows. */
-export function marksAt(gl, marked, path, { fill, shape }) {
+export function marksOn(gl, marked, path, { fill, shape, larger = 0 }) {
   const places = new Float32Array(3 * marked.length);
   marked.forEach((row, k) => places.set(path.points.subarray(3 * path.slot(row), 3 * path.slot(row) + 3), 3 * k));
   const points = cornersOn(gl, programOf(gl, MARK_VERTEX, MARK_FRAGMENT), { place: [places, 3] });
-  const draw = (toClip, firstRow, endRow, size, lift) => {
+  const draw = ({ toClip }, firstRow, endRow, size, lift) => {
     const first = countUpTo(marked, firstRow - 1), end = countUpTo(marked, endRow - 1);
-    if (end > first) points.draw({ toClip, size, lift, fill, shape }, () => gl.drawArrays(gl.POINTS, first, end - first));
+    if (end > first) points.draw({ toClip, size: size + larger, lift, fill, shape }, () => gl.drawArrays(gl.POINTS, first, end - first));
   };
   return { draw };
 }

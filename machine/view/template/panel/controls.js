@@ -1,6 +1,6 @@
 // Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
 
-import { $, duration, listen, made, optionsOf, partsInWords, swatch, swatches, tabsOf, toggle } from "../elements.js";
+import { $, duration, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, toggle } from "../elements.js";
 import { RAMP, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
@@ -23,7 +23,7 @@ export function controlsOf(print, scene, bells) {
     frame: () => { scene.riding = $("frame").value === "workpiece"; bells.ring("frame"); },
     stand: () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)),
   });
-  listen("input", { apart: () => { scene.apart = Number($("apart").value); bells.ring("look"); } });
+  listen("input", { apart: () => { scene.apart = numberIn("apart"); bells.ring("look"); } });
   toggle(print.rows.count ? "has-paths" : "no-paths", true);
   toggle("no-solids", !print.surfaces && !posed.length);
   toggle("one-part", parts.length < 2);
@@ -70,6 +70,7 @@ function kindEntries(rows) {
 
 const KINDS = ["travel", "", "retraction", "turning the table", "wipe", "prime"];
 
+/** Where the print is after the row shown, in the file's own numbers. */
 export function readoutsOf(print, scene, bells) {
   const { rows, header, flow } = print, letters = [header.machine.tilt.letter, header.machine.turn.letter];
   const axis = (k, digits) => () => scene.place[k].toFixed(digits);

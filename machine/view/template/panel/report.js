@@ -14,6 +14,7 @@ const FRONT = [
   ["filament m", (row) => orDash(row.filament_mm, (length) => (length / 1000).toFixed(1))],
 ];
 
+/** The best decomposition for every number of parts: its figures, and how another one than the taken would cut the model. */
 export function frontOf(print, scene) {
   const { front } = print.header;
   if (front.length < 2) return;
@@ -76,6 +77,7 @@ const APART_PX = 30; // findings nearer to each other share a marker
 const CELL_PX = APART_PX / Math.SQRT2; // no two markers lie in one cell
 const AROUND = [-2, -1, 0, 1, 2];
 
+/** What the dry run complains about: a list, and markers over the picture, one for all that lie together; a click goes there. */
 export function findingsOf(print, scene, bells, camera, player) {
   const { findings } = print.header, placed = findings.flatMap((finding, k) => (finding.row >= 0 && finding.workpiece_mm ? [k] : []));
   let chosen = -1;

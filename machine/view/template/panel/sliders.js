@@ -1,7 +1,8 @@
 // Sliders: the one over the whole print, with playing and keys, and the two that limit the layers, with a bar for the time of every layer.
 
-import { $, duration, hide, listen, onKeys, optionsOf, tell } from "../elements.js";
+import { $, duration, hide, listen, numberIn, onKeys, optionsOf, tell } from "../elements.js";
 import { viewKeys } from "../picture/camera.js";
+import { density } from "../picture/gl.js";
 import { clamp } from "../picture/math.js";
 
 const PLAYING = [1, 5, 20, 100, 300, 1000];
@@ -32,7 +33,7 @@ function playerOf(scene, bells, total) {
   let before = 0;
   const step = (now) => {
     if (!player.playing) return;
-    const next = scene.time() + (Math.min(now - before, 250) / 1000) * Number($("speed").value);
+    const next = scene.time() + (Math.min(now - before, 250) / 1000) * numberIn("speed");
     before = now;
     scene.goToTime(Math.min(next, total));
     bells.ring("moving");
@@ -96,7 +97,7 @@ export function layerSliders({ header: { parts } }, scene, bells) {
   const typed = (end, field, of) => () => {
     const { value } = $(`layer-${end}-${field}`);
     if (value === "" || !Number.isFinite(Number(value))) return show();
-    limits[end](nearestLayer(scene.layers(), Number($(`layer-${end}`).value), Number(value), of));
+    limits[end](nearestLayer(scene.layers(), numberIn(`layer-${end}`), Number(value), of));
     return scene.goTo(scene.layers()[scene[end]]);
   };
   for (const end of Object.keys(limits)) {
@@ -104,7 +105,7 @@ export function layerSliders({ header: { parts } }, scene, bells) {
     listen("change", { [`layer-${end}-number`]: typed(end, "number", ({ number }) => number), [`layer-${end}-mm`]: typed(end, "mm", ({ z }) => z) });
   }
   $("part").append(...optionsOf(parts.filter(({ rows }) => rows).map(({ index }) => [index, index ? `part ${index}` : "the file"])));
-  listen("change", { part: () => scene.choosePart($("part").value === "" ? null : Number($("part").value)) });
+  listen("change", { part: () => scene.choosePart($("part").value === "" ? null : numberIn("part")) });
   const show = () => {
     const layers = scene.layers();
     hide({ layers: layers.length < 2 });
@@ -133,21 +134,18 @@ function nearestLayer(layers, place, value, of) {
 
 const THUMB_PX = 13; // of the slider: half of it lies beyond its first and last place
 
+/** A bar for every layer beside the slider of the layers, as long as the layer takes; a click goes to the layer. */
 export function layerTimes(scene, bells) {
   const canvas = $("layer-times"), pen = canvas.getContext("2d");
-  const placeAt = (y, height) => {
-    const most = Math.max(scene.layers().length - 1, 0), share = (height - THUMB_PX / 2 - y) / Math.max(height - THUMB_PX, 1);
-    return Math.round(clamp(share, 0, 1) * most);
-  };
   const draw = () => {
-    const layers = scene.layers(), density = Math.min(devicePixelRatio || 1, 2);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.round(x * density));
+    const layers = scene.layers(), dense = density();
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.round(x * dense));
     if (!width || !height) return;
     [canvas.width, canvas.height] = [width, height];
     const style = getComputedStyle(canvas), [shown, others] = ["--accent", "--soft"].map((name) => style.getPropertyValue(name));
-    const usual = longestUsual(layers);
-    const lines = longestAt(layers, (k) => Math.floor(height - (THUMB_PX / 2 + (k / Math.max(layers.length - 1, 1)) * (height / density - THUMB_PX)) * density));
-    const pitch = (height - THUMB_PX * density) / Math.max(layers.length - 1, 1), thick = pitch < 3 ? Math.ceil(pitch) : Math.floor(pitch) - 1;
+    const times = Float32Array.from(layers, ({ time }) => time).sort(), usual = times[Math.ceil(0.98 * (times.length - 1))] || 1; // the longest would leave the others no length
+    const lines = longestAt(layers, (k) => Math.floor(height - (THUMB_PX / 2 + (k / Math.max(layers.length - 1, 1)) * (height / dense - THUMB_PX)) * dense));
+    const pitch = (height - THUMB_PX * dense) / Math.max(layers.length - 1, 1), thick = pitch < 3 ? Math.ceil(pitch) : Math.floor(pitch) - 1;
     for (const [y, k] of lines) {
       const long = clamp((layers[k].time / usual) * width, 1, width), drawn = scene.low <= k && k <= scene.high;
       pen.globalAlpha = drawn ? 1 : 0.45;
@@ -155,7 +153,10 @@ export function layerTimes(scene, bells) {
       pen.fillRect(width - long, y - Math.floor(thick / 2), long, thick);
     }
   };
-  const point = (event) => placeAt(event.clientY - canvas.getBoundingClientRect().top, canvas.clientHeight);
+  const point = ({ clientY }) => {
+    const { top, height } = canvas.getBoundingClientRect(), share = (height - THUMB_PX / 2 - (clientY - top)) / Math.max(height - THUMB_PX, 1);
+    return Math.round(clamp(share, 0, 1) * Math.max(scene.layers().length - 1, 0));
+  };
   const go = (event) => {
     const place = point(event);
     scene.chooseLayers(Math.min(scene.low, place), place);
@@ -170,12 +171,6 @@ export function layerTimes(scene, bells) {
   });
   bells.on("layers theme", draw);
   new ResizeObserver(draw).observe(canvas);
-}
-
-/** The longest time of a layer, seconds, a fiftieth of the layers left out: they would leave the others no length. */
-function longestUsual(layers) {
-  const times = Float32Array.from(layers, ({ time }) => time).sort();
-  return times[Math.ceil(0.98 * (times.length - 1))] || 1;
 }
 
 /** Of the layers that share a line of pixels, the one that takes longest: line of pixels to place. */

@@ -64,15 +64,18 @@ export function perspective(height, aspect, near, far) {
   return [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
 }
 
-/** Least and greatest corner of points x, y, z after each other; [] where there are none. */
-export function bounds(points) {
+/** Least and greatest corner of points x, y, z after each other, of those that count by their place; [] where there are none. */
+export function bounds(points, counts = null) {
   const least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < points.length; i++) {
-    const k = i % 3, x = points[i];
-    if (x < least[k]) least[k] = x;
-    if (x > most[k]) most[k] = x;
+  for (let i = 0; i < points.length; i += 3) {
+    if (counts && !counts(i / 3)) continue;
+    for (let k = 0; k < 3; k++) {
+      const x = points[i + k];
+      if (x < least[k]) least[k] = x;
+      if (x > most[k]) most[k] = x;
+    }
   }
-  return points.length ? [least, most] : [];
+  return least[0] <= most[0] ? [least, most] : [];
 }
 
 /** The eight corners of a box [least, most]; the bits of a corner's place tell at which end of each axis it lies. */

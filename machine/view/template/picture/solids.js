@@ -1,7 +1,6 @@
 // Solids: triangles with flat faces, drawn whole or as a ghost whose edges show and whose faces let the light through; lines; and the shapes of both.
 
 import { cornersOn, LIGHT, programOf } from "./gl.js";
-import { cornersOf } from "./math.js";
 
 export const rgb = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
 export const hex = (colour) => "#" + colour.map((x) => Math.round(x).toString(16).padStart(2, "0")).join("");
@@ -76,47 +75,6 @@ export function solidOf(gl, { places, colours }) {
   };
   return { draw, corners, paint: (painted) => shape.put("colour", painted), free: shape.free };
 }
-
-/** Corners of triangles put together, all of one colour a piece. */
-export function trianglesOf(pieces) {
-  const places = [], colours = [];
-  for (const { corners, colour } of pieces)
-    for (const corner of corners) {
-      places.push(...corner);
-      colours.push(...colour);
-    }
-  return { places: new Float32Array(places), colours: new Uint8Array(colours) };
-}
-
-const quad = (a, b, c, d) => [a, b, c, a, c, d];
-
-const SIDES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]; // of a box, by its corners
-
-export function boxCorners(least, most) {
-  const corners = cornersOf([least, most]);
-  return SIDES.flatMap((side) => quad(...side.map((k) => corners[k])));
-}
-
-export function boxEdges(least, most) {
-  const corners = cornersOf([least, most]);
-  return corners.flatMap((corner, k) => [1, 2, 4].filter((bit) => !(k & bit)).flatMap((bit) => [corner, corners[k | bit]]));
-}
-
-export const circle = (radius, z, steps) => Array.from({ length: steps }, (_, k) => {
-  const angle = (2 * Math.PI * k) / steps;
-  return [radius * Math.cos(angle), radius * Math.sin(angle), z];
-});
-
-/** The surface of an outline [radius, z] turned about z. */
-export function revolved(outline, steps = 64) {
-  const rings = outline.map(([radius, z]) => circle(radius, z, steps));
-  return rings.slice(1).flatMap((ring, i) => ring.flatMap((_, k) => {
-    const next = (k + 1) % steps;
-    return quad(rings[i][k], rings[i][next], ring[next], ring[k]);
-  }));
-}
-
-export const chained = (points) => points.flatMap((point, k) => [point, points[(k + 1) % points.length]]);
 
 export const LINE_VERTEX = `
 in vec3 place;

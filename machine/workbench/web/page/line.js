@@ -1,13 +1,13 @@
-// Line: state in, commands out; when it is lost the page says so and tries again.
+// Lines: all that the page and its server say to each other: state in, commands out; when one is lost the page says so and tries again.
+// A command is {do: NAME, its fields}; tests/machine/workbench/test_page_commands.py holds every one of the page against the server's:
+// send and ask: the bench's, the classes in machine/workbench/session/commands.py and bench/; the state that answers: web/snapshot.py;
+// printsLine: the prints', COMMANDS in machine/workbench/printing/commands.py; the state: prints.snapshot() there;
+// the line in model/benches.js: the paired devices', DEVICE_COMMANDS in web/line.py. A button with data-do or data-print gives the NAME alone.
 
-import { made } from "../../../view/template/elements.js";
+import { made, notice } from "../../../view/template/elements.js";
 
 export const AGAIN_MS = 1000;
-const CLOSED_CODE = 4404; // of a line whose bench is not open any more
-const UNPAIRED_CODE = 4403; // of one whose device is let go
-
-const ENDINGS = { [CLOSED_CODE]: "closed", [UNPAIRED_CODE]: "unpaired" };
-
+const ENDINGS = { 4404: "closed", 4403: "unpaired" }; // by the code with which the server ends a line: its bench is closed, its device let go
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
 export const LINE_TOLD = {
   open: "",
@@ -41,39 +41,41 @@ export const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSign
   ({ status }) => ({ 403: "unpaired", 404: "replaced" }[status] || "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
 
 let line = null, asked = new Map(), count = 0; // asked: what is called when a command is answered, by its name
-const page = crypto.getRandomValues(new Uint32Array(4)).join("-"); // this page's name, which no other one has; a page that is not encrypted has no randomUUID
+/** This page's name, which no other one has; a page that is not encrypted has no randomUUID. */
+export const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
 
 /** A state as this page tells it: what others were refused is theirs to see. */
 function toldHere(state) {
-  const own = (told) => ([page, ""].includes(told?.page) ? told : null);
-  return { ...state, problem: state.problems[page] || state.problems[""] || "", refused: own(state.refused), units: own(state.units) };
+  const own = (told) => ([OWN_PAGE, ""].includes(told?.page) ? told : null);
+  return { ...state, problem: state.problems[OWN_PAGE] || state.problems[""] || "", refused: own(state.refused), units: own(state.units) };
 }
 
 /** The page's line to its bench: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD. */
 export function openLine(follow, stands) {
-  const answer = ({ answers }) => {
-    for (const [name, refusal] of Object.entries(answers)) {
+  const heard = (state) => {
+    follow(toldHere(state));
+    for (const [name, refusal] of Object.entries(state.answers)) {
       const answered = asked.get(name);
       asked.delete(name);
       answered?.(refusal);
     }
   };
-  line = lineAt("line", (state) => { follow(toldHere(state)); answer(state); }, stands);
+  line = lineAt("line", heard, stands);
 }
 
 /** A command; what becomes of it is seen by the next states. */
-export const send = (command) => { if (line?.isOpen()) line.send({ ...command, page }); };
+export const send = (command) => { if (line?.isOpen()) line.send({ ...command, page: OWN_PAGE }); };
 
 /** The same; answered(refusal) is called after the state by which it is done ("") or refused. */
 export function ask(command, answered) {
   if (!line?.isOpen()) return answered(NOT_SENT);
-  const name = `${page} ${++count}`;
+  const name = `${OWN_PAGE} ${++count}`;
   asked.set(name, answered);
   send({ ...command, ask: name });
 }
 
 /** Sends a file of the person's to a bench; what is wrong with it comes back by the line, also where it is not taken to its end. */
-export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name, page })}`, { method: "POST", body: file }).catch(() => {});
+export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE })}`, { method: "POST", body: file }).catch(() => {});
 
 /** A function of a key and its address that gives take() what is there, read: only what was asked for last, and once; null: nothing.
  * insists: what is not there is asked for again, as it always is where the line is lost; begin(): something is asked for. */
@@ -98,4 +100,40 @@ export async function save(address) {
   const link = made("a", { href: URL.createObjectURL(await answer.blob()), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+
+export const ANSWER_MS = 3000; // within which the workbench answers, and a printer has confirmed an emergency stop
+const OWED_MS = 10000; // so long an emergency stop waits for a line: after that its person has done something else
+
+/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. An emergency
+ * stop that finds no line is sent as soon as there is one, if that is soon and its print still there, else expired() is called; a command
+ * to which nothing answers is told. */
+export function printsLine(follow, refused, expired) {
+  let owed = [], waiting = 0;
+  const sendOwed = (prints) => {
+    const meant = owed.filter(({ command, at }) => Date.now() - at < OWED_MS && prints.some(({ number }) => number === command.print));
+    meant.forEach(({ command }) => line.send(command));
+    if (meant.length < owed.length) expired();
+    owed = [];
+  };
+  const heard = (told) => {
+    clearTimeout(waiting);
+    notice("", "sent");
+    if (told.problem) return refused(told);
+    follow(told);
+    sendOwed(told.prints);
+  };
+  const line = lineAt(`prints?page=${OWN_PAGE}`, heard, (how) => { if (how === "open") notice("", "sent"); });
+  return {
+    isOpen: line.isOpen,
+    send: (command) => {
+      clearTimeout(waiting);
+      if (line.isOpen()) {
+        waiting = setTimeout(notice, ANSWER_MS, "tiltprint does not answer: what was asked for may not have arrived.", "sent");
+        return line.send(command);
+      }
+      if (command.do === "emergency") owed.push({ command, at: Date.now() });
+      else notice("The line to tiltprint is lost; nothing was sent.", "sent");
+    },
+  };
 }

@@ -1,6 +1,6 @@
 // Lists: texts, lists and rows of the panels, made anew only where what they tell is new.
 
-import { $, button, made, termsOf } from "../../../view/template/elements.js";
+import { $, button, made, rowOf, termsOf } from "../../../view/template/elements.js";
 
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 export const newtons = (force) => `${Number(force.toPrecision(2))} N`;
@@ -54,9 +54,12 @@ export const putTable = (table, told, head, rows) => putNew(table, told, () => {
   return body.length ? [...(head.length ? [made("thead", {}, titles)] : []), made("tbody", {}, ...body)] : [];
 });
 
-/** A row that is chosen by its radio button, in the label of which its name stands, or by a click; cells: [content, class]. */
+/** A row that is chosen by its radio button, in the label of which its name stands, or by a click. */
 export function choiceRow(name, value, checked, label, cells, choose) {
-  const mark = made("input", { type: "radio", name, value, checked, onchange: choose });
-  const onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
-  return made("tr", { onclick }, made("td", {}, made("label", {}, mark, ...label)), ...cells.map(([content, className]) => made("td", { className }, content)));
+  const mark = made("input", { type: "radio", name, value, checked, onchange: choose }), row = rowOf([made("label", {}, mark, ...label), ...cells]);
+  row.onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
+  return row;
 }
+
+/** Buttons, one a unit, that say what a model's coordinates are in. */
+export const unitButtons = (row, words, choose) => putNew(row, words, () => words.map((unit) => button(`in ${unit}`, () => choose(unit))));

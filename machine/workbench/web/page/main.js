@@ -1,12 +1,12 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, disable, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, disable, duration, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
+import { putNew, unitButtons, withWholeOptions } from "./lists.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
-import { fetchModel, modelOf, pedestalOf } from "./model/model.js";
-import { facetsOf, thumbnailsOf } from "./model/resting.js";
+import { facetsOf, fetchModel, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
 import { ringsOf } from "./model/rings.js";
 import { marksPanel } from "./parts/marks-panel.js";
 import { partsList, partsPanel } from "./parts/parts-panel.js";
@@ -22,7 +22,6 @@ import { settingsPanel } from "./settings/settings-panel.js";
 import { saveMenu } from "./slice/save-menu.js";
 import { comparePanel, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
 import { keptLook, onState, store, subscribe, update } from "./store.js";
-import { elapsedTimes, problemLine } from "./told.js";
 
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
@@ -30,7 +29,7 @@ function main() {
   const follow = async (state) => {
     update({ state, turning: null });
     await fetchModel(state.model, picture, () => follow(store.state));
-    look.restore();
+    restoreLook();
     if (store.state.version === state.version) root.dataset.version = state.version;
   };
   openLine(follow, (how) => {
@@ -38,10 +37,10 @@ function main() {
     notice(LINE_TOLD[how], "line");
   });
   tabsOf((tab) => update({ tab }));
-  const look = keptLook(camera, picture);
+  const restoreLook = keptLook(camera, picture);
   onState(tellState);
   onState(({ stopped }) => notice(stopped, "stopped"));
-  slicesPanel(printFrame(camera, picture).showFinding);
+  slicesPanel(printFrame(camera, picture));
   const panels = [problemLine, elapsedTimes, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
   if (picture) {
@@ -74,6 +73,35 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   disable({ undo: !undo, redo: !redo });
   $("undo").ariaLabel = undo ? `undo: ${undo}` : "undo";
   $("redo").ariaLabel = redo ? `redo: ${redo}` : "redo";
+}
+
+/** What could not be done last, for as long as it is so or until it is read. */
+function problemLine() {
+  onState(({ problem, refused, units }) => {
+    putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
+    hide({ problem: !problem, "put-near": !refused?.near });
+    unitButtons($("units"), units?.words || [], (unit) => send({ do: "unit", unit }));
+  });
+}
+
+const MOMENT_S = 2;
+const WORK = {
+  "summary": ({ busy, search, slicing, preparing }) => busy || (search ? "search" : slicing ? "slicing" : preparing ? "planes" : ""),
+  "search-told": ({ search }) => (search ? "search" : ""), "slicing-told": ({ slicing }) => (slicing ? "slicing" : ""), "comparing-told": ({ comparing }) => (comparing ? "comparing" : ""),
+};
+
+/** How long work has been under way, beside what it tells of itself, as soon as that is longer than a moment. */
+function elapsedTimes() {
+  const begun = new Map(); // element -> {work, at}
+  const show = () => begun.forEach(({ work, at }, id) => {
+    const seconds = (performance.now() - at) / 1000;
+    $(id).dataset.elapsed = work && seconds >= MOMENT_S ? ` ${duration(seconds)}` : "";
+  });
+  onState((state) => {
+    for (const [id, of] of Object.entries(WORK)) if (begun.get(id)?.work !== of(state)) begun.set(id, { work: of(state), at: performance.now() });
+    show();
+  });
+  setInterval(show, 1000);
 }
 
 /** What keys do; undo and redo, but where what is typed has an undo of its own. */

@@ -56,7 +56,7 @@ export function keptInTab(name, usual) {
 
 const SEEN = ["yaw", "pitch", "target", "distance", "radius"]; // of a camera
 
-/** {restore(): once the model is there, the view that was kept of it}. Call it when the tabs are there. */
+/** A function that, once the model is there, takes the view that was kept of it. Call it when the tabs are there. */
 export function keptLook(camera, picture) {
   const kept = keptInTab("look", { tab: "", camera: null });
   let waiting = kept.now.camera; // its view comes with its model
@@ -66,14 +66,12 @@ export function keptLook(camera, picture) {
     const model = store.state?.model?.key;
     if (picture && model) kept.keep({ camera: { model, ...Object.fromEntries(SEEN.map((name) => [name, camera[name]])) } });
   });
-  return {
-    restore: () => {
-      if (!store.triangles) return;
-      if (waiting?.model === store.state.model?.key) {
-        SEEN.forEach((name) => { camera[name] = waiting[name]; });
-        picture?.ask();
-      }
-      waiting = null;
-    },
+  return () => {
+    if (!store.triangles) return;
+    if (waiting?.model === store.state.model?.key) {
+      SEEN.forEach((name) => { camera[name] = waiting[name]; });
+      picture?.ask();
+    }
+    waiting = null;
   };
 }

@@ -8,8 +8,8 @@ import { onNew } from "../store.js";
 const TOLD_MS = 8000;
 const HERE = Number(location.pathname.split("/").at(-2));
 
-/** A further bench with the settings of this one, in a page of its own; files: opened there, a model before a plan. */
-async function openBench(files = []) {
+/** A further bench with the settings of this one, in a page of its own, where a model is opened. */
+async function openBench(model = null) {
   const page = window.open("", "_blank"); // at once, while the browser still knows that a person has asked for it
   const answer = await fetch(`../benches?like=${HERE}`, { method: "POST" }), told = await answer.json();
   if (!answer.ok) {
@@ -22,26 +22,14 @@ async function openBench(files = []) {
     notice("The browser opens no further page by itself: the new bench is in the list.", "benches");
     setTimeout(() => notice("", "benches"), TOLD_MS);
   }
-  await sendFiles(files, `../${told.number}/`);
+  if (model) await sendFile(model, `../${told.number}/`);
 }
 
-/** Files sent to a bench one after the other, models before plans, which are for them. */
-async function sendFiles(files, to = "") {
-  const plans = files.filter(({ name }) => name.toLowerCase().endsWith(".toml")), models = files.filter((file) => !plans.includes(file));
-  for (const file of [...models, ...plans]) await sendFile(file, to);
-}
-
-/** What a person has dropped or chosen: the first model, and plans, for this bench; every further model on a bench of its own. */
+/** What a person has dropped or chosen: the first model, and plans after it, for this bench; every further model on a bench of its own. */
 export async function takeFiles(files) {
-  const models = files.filter(({ name }) => !name.toLowerCase().endsWith(".toml")), [, ...further] = models;
-  further.forEach((model) => openBench([model]));
-  await sendFiles(files.filter((file) => !further.includes(file)));
-}
-
-/** The list of the open benches, where there are several. */
-function showBenches(benches) {
-  hide({ benches: benches.length < 2 });
-  putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
+  const isPlan = ({ name }) => name.toLowerCase().endsWith(".toml"), [first = [], ...further] = files.filter((file) => !isPlan(file));
+  further.forEach((model) => openBench(model));
+  for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
 }
 
 function benchRow({ number, name, parts, work }) {
@@ -53,7 +41,10 @@ function benchRow({ number, name, parts, work }) {
 export function benchesPanel() {
   listen("click", { another: () => openBench() });
   offer("kept");
-  onNew(({ benches }) => benches, showBenches);
+  onNew(({ benches }) => benches, (benches) => {
+    hide({ benches: benches.length < 2 });
+    putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
+  });
 }
 
 const OFFERS = {
@@ -68,16 +59,17 @@ function moment(seconds) {
 
 /** What is there from earlier: work that was kept, or files that a workbench has left which was killed. */
 export async function offer(what) {
-  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, tell] = OFFERS[what];
+  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, inWords] = OFFERS[what];
   hide({ [`${what}-field`]: !found.length });
   $(list).replaceChildren(...found.map((one) => {
-    const [name, title, words] = tell(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
+    const [name, title, words] = inWords(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
     return button("", open, {}, made("span", { text: title }), made("small", { text: words }));
   }));
 }
 
 const PAIRED = "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself.";
 
+/** On this computer's page, where the workbench is open to the network: which devices are paired, each with a button that lets it go. */
 export function devicesPanel() {
   const { network } = document.documentElement.dataset;
   if (network !== "open" && network !== "paired") return;

@@ -1,13 +1,12 @@
 // Model panel: the file, how it is turned, what overhangs then, how large it is, and where on the plate it and its copies stand.
 
-import { $, alike, button, hide, listen, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, hide, listen, numberIn, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask, send } from "../line.js";
-import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
+import { fill, listIn, mm2, putNew, tellIn, unitButtons } from "../lists.js";
 import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
-import { unitButtons } from "../told.js";
 import { offer, takeFiles } from "./benches.js";
 
 const TURNS = ["x", "y", "z"];
@@ -17,7 +16,7 @@ export function modelPanel() {
     file: () => { takeFiles([...$("file").files]); $("file").value = ""; },
     demo: () => { if ($("demo").value) send({ do: "demo", name: $("demo").value }); },
   });
-  const by = () => TURNS.map((axis) => Number($(`turn-${axis}-typed`).value));
+  const by = () => TURNS.map((axis) => numberIn(`turn-${axis}-typed`));
   const turn = () => { if (by().some(Boolean)) send({ do: "stand", rotation: turnedFurther(store.state.rotation, by()) }); };
   for (const axis of TURNS) {
     const inputs = [$(`turn-${axis}`), $(`turn-${axis}-typed`)];
@@ -94,7 +93,7 @@ export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
   let shown = null; // the standing that was told last
   const scale = (value) => send({ do: "set", key: "process.scale", value });
-  listen("change", { scale: () => scale(scaleBy(Number($("scale").value) / 100 / store.state.scale)) });
+  listen("change", { scale: () => scale(scaleBy(numberIn("scale") / 100 / store.state.scale)) });
   listen("click", { "scale-as-read": () => scale(null) });
   sides.forEach((side, k) => side.addEventListener("change", () => {
     const { standing } = store.state;
@@ -125,6 +124,7 @@ function put(place) {
   ask({ do: "set", key: "process.place_mm", value: alike(place, MIDDLE) ? null : `[${place.join(", ")}]` }, () => { if (store.placing === place) update({ placing: null }); });
 }
 
+/** Where on the plate the model and its copies stand: dragged there in the picture, by arrow keys, or typed. */
 export function placePanel(picture) {
   const fields = [$("place-x"), $("place-y")];
   const putFar = (place) => {

@@ -1,12 +1,13 @@
-// Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal.
+// Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal; and the ways in which it can lie.
 
-import { $, alike, made, notice, swatches } from "../../../../view/template/elements.js";
-import { sub } from "../../../../view/template/picture/math.js";
-import { AGAIN_MS, newest } from "../line.js";
+import { $, alike, button, hide, made, notice, swatches, tell } from "../../../../view/template/elements.js";
+import { add, dot, scaled, sub } from "../../../../view/template/picture/math.js";
+import { trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { AGAIN_MS, newest, send } from "../line.js";
 import { mm2 } from "../lists.js";
 import { fadedColours } from "../parts/pieces.js";
 import { planesNow } from "../parts/planes.js";
-import { overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";
+import { cornersAt, faceMet, overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 
 const MISSING = "The model has not come from tiltprint, so it is not drawn; it is asked for again with the next news.";
@@ -49,7 +50,7 @@ export function modelOf(picture) {
       stood = how;
       const found = overhanging(triangles, rotation[2], limit, platform);
       red = found.red;
-      if (turning || area === null) $("overhang").textContent = mm2(found.area);
+      if (turning || area === null) tell({ overhang: mm2(found.area) });
       const stands = standingBy(rotation, triangles.vertices, lift), [least, most] = stands.box;
       picture?.stand(stands);
       update({ seen: { size_mm: sub(most, least) } });
@@ -81,4 +82,76 @@ export function pedestalOf(picture) {
   const fetchPedestal = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true });
   onState(({ pedestal }) => fetchPedestal(pedestal, `pedestal/${pedestal}`));
   subscribe(({ state, turning, pedestal }) => picture.pedestal(!turning && pedestal?.of === state.pedestal ? pedestal.body : null));
+}
+
+const COLOUR = [230, 159, 0, 255], FAINT = 0.3, LIT = 0.85;
+const OUT_SHARE = 0.002; // of the model's size, by which they are drawn outside of it
+
+/** The facet under an event, of those that face the eye; -1: none. */
+function facetMet({ facets }, picture, event) {
+  const [from, along] = picture.ray(event), facing = facets.map((facet, k) => ({ ...facet, k })).filter(({ normal }) => dot(normal, along) < 0);
+  const corners = facing.flatMap((facet) => facet.corners), owners = facing.flatMap(({ corners: own, k }) => Array(own.length / 9).fill(k));
+  const face = faceMet({ corners, count: owners.length }, from, along);
+  return face < 0 ? -1 : owners[face];
+}
+
+/** Lays the facet under an event down. */
+export function layFacet(picture, event) {
+  const facet = store.facets?.facets[facetMet(store.facets, picture, event)];
+  if (!facet) return;
+  update({ clicks: "" });
+  send({ do: "lay", normal: facet.normal });
+}
+
+/** What of the model's hull it can rest on, lit where one of them is to be laid down. */
+export function facetsOf(picture) {
+  const fetchFacets = newest({ read: (answer) => answer.json(), insists: true, take: (facets, key) => update({ facets: facets && { key, facets, lit: -1 } }) });
+  $("canvas").addEventListener("pointermove", (event) => {
+    const { clicks, facets } = store;
+    if (clicks !== "lay" || !facets || event.buttons) return;
+    const lit = facetMet(facets, picture, event);
+    if (lit !== facets.lit) update({ facets: { ...facets, lit } });
+  });
+  subscribe(({ state: { model, rotation }, clicks, facets, triangles }) => {
+    const laying = clicks === "lay" && model && triangles;
+    if (laying) fetchFacets(model.key, `facets/${model.key}`);
+    const seen = laying && facets?.key === model.key ? facets : null;
+    $("canvas").style.cursor = seen && seen.lit >= 0 ? "pointer" : "";
+    picture.extra("facets", JSON.stringify([seen?.key, seen?.lit, seen && rotation]), () => (seen ? seen.facets.map((facet, k) => facetDrawn(facet, k === seen.lit, picture)) : []));
+  });
+}
+
+function facetDrawn({ normal, corners }, lit, picture) {
+  const [least, most] = picture.box(), out = scaled(normal, OUT_SHARE * Math.hypot(...most.map((x, k) => x - least[k])));
+  const places = Array.from({ length: corners.length / 9 }, (_, face) => cornersAt(corners, face).map((corner) => add(corner, out))).flat();
+  return { solid: trianglesOf([{ corners: places, colour: COLOUR }]), matrix: picture.matrix(), strength: lit ? LIT : FAINT };
+}
+
+let wanted = []; // [rotation, canvas] of small pictures that are drawn as soon as nothing else is to be done
+
+/** A small picture of the model as it would stand by a rotation; "" without a picture. */
+function thumbnail(picture, rotation) {
+  if (!picture) return "";
+  const into = made("canvas", { width: 112, height: 84, className: "thumbnail" });
+  if (wanted.push([rotation, into]) === 1) setTimeout(() => {
+    if (store.triangles) picture.thumbnails(wanted.filter(([, canvas]) => canvas.isConnected));
+    wanted = [];
+  });
+  return into;
+}
+
+/** The ways in which the model rests, and how a search has laid it down; without a picture in words alone. */
+export function thumbnailsOf(picture) {
+  let told = "", model = null; // of what there are small pictures
+  subscribe(({ state: { resting, laid }, triangles }) => {
+    const now = JSON.stringify([resting, laid]), drawn = triangles && picture, views = laid && drawn ? [["as it stood", laid.before], ["as it lies now", laid.after]] : [];
+    if (now === told && triangles === model) return;
+    [told, model] = [now, triangles];
+    $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
+      const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
+      return button("", lay, {}, thumbnail(drawn, rotation), made("span", { text: words }), made("small", { text: mm2(area) }));
+    }));
+    hide({ laid: !views.length });
+    $("laid").replaceChildren(...views.map(([words, rotation]) => made("figure", {}, thumbnail(drawn, rotation), made("figcaption", { text: words }))));
+  });
 }

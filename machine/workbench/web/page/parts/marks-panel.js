@@ -1,8 +1,9 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, button, listen, made, putAt, swatch } from "../../../../view/template/elements.js";
+import { $, alike, button, listen, made, numberIn, putAt, swatch } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
-import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/solids.js";
+import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { wordOf } from "../../../../view/template/picture/solids.js";
 import { newest, send } from "../line.js";
 import { choiceRow, fill, putTable, removeButton } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
@@ -54,7 +55,7 @@ const facesNow = () => store.state.zones.find((zone) => sameMark(zone, store.zon
 
 /** A click on the model where faces or a corner of a box are marked. */
 export function markAt(place) {
-  if (store.clicks === "faces") return send({ do: "mark", kind: kindNow(), point_mm: fine(place), angle_deg: Number($("mark-angle").value) });
+  if (store.clicks === "faces") return send({ do: "mark", kind: kindNow(), point_mm: fine(place), angle_deg: numberIn("mark-angle") });
   if (!store.corner) return update({ corner: place });
   const [least, most] = bounds([...store.corner, ...place]);
   update({ clicks: "", corner: null });
@@ -89,7 +90,7 @@ function chooseMark(zone) {
 }
 
 export function marksPanel(picture) {
-  listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: Number($("mark-angle").value) }); } });
+  listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: numberIn("mark-angle") }); } });
   listen("click", { "mark-middle": () => {
     update({ clicks: "" });
     const [x, y, z] = modelSize(store.state), low = store.state.pedestal_mm;
@@ -154,9 +155,9 @@ function knobOf(side, picture) {
 
 /** A field for one side of the chosen box. */
 function numberOf(side) {
-  const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${side.name}, mm` });
+  const { axis, end, name } = side, typed = (zone, value) => ({ ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) });
+  const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${name}, mm`, onchange: () => { if (boxNow()) putBox(typed(boxNow(), Number(input.value))); } });
   input.dataset.side = sideTitle(side);
-  input.addEventListener("change", () => { if (boxNow()) putBox({ ...boxNow(), [side.end]: boxNow()[side.end].map((x, k) => (k === side.axis ? Number(input.value) : x)) }); });
   return input;
 }
 
@@ -174,7 +175,7 @@ function markRow(zone, chosen) {
   const remove = removeButton(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
-  const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [[where], [remove]], () => chooseMark(zone));
+  const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [where, remove], () => chooseMark(zone));
   row.querySelector("input").ariaLabel = name;
   return row;
 }

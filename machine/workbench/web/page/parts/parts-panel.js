@@ -1,9 +1,9 @@
 // Parts panel: the search, its front as a slider, and every part in a row, chosen there as in the picture, with keys and a menu for what is done to it.
 
-import { $, button, disable, hide, listen, made, needsKey, partsInWords, roughly, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, made, needsKey, partsInWords, roughly, swatch, tell, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
 import { choiceRow, listIn, mm2, newtons, putTable, tellIn } from "../lists.js";
-import { onState, store, subscribe, update } from "../store.js";
+import { onNew, onState, store, subscribe, update } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 
 export function partsPanel() {
@@ -11,16 +11,13 @@ export function partsPanel() {
     find: () => send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }),
     recommended: () => send({ do: "take", parts: store.state.recommended }),
   });
-  let shown = ""; // of which front the slider is
-  const toldOf = ({ front, parts, recommended, cuts, priced }) => JSON.stringify([front, parts, recommended, cuts, priced]);
-  const show = (state) => {
-    const { front, parts, recommended } = state, place = front.findIndex((row) => row.parts === parts);
-    shown = toldOf(state);
+  const show = () => {
+    const { front, parts, recommended, notes } = store.state, place = Math.max(front.findIndex((row) => row.parts === parts), 0);
     update({ row: null });
-    Object.assign($("front"), { max: front.length - 1, value: Math.max(place, 0), disabled: front.length < 2 });
+    Object.assign($("front"), { max: front.length - 1, value: place, disabled: front.length < 2 });
     marksUnder(front, recommended);
-    tellRow(front[Math.max(place, 0)], state);
-    listIn("front-notes", state.notes);
+    tellRow(front[place]);
+    listIn("front-notes", notes);
     hide({ recommended: !recommended });
   };
   let held = null; // the front whose slider is under the hand: nothing moves it there, not even another front
@@ -29,12 +26,12 @@ export function partsPanel() {
   const follow = (row) => {
     const newest = store.state.front.find(({ parts }) => parts === row.parts) || row;
     update({ row: newest });
-    tellRow(newest, store.state);
+    tellRow(newest);
   };
   const letGo = () => {
     if (!held) return;
     held = null;
-    show(store.state);
+    show();
   };
   listen("pointerdown", { front: hold });
   for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first
@@ -44,19 +41,19 @@ export function partsPanel() {
     const { parts } = (held || store.state.front)[$("front").value];
     held = null;
     update({ row: null });
-    ask({ do: "take", parts }, (refusal) => { if (refusal && !held && store.state.front.length) show(store.state); });
+    ask({ do: "take", parts }, (refusal) => { if (refusal && !held && store.state.front.length) show(); });
   } });
-  onState((state) => {
-    const { front, search, parts } = state;
+  onState(({ front, search, parts }) => {
     disable({ find: Boolean(search) });
-    hide({ "stop": !search, "front-field": !front.length });
+    hide({ stop: !search, "front-field": !front.length });
     tell({ "search-told": search ? search.text : "" });
     toggle("no-cuts", !parts);
+  });
+  onNew(({ front, parts, recommended, cuts, priced, notes }) => [front, parts, recommended, cuts, priced, notes], ([front]) => {
     if (!front.length) {
       held = null;
-      shown = "";
       if (store.row) update({ row: null });
-    } else if (!held) { if (toldOf(state) !== shown) show(state); }
+    } else if (!held) show();
     else if (store.row) follow(store.row);
   });
 }
@@ -70,8 +67,9 @@ function marksUnder(front, recommended) {
   }));
 }
 
-function tellRow(row, { recommended, parts, cuts, priced }) {
-  const byHand = row.parts === parts && JSON.stringify(row.planes) !== JSON.stringify(cuts);
+function tellRow(row) {
+  const { recommended, parts, cuts, priced } = store.state;
+  const byHand = row.parts === parts && !alike(row.planes, cuts);
   const orDash = (value, told) => (value !== null ? told(value) : priced ? "–" : "worked out anew …"), best = row.parts === recommended;
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
@@ -105,12 +103,12 @@ function cellsOf(number, { volume_mm3: volume, support_mm2: support, rim_mm: rim
   const joint = store.pieces?.parts.find(({ part }) => part.index === number)?.part.joint, onchange = ({ target }) => lockPart(number, target.checked);
   const lock = number > 1 ? made("input", { type: "checkbox", checked: isLocked(number), ariaLabel: `lock the plane of part ${number}`, onchange }) : "";
   return [
-    [told(volume, (mm3) => (mm3 / 1000).toFixed(2))], [told(support, (mm2) => Math.max(mm2, 0).toFixed(1))], [own(rim, (mm) => mm.toFixed(0))],
-    [own(edge, (deg) => `${deg.toFixed(0)}°`)], [own(joint?.load_n, newtons)], [lock],
+    told(volume, (mm3) => (mm3 / 1000).toFixed(2)), told(support, (mm2) => Math.max(mm2, 0).toFixed(1)), own(rim, (mm) => mm.toFixed(0)),
+    own(edge, (deg) => `${deg.toFixed(0)}°`), own(joint?.load_n, newtons), lock,
   ];
 }
 
-function rowOf(number, figures) {
+function partRow(number, figures) {
   const direction = planesNow()[number - 2]?.normal || [0, 0, 1];
   const name = [swatch(store.state.colours[number - 1]), `${number}`];
   const row = choiceRow("part", number, number === store.part, name, cellsOf(number, figures), () => choosePart(number));
@@ -122,6 +120,7 @@ function rowOf(number, figures) {
   return row;
 }
 
+/** Every part with the plane it stands on in a row, chosen there as in the picture; keys and a menu for what is done to it. */
 export function partsList() {
   addEventListener("keydown", (event) => {
     const typing = event.target.closest?.("[data-typing], #marks, dialog");
@@ -132,7 +131,7 @@ export function partsList() {
   menuKeys();
   subscribe(({ state, part, pieces }) => {
     const figures = partsFigures();
-    putTable($("parts-list"), [figures, state.locked, state.parts, state.colours, planesNow(), part, Boolean(pieces)], HEAD, () => figures.map((own, k) => rowOf(k + 1, own)));
+    putTable($("parts-list"), [figures, state.locked, state.parts, state.colours, planesNow(), part, Boolean(pieces)], HEAD, () => figures.map((own, k) => partRow(k + 1, own)));
   });
 }
 

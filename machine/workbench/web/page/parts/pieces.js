@@ -1,9 +1,9 @@
 // Pieces: the parts as bodies of their own, drawn apart along their printing directions, so that the faces of the cuts are seen.
 
-import { $, listen } from "../../../../view/template/elements.js";
+import { $, listen, numberIn } from "../../../../view/template/elements.js";
 import { blockOf } from "../../../../view/template/moves/block.js";
 import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
-import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/model.js";
+import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/shapes.js";
 import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest } from "../line.js";
 import { mm2, newtons } from "../lists.js";
@@ -99,7 +99,7 @@ export function apartPanel(picture) {
   const fetchPieces = newest({ read: async (answer) => piecesIn(new Uint8Array(await answer.arrayBuffer())), take, begin: () => update({ pieces: null }) });
   $("apart").disabled = !picture;
   listen("input", { apart: () => {
-    update({ apart: Number($("apart").value) });
+    update({ apart: numberIn("apart") });
     picture.fit();
   } });
   subscribe(({ state, tab, pieces, part, apart }, before) => {

@@ -1,10 +1,9 @@
 // Planes: those that are looked at, as the bench has them or a hand holds one: their panel, the knobs in the picture, and what a refused one is in the way of.
 
-import { $, alike, disable, hide, listen, onData, putAt, tell } from "../../../../view/template/elements.js";
-import { boxesOf, headOf } from "../../../../view/template/picture/bodies.js";
+import { $, alike, disable, hide, listen, numberIn, onData, putAt, tell } from "../../../../view/template/elements.js";
 import { add, clamp, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
-import { beside } from "../../../../view/template/picture/model.js";
-import { chained, circle, RED, trianglesOf } from "../../../../view/template/picture/solids.js";
+import { beside, boxesOf, chained, circle, headOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { RED } from "../../../../view/template/picture/solids.js";
 import { ask, send } from "../line.js";
 import { fill, mm2 } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
@@ -58,7 +57,7 @@ function holdPlane(wanted) {
 }
 
 /** What a hand holds after a trial of its plane: where it cannot be cut, it stays at the last place where it can. */
-export function afterTrial(hand, trial) {
+function afterTrial(hand, trial) {
   const plane = trial.cuts[hand.part - 2], here = { plane, figures: trial };
   if (!trial.refused) return { ...hand, allowed: here, checked: trial.unchecked ? hand.checked : here, why: null, plane: hand.wanted };
   const allowed = alikePlanes(plane, hand.allowed.plane) ? hand.checked : hand.allowed;
@@ -92,17 +91,6 @@ function leavePlane() {
   const here = store.hand && store.state.cuts[store.hand.part - 2];
   if (here) send({ do: "try", part: store.hand.part, ...here });
   update({ hand: null });
-}
-
-/** A plane put where it is wanted or at the nearest place where it can be cut; moved(plane wanted, plane there): it stands. */
-function putNear(command, moved) {
-  const before = store.state.cuts;
-  ask({ ...command, near: true }, (refusal) => {
-    const { cuts } = store.state, k = cuts.findIndex((plane) => !before.some((other) => alikePlanes(plane, other)));
-    if (refusal || k < 0) return;
-    choosePart(k + 2);
-    moved(command, cuts[k]);
-  });
 }
 
 export const removePart = (part) => send({ do: "remove", part });
@@ -146,6 +134,7 @@ function sectionNow(picture) {
   return last.section;
 }
 
+/** Three knobs at the chosen plane: one moves it along its normal, two tilt it; by hand, finger or arrow keys. */
 export function handlesOf(picture) {
   let section = null; // of the chosen plane
   const placeOf = ({ tilts }) => {
@@ -185,28 +174,36 @@ export function handlesOf(picture) {
 
 const MOVED_MM = 0.01, MOVED_DEG = 0.05; // less is not told
 
-const normalOf = (tilt, towards) => {
-  const across = Math.sin(tilt * RAD);
-  return [across * Math.cos(towards * RAD), across * Math.sin(towards * RAD), Math.cos(tilt * RAD)];
-};
-
+/** The chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand. */
 export function planesPanel(picture) {
   let moved = { text: "", cuts: [] }; // what is told of a plane that was put near, as long as the planes are these
   const byPlane = (event, acts) => Object.entries(acts).forEach(([id, act]) => listen(event, { [id]: () => { if (planeNow()) act(store.part); } }));
-  const lean = (tilt, towards) => putPlane(leaned(normalOf(tilt, towards), picture));
-  const near = (command) => putNear(command, (wanted, there) => {
-    moved = { text: movedInWords(wanted, there), cuts: store.state.cuts };
-    tellPlane();
-  });
+  /** The chosen plane with another normal, turned about the middle of its cut. */
+  const lean = (tilt, towards) => {
+    const plane = planeNow(), about = sectionNow(picture)?.centre_mm || scaled(plane.normal, plane.offset_mm), across = Math.sin(tilt * RAD);
+    const normal = [across * Math.cos(towards * RAD), across * Math.sin(towards * RAD), Math.cos(tilt * RAD)];
+    putPlane({ normal, offset_mm: dot(normal, about) });
+  };
+  /** A plane put where it is wanted or at the nearest place where it can be cut. */
+  const near = (command) => {
+    const before = store.state.cuts;
+    ask({ ...command, near: true }, (refusal) => {
+      const { cuts } = store.state, k = cuts.findIndex((plane) => !before.some((other) => alikePlanes(plane, other)));
+      if (refusal || k < 0) return;
+      choosePart(k + 2);
+      moved = { text: movedInWords(command, cuts[k]), cuts };
+      tellPlane();
+    });
+  };
   const tellPlane = () => tellAll(alike(moved.cuts, store.state.cuts) ? moved.text : "");
-  const leanAsTyped = () => lean(Number($("plane-tilt").value), Number($("plane-towards").value));
+  const leanAsTyped = () => lean(numberIn("plane-tilt"), numberIn("plane-towards"));
   byPlane("click", {
     remove: removePart, neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
   });
   byPlane("change", {
-    "plane-offset": () => putPlane({ ...planeNow(), offset_mm: Number($("plane-offset").value) }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
+    "plane-offset": () => putPlane({ ...planeNow(), offset_mm: numberIn("plane-offset") }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
   });
-  onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), Number($("plane-towards").value)); });
+  onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), numberIn("plane-towards")); });
   listen("click", {
     "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(store.state.refused.near),
   });
@@ -217,12 +214,6 @@ export function planesPanel(picture) {
     if (hand) followHand(state, before);
   });
   subscribe(tellPlane);
-}
-
-/** The chosen plane with another normal, turned about the middle of its cut. */
-function leaned(normal, picture) {
-  const plane = planeNow(), about = sectionNow(picture)?.centre_mm || scaled(plane.normal, plane.offset_mm);
-  return { normal, offset_mm: dot(normal, about) };
 }
 
 /** The command for a level plane half way up, for a part printed after the one that is chosen. */
@@ -260,6 +251,7 @@ const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marke
 const TOUCH_COLOUR = [255, 221, 70, 255]; // seen on the red body and on the table
 const RING_SHARES = [1, 0.5]; // of that mark's size: rings on the table where the head would touch it
 
+/** What a refused plane is in the way of: the head where it would touch the table, or the places that are meant. */
 export function obstacleOf(picture) {
   subscribe(({ state, triangles, tab, hand }) => {
     if (!triangles || !state.model) return;

@@ -1,13 +1,13 @@
 // Print frame: the page of the print in the place of picture and panel, beside the tab that prints in the picture's alone; the two
 // pages tell each other what to show.
 
-import { $, listen, pressed, toggle } from "../../../../view/template/elements.js";
+import { $, hide, listen, pressed, toggle } from "../../../../view/template/elements.js";
 import { store, subscribe, update } from "../store.js";
 
 const frame = $("print-page"), heard = {}; // heard: what is done at what the page of the print says
 const post = (tiltprint, more = {}) => frame.contentWindow.postMessage({ tiltprint, ...more }, location.origin);
 
-/** {showFinding(its place in the list)}. The two pages look from the same side: each takes the view of the other when it is shown. */
+/** A function that shows a finding, by its place in the list. The two pages look from the same side: each takes the view of the other when it is shown. */
 export function printFrame(camera, picture) {
   let ready = false, finding = null; // finding: to be shown as soon as the page is ready
   const postView = () => post("view", { yaw: camera.yaw, pitch: camera.pitch });
@@ -36,7 +36,7 @@ export function printFrame(camera, picture) {
     const { state: { sliced }, looking, tab } = store, address = sliced ? `print/${sliced.key}` : "", there = frame.getAttribute("src") === address;
     toggle("looking", looking && tab !== "printing");
     pressed("look", looking);
-    frame.hidden = $("leave-print").hidden = !looking;
+    hide({ "print-page": !looking, "leave-print": !looking });
     if (looking && there && ready) postView();
     if (!looking || there) return;
     [ready, finding] = [false, null];
@@ -46,13 +46,11 @@ export function printFrame(camera, picture) {
     if (now.looking !== before.looking) show();
     if (now.dark !== before.dark && ready) post("theme", { dark: now.dark });
   });
-  return {
-    showFinding: (place) => {
-      update({ looking: true });
-      show();
-      if (ready) post("finding", { finding: place });
-      else finding = place;
-    },
+  return (place) => {
+    update({ looking: true });
+    show();
+    if (ready) post("finding", { finding: place });
+    else finding = place;
   };
 }
 
@@ -83,7 +81,7 @@ export function followIn(print) {
   };
   return () => {
     const runs = same() && print().progress && !print().over;
-    $("follow").hidden = !runs;
+    hide({ follow: !runs });
     tell();
     if (follows && (!store.looking || !runs)) set(false);
   };

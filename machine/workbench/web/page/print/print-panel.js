@@ -1,13 +1,12 @@
 // Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
 // whatever becomes of this page.
 
-import { $, alike, disable, hide, listen, made, needsKey, notice, sayIn, tell } from "../../../../view/template/elements.js";
-import { withWholeOptions } from "../lists.js";
+import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, sayIn, tell } from "../../../../view/template/elements.js";
+import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
+import { putNew, withWholeOptions } from "../lists.js";
 import { onNew, onState, update } from "../store.js";
-import { handPanel, keepHeats, showHand, showHeats, webcamPanel } from "./at-printer.js";
 import { followIn } from "./print-frame.js";
-import { askToNotify, hear, notifyOver, showBar, showPrint, showProgress, showWhich, silence, sure, titleOfPrints } from "./print-shown.js";
-import { OWN_PAGE, printsLine, stopsAsked } from "./prints-line.js";
+import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
 
 /** What is chosen of a list whose last entry is another one, typed. */
 function chosenOr(name, typed) {
@@ -17,11 +16,7 @@ function chosenOr(name, typed) {
 
 const port = () => chosenOr("port", "port-typed");
 
-let chosen = false; // by a person, now or the last time, or because no other one was found
-
-/** Whether there is a printer that needs not be asked for. */
-const printerIsChosen = () => chosen && Boolean(port());
-const printerChosen = () => { chosen = true; };
+let known = false; // the printer is chosen by a person, now or the last time, or because no other one was found
 
 function choosePort({ port: name, baud = $("baud").value, sim_speed: speed = $("sim-speed").value }) {
   $("baud").value = baud;
@@ -29,7 +24,7 @@ function choosePort({ port: name, baud = $("baud").value, sim_speed: speed = $("
   const listed = [...$("ports").querySelectorAll("input[name=port]")].find(({ value }) => value && value === name);
   if (!listed) $("port-typed").value = name;
   (listed || $("port-other")).checked = true;
-  printerChosen();
+  known = true;
   showPort();
 }
 
@@ -47,12 +42,12 @@ function unforce() {
 }
 
 function showPorts({ ports, asking, last_printer: last }, before) {
-  if (last && !chosen) choosePort(last);
+  if (last && !known) choosePort(last);
   disable({ "ask-ports": asking });
   tell({ "ports-told": asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "" });
   if (alike(ports, before.ports) && $("ports-found").children.length) return;
   offer("port", port(), (ports || []).map((device) => [device.port, device.port, [device.description, device.words].filter(Boolean).join(": ")]));
-  if (ports?.length === 1 && !chosen) choosePort({ port: ports[0].port });
+  if (ports?.length === 1 && !known) choosePort({ port: ports[0].port });
 }
 
 /** Prints that were cut off, those of the last run of the program among them. */
@@ -77,7 +72,8 @@ export function printPanel() {
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
   const print = () => state.prints.find((job) => job.number === chosen) || null;
   const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => !job.over);
-  const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
+  /** A command to the print that is looked at, if there is one. */
+  const toldTo = (command) => { if (print()) send({ ...command, print: print().number }); };
 
   function show(before) {
     const known = before.prints.map((job) => job.number), fresh = state.prints.findLast((job) => !known.includes(job.number));
@@ -110,7 +106,7 @@ export function printPanel() {
     showPrint(print(), commands());
     showBar(running(), print());
   }, 1000);
-  const where = () => ({ port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value) });
+  const where = () => ({ port: port(), baud: numberIn("baud"), sim_speed: numberIn("sim-speed") });
   const check = () => {
     send({ do: "check", ...where(), send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
     unforce();
@@ -119,9 +115,9 @@ export function printPanel() {
   const toPrint = () => {
     update({ looking: false });
     $("tab-printing").click();
-    if (printerIsChosen() && !state.prints.some((job) => !job.over && job.port === port())) check();
+    if (known && port() && !state.prints.some((job) => !job.over && job.port === port())) check();
   };
-  for (const event of ["change", "input"]) listen(event, { ports: () => { printerChosen(); showPort(); unforce(); } });
+  for (const event of ["change", "input"]) listen(event, { ports: () => { known = true; showPort(); unforce(); } });
   listen("focus", {
     "port-typed": () => { $("port-other").checked = true; $("ports").dispatchEvent(new Event("change")); },
     "journal-typed": () => { $("journal-other").checked = true; },
@@ -133,17 +129,17 @@ export function printPanel() {
     "go-on-with": () => send({ do: "go_on", ...where(), journal: chosenOr("journal", "journal-typed"), machine: $("rest-machine").value.trim() }),
     cancel: () => { sure(true); $("go-on").focus(); }, "go-on": () => sure(false), begin: askToNotify,
   });
-  for (const button of $("run").querySelectorAll("[data-print]")) button.addEventListener("click", () => { sure(false); command(button.dataset.print); });
+  onData("print", ({ print: name }) => { sure(false); toldTo({ do: name }); }, $("run"));
   webcamPanel(print);
-  handPanel((asked) => command("by_hand", asked));
+  handPanel((asked) => toldTo({ do: "by_hand", ...asked }));
   listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });
-  listen("change", { which: () => { chosen = Number($("which").value); sure(false); show(state); } });
+  listen("change", { which: () => { chosen = numberIn("which"); sure(false); show(state); } });
   for (const id of ["feed", "flow"]) {
     const letGo = () => delete $(id).dataset.held;
-    listen("input", { [id]: () => { $(id).dataset.held = true; $(`${id}-told`).textContent = `${$(id).value} %`; } });
+    listen("input", { [id]: () => { $(id).dataset.held = true; tell({ [`${id}-told`]: `${$(id).value} %` }); } });
     for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first, if any
     listen("blur", { [id]: letGo });
-    listen("change", { [id]: () => { letGo(); command(id, { percent: Number($(id).value) }); } });
+    listen("change", { [id]: () => { letGo(); toldTo({ do: id, percent: numberIn(id) }); } });
   }
   const stop = () => stops.press(Number($("emergency").dataset.print));
   listen("click", { emergency: stop });
@@ -157,18 +153,54 @@ export function printPanel() {
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
   onNew(({ sliced }) => sliced && [sliced.key, sliced.stale], () => { unforce(); problem(""); }); // what was found of others
   onState(({ lacking: { slices: why } }) => {
-    $("check").disabled = Boolean(why);
+    disable({ check: Boolean(why) });
     sayIn("unsliced", why && `Nothing to print: ${why}.`);
     follow();
   });
 }
 
 function problem(text) {
-  $("print-problem").replaceChildren(...withWholeOptions(text));
-  $("print-problem").hidden = !text;
+  putNew($("print-problem"), text, () => withWholeOptions(text));
+  hide({ "print-problem": !text });
 }
 
 function refused({ problem: text, forcible }) {
   problem(text);
-  if (forcible) $("force-line").hidden = false;
+  if (forcible) hide({ "force-line": false });
+}
+
+const SAME_PRESS_MS = 1000; // who presses twice in a fright means the print of the first time
+
+/** Emergency stops, and in the bar at the foot, which nothing covers, what has become of them, until a person has noted it. */
+function stopsAsked(prints, send, isOpen) {
+  let asked = new Set(), late = 0, pressed = { number: 0, at: -Infinity };
+  const going = ({ over }) => !over;
+  const stopped = () => prints().filter(({ number }) => asked.has(number));
+  const say = (text) => {
+    sayIn("stop-words", text);
+    hide({ "stop-told": !text, "print-bar": !text && $("emergency").hidden });
+  };
+  const doubt = () => {
+    if (stopped().length ? !stopped().some(going) : isOpen()) return;
+    say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
+  };
+  const ask = (number) => {
+    if (prints().some((job) => going(job) && job.number === number)) asked.add(number);
+    send({ do: "emergency", print: number });
+    if (!isOpen()) doubt();
+    clearTimeout(late);
+    late = setTimeout(doubt, ANSWER_MS);
+  };
+  listen("click", { "stop-noted": () => { if (!stopped().some(going)) asked = new Set(); say(""); } });
+  return {
+    /** number: of a print. */
+    press: (number) => {
+      const now = performance.now();
+      pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
+      ask(pressed.number);
+    },
+    /** One has waited too long for a line, or its print is not there any more. */
+    expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },
+    told: () => { if (stopped().length && !stopped().some(going)) say(stopped().map(({ name, sentence }) => `${name}: ${sentence}.`).join(" ")); },
+  };
 }

@@ -1,14 +1,15 @@
-// Print shown: a print's checks, its progress and its end, the bar on every tab while anything prints, and what is told of prints outside the page.
+// Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
 
-import { $, duration, hide, optionsOf, tell } from "../../../../view/template/elements.js";
+import { $, duration, hide, listen, onData, optionsOf, tell } from "../../../../view/template/elements.js";
 import { clock, listIn, putNew, tellIn } from "../lists.js";
+import { keptInTab } from "../store.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
 const FEW = 8;
 const HEARD = new Map(); // by the number of a print: what was heard of it last, and when
 let shownState = "";
 
-export const IN_HAND = "in hand";
+const IN_HAND = "in hand";
 /** States in which a print is under way, and in which the tip is away from it. */
 const LIVE = ["printing", "pausing", "paused", "resuming", "reconnecting", "finishing", "cancelling"];
 const AWAY = ["pausing", "paused"], COMMANDED = LIVE.filter((state) => state !== "cancelling");
@@ -158,4 +159,82 @@ export function notifyOver(prints, page) {
     }
     if (holder === page || heard.has(number)) heard.set(number, state);
   }
+}
+
+/** A printer that is heated and moved from the page, with nothing printed. ask({does, ...}): what is to be done at it. */
+export function handPanel(ask) {
+  const sure = (whether) => hide({ "hand-sure": !whether });
+  listen("click", { "hand-home": () => sure(true), "hand-not": () => sure(false) });
+  onData("hand", ({ hand: does, keep }) => { sure(false); ask({ does, keep_heat: keep === "yes" }); }, $("hand-live"));
+  onData("jog", ({ jog: [axis, way] }) => ask({ does: "jog", axis, by_mm: Number(`${way}${$("hand-step").value}`) }), $("hand-live"));
+}
+
+export function showHand(print, commands) {
+  hide({ "hand-live": print?.state !== IN_HAND || !commands });
+  for (const button of $("hand-jog").children) button.disabled = !print?.progress?.homed;
+}
+
+const EVERY_MS = 2000;
+
+/** A picture of the camera at a print server, anew every two seconds while it is looked at: of print(). It comes through the workbench, for
+ * the page loads nothing from elsewhere. */
+export function webcamPanel(print) {
+  let shown = "", asking = false;
+  const forget = () => {
+    hide({ "webcam-line": true });
+    if (shown) URL.revokeObjectURL(shown);
+    shown = "";
+  };
+  setInterval(async () => {
+    const job = print();
+    if (!job?.webcam || job.over) return forget();
+    if (asking || document.hidden || $("printing").hidden) return;
+    asking = true;
+    const answer = await fetch(`prints/${job.number}/webcam`).catch(() => null), picture = answer?.ok ? await answer.blob().catch(() => null) : null;
+    asking = false;
+    if (!picture || print()?.number !== job.number) return forget();
+    const before = shown;
+    $("webcam").src = shown = URL.createObjectURL(picture);
+    if (before) URL.revokeObjectURL(before);
+    hide({ "webcam-line": false });
+  }, EVERY_MS);
+}
+
+const KEPT_S = 600, WIDTH = 300, HEIGHT = 80; // of the drawing
+const HEATS = ["nozzle", "bed", "nozzleTarget", "bedTarget"];
+const kept = keptInTab("heats", { samples: [] }); // a reload loses nothing of them
+export const SAMPLES = new Map(kept.now.samples); // by the number of a print: {at_s, nozzle, bed, nozzleTarget, bedTarget}, oldest first
+
+addEventListener("pagehide", () => kept.keep({ samples: [...SAMPLES] }));
+
+/** Keep what is told of the temperatures of prints, once each. */
+export function keepHeats(prints) {
+  for (const number of SAMPLES.keys()) if (!prints.some((print) => print.number === number)) SAMPLES.delete(number);
+  for (const { number, progress } of prints) {
+    if (!progress || progress.nozzle_c == null) continue;
+    const own = SAMPLES.get(number) || [];
+    if (own.at(-1)?.at_s === progress.heat_s) continue;
+    own.push({ at_s: progress.heat_s, nozzle: progress.nozzle_c, bed: progress.bed_c, nozzleTarget: progress.nozzle_target_c, bedTarget: progress.bed_target_c });
+    while (own[0].at_s < progress.heat_s - KEPT_S) own.shift();
+    SAMPLES.set(number, own);
+  }
+}
+
+/** The ways of lines through samples, by name, in the drawing's own measure, and the greatest temperature, at its upper edge. */
+export function heatLines(samples, now_s) {
+  const values = samples.flatMap((sample) => HEATS.map((name) => sample[name])).filter((value) => value != null);
+  const most = Math.max(50, 50 * Math.ceil(Math.max(0, ...values) / 50));
+  const pointOf = ({ at_s: at }, value) => `${(WIDTH * (1 - (now_s - at) / KEPT_S)).toFixed(1)} ${(HEIGHT * (1 - value / most)).toFixed(1)}`;
+  const wayOf = (name) => samples.map((sample, k) => (sample[name] == null ? "" : (samples[k - 1]?.[name] == null ? "M" : "L") + pointOf(sample, sample[name]))).join("");
+  return { most, lines: Object.fromEntries(HEATS.map((name) => [name, wayOf(name)])) };
+}
+
+/** Nozzle and bed of a print over the last ten minutes, with what they are to be, where there are two temperatures of it. */
+export function showHeats(print) {
+  const samples = (print && SAMPLES.get(print.number)) || [];
+  hide({ heat: samples.length < 2 });
+  if (samples.length < 2) return;
+  const { most, lines } = heatLines(samples, samples.at(-1).at_s);
+  for (const [name, way] of Object.entries(lines)) $(`heat-${name}`).setAttribute("d", way);
+  tell({ "heat-most": `${most} °C` });
 }

@@ -1,7 +1,7 @@
 // Clicks: what the next click on the model is for, and what it does.
 
-import { $, listen, notice, pressed } from "../../../../view/template/elements.js";
-import { layFacet } from "../model/resting.js";
+import { $, disable, listen, notice, pressed } from "../../../../view/template/elements.js";
+import { layFacet } from "../model/model.js";
 import { markAt, markWord } from "../parts/marks-panel.js";
 import { openMenu } from "../parts/parts-panel.js";
 import { apartNow, pieceMet, shiftsOf } from "../parts/pieces.js";
@@ -10,24 +10,24 @@ import { store, subscribe, update } from "../store.js";
 import { faceMet, placeMet } from "./triangles.js";
 
 const STILL_PIXELS = 4; // a hand that moves less only clicks
-const BUTTONS = { lay: "lay", snap: "snap", limb: "limb", faces: "mark-faces", box: "mark-box" };
+const NEEDS_PICTURE = ["faces", "box"];
+/** Of what a click can be for: the button that asks for it, and what is said then. */
 const WANTED = {
-  lay: () => "Click a lit face: it can rest on that.", snap: () => "Click the face whose plane it is to take.",
-  limb: () => "Click the limb above the plane that is to come off alone; the others stay.",
-  faces: () => `Click where there is to be ${markWord()}; Esc ends it.`, box: () => (store.corner ? "Now the opposite corner." : "Click a corner of the box."),
+  lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take."],
+  limb: ["limb", () => "Click the limb above the plane that is to come off alone; the others stay."],
+  faces: ["mark-faces", () => `Click where there is to be ${markWord()}; Esc ends it.`],
+  box: ["mark-box", () => (store.corner ? "Now the opposite corner." : "Click a corner of the box.")],
 };
 
 export function clicksOf(picture) {
-  for (const [clicks, id] of Object.entries(BUTTONS)) {
-    $(id).addEventListener("click", () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }));
-    if (!["lay", "snap", "limb"].includes(clicks)) $(id).disabled = !picture;
-  }
+  for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }) });
+  NEEDS_PICTURE.forEach((clicks) => disable({ [WANTED[clicks][0]]: !picture }));
   if (picture) menuOf($("canvas"), picture);
   listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
     if (now.clicks && now.tab !== before.tab) update({ clicks: "", corner: null });
-    for (const [clicks, id] of Object.entries(BUTTONS)) pressed(id, now.clicks === clicks);
-    notice(WANTED[now.clicks]?.() || "", "hand");
+    for (const [clicks, [id]] of Object.entries(WANTED)) pressed(id, now.clicks === clicks);
+    notice(WANTED[now.clicks]?.[1]() || "", "hand");
   });
 }
 

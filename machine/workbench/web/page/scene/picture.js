@@ -1,12 +1,11 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
 import { nextFrame } from "../../../../view/template/elements.js";
-import { bodiesOf, FROM_BELOW, ON_PLATE } from "../../../../view/template/picture/bodies.js";
 import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
 import { add, bounds, carried, cornersOf, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
-import { beside, cutsOf, planesOf } from "../../../../view/template/picture/model.js";
-import { bodyOf, boxEdges, MOST_CUTS, solidOf, trianglesOf } from "../../../../view/template/picture/solids.js";
+import { beside, bodiesOf, boxEdges, cutsOf, FROM_BELOW, ON_PLATE, planesOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { bodyOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";

@@ -16,7 +16,7 @@ export function trianglesFrom(buffer) {
   }
   const middle = points ? scaled(add(...bounds(vertices)), 0.5) : [0, 0, 0];
   let reach = 1;
-  for (let i = 0; i < vertices.length; i += 3) reach = Math.max(reach, Math.hypot(vertices[i] - middle[0], vertices[i + 1] - middle[1], vertices[i + 2] - middle[2]));
+  for (let i = 0; i < vertices.length; i += 3) reach = Math.max(reach, Math.hypot(...middle.map((x, k) => vertices[i + k] - x)));
   return { vertices, faces, corners, normals, areas, count, reach_mm: reach };
 }
 

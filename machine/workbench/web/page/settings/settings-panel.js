@@ -1,7 +1,7 @@
 // Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
 // changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
-import { $, button, disable, hide, listen, made, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
+import { $, button, disable, hide, listen, made, numberIn, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
 import { putNew, putRows } from "../lists.js";
 import { keptInTab, onNew, onState, store } from "../store.js";
@@ -15,7 +15,7 @@ export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   const explained = new Set();
   let settings = [], missed = false, changedOnly = false; // missed: they have not come
-  const part = () => Number($("settings-part").value) || 0;
+  const part = () => numberIn("settings-part") || 0;
   const set = (key, value, typed) => {
     const of = part();
     ask(of ? { do: "set_part", part: of, key, value } : { do: "set", key, value }, (refusal) => {
@@ -30,7 +30,7 @@ export function settingsPanel() {
   /** What is refused stands beside its field, whatever is told next. */
   const tellBeside = () => {
     const beside = [...wrongs.values()].some(({ text }) => text === store.state.problem);
-    if (beside && store.tab === "settings") $("problem").hidden = true;
+    if (beside && store.tab === "settings") hide({ problem: true });
   };
   const sought = () => $("search-settings").value.toLowerCase().split(/\s+/).filter(Boolean).map(stem);
   const shown = (setting) => {
@@ -45,7 +45,7 @@ export function settingsPanel() {
     disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
     tellTakeBack(changed, part());
     for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
-    const groups = groupedBy(rows, ({ group }) => group);
+    const groups = Map.groupBy(rows, ({ group }) => group);
     putRows([...groups].flatMap(([group, own]) => {
       const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
       const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key)]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
@@ -89,7 +89,7 @@ export function settingsPanel() {
   for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
   onNew(({ given, part_settings: own, parts, model, rotation, stops, copies }) => [given, own, parts, model?.name, rotation, stops, copies], () => {
     partsToChoose(store.state);
-    missed = true;
+    fetchAll();
   });
   onState(() => {
     tellBeside();
@@ -119,15 +119,9 @@ function farFrom(setting, words) {
   return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));
 }
 
-function groupedBy(rows, nameOf) {
-  const groups = new Map();
-  for (const row of rows) groups.set(nameOf(row), [...(groups.get(nameOf(row)) || []), row]);
-  return groups;
-}
-
 /** Whose changes there are, with a button for each profile that has some, and one for all. */
 function tellTakeBack(changed, part) {
-  const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
+  const counts = Map.groupBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
   for (const kind of KINDS) {
     const count = counts.get(kind)?.length || 0;
     tell({ [`reset-${kind}`]: `Those of the ${kind} (${count})` });

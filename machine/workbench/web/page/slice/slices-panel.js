@@ -1,6 +1,6 @@
 // Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, and what one piece would cost.
 
-import { $, disable, findingButton, hide, listen, made, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, disable, findingButton, hide, listen, made, numberIn, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
 import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
 import { send } from "../line.js";
@@ -67,7 +67,7 @@ function showFindings(sliced, showFinding) {
 
 export function stopsPanel() {
   let adding = false; // what was typed stays until it is taken
-  listen("change", { copies: () => send({ do: "copies", count: Number($("copies").value) }) });
+  listen("change", { copies: () => send({ do: "copies", count: numberIn("copies") }) });
   listen("submit", { "add-stop": (event) => {
     event.preventDefault();
     adding = true;
@@ -121,7 +121,7 @@ function bandsOf(bytes, colour) {
   return { places, colours: new Uint8Array(colours.buffer) };
 }
 
-/** The parts of the slices that are made, or lie there and are not out of date, while the slices are looked at. */
+/** What is seen of the parts that are sliced, as they become ready or while they are not out of date, over the faint model and its copies. */
 export function wallsOf(picture) {
   let number = 0, asked = new Set(); // of the slices whose walls are there, or asked for
   const fetchPart = async (part, of) => {

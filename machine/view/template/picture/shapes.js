@@ -1,0 +1,201 @@
+// Shapes: triangles and lines of the machine's bodies, of the parts' surfaces, the planes of the cuts and the directions of printing.
+
+import { add, cornersOf, cross, scaled, unit } from "./math.js";
+import { RED, rgb, wordOf } from "./solids.js";
+
+/** Corners of triangles put together, all of one colour a piece. */
+export function trianglesOf(pieces) {
+  const places = [], colours = [];
+  for (const { corners, colour } of pieces)
+    for (const corner of corners) {
+      places.push(...corner);
+      colours.push(...colour);
+    }
+  return { places: new Float32Array(places), colours: new Uint8Array(colours) };
+}
+
+const quad = (a, b, c, d) => [a, b, c, a, c, d];
+
+const SIDES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]; // of a box, by its corners
+
+export function boxCorners(least, most) {
+  const corners = cornersOf([least, most]);
+  return SIDES.flatMap((side) => quad(...side.map((k) => corners[k])));
+}
+
+export function boxEdges(least, most) {
+  const corners = cornersOf([least, most]);
+  return corners.flatMap((corner, k) => [1, 2, 4].filter((bit) => !(k & bit)).flatMap((bit) => [corner, corners[k | bit]]));
+}
+
+export const circle = (radius, z, steps) => Array.from({ length: steps }, (_, k) => {
+  const angle = (2 * Math.PI * k) / steps;
+  return [radius * Math.cos(angle), radius * Math.sin(angle), z];
+});
+
+/** The surface of an outline [radius, z] turned about z. */
+function revolved(outline, steps = 64) {
+  const rings = outline.map(([radius, z]) => circle(radius, z, steps));
+  return rings.slice(1).flatMap((ring, i) => ring.flatMap((_, k) => {
+    const next = (k + 1) % steps;
+    return quad(rings[i][k], rings[i][next], ring[next], ring[k]);
+  }));
+}
+
+export const chained = (points) => points.flatMap((point, k) => [point, points[(k + 1) % points.length]]);
+
+const HEAD_ABOVE_MM = 12; // how far the hot end is drawn above the last height that the profile tells
+const NOZZLE_MM = 6; // what lies within is drawn as the nozzle
+const ROUND = 96;
+export const ON_PLATE = 1e-5; // in depth, by which the plate's lines are seen before it
+export const FROM_BELOW = { strength: 0.18 }; // how the plate is drawn then, or it would hide everything
+
+/** Shapes of all that the machine is, {solid, lines} each, by name; hotEnd: of the head, above the nozzle. */
+export function bodiesOf(machine, dark) {
+  const plate = dark ? [66, 72, 81, 255] : [232, 235, 239, 255], frame = dark ? [112, 121, 134, 255] : [190, 196, 205, 255];
+  const line = dark ? [120, 128, 140, 110] : [120, 126, 136, 120], edge = dark ? [170, 178, 190, 190] : [70, 76, 86, 170];
+  return {
+    table: { solid: trianglesOf([{ corners: plateCorners(machine.table), colour: plate }]), lines: trianglesOf(plateLines(machine.table, line, edge)) },
+    cradle: boxesOf(machine.cradle, frame, edge),
+    ...headOf(machine.head, frame, edge),
+  };
+}
+
+export function boxesOf(boxes, colour, edge) {
+  return {
+    solid: trianglesOf(boxes.map((box) => ({ corners: boxCorners(box.min_mm, box.max_mm), colour }))),
+    lines: trianglesOf(boxes.map((box) => ({ corners: boxEdges(box.min_mm, box.max_mm), colour: edge }))),
+  };
+}
+
+function plateCorners({ radius_mm: radius, size_mm: size, thickness_mm: thick }) {
+  if (size) return boxCorners([-size[0] / 2, -size[1] / 2, -thick], [size[0] / 2, size[1] / 2, 0]);
+  return revolved([[0, -thick], [radius, -thick], [radius, 0], [0, 0]], 96);
+}
+
+/** Rings and spokes, by which a turn of the plate is seen; a longer stroke marks the workpiece's +x. */
+function plateLines({ radius_mm: radius, size_mm: size }, line, edge) {
+  const step = radius > 120 ? 50 : radius > 40 ? 20 : 10, z = 0.05, pieces = [];
+  if (size) {
+    const [a, b] = [size[0] / 2, size[1] / 2], rows = [];
+    for (let x = -Math.floor(a / step) * step; x <= a; x += step) rows.push([x, -b, z], [x, b, z]);
+    for (let y = -Math.floor(b / step) * step; y <= b; y += step) rows.push([-a, y, z], [a, y, z]);
+    const rim = chained([[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]]);
+    pieces.push({ corners: rows, colour: line }, { corners: [...rim, [0, 0, z], [a, 0, z]], colour: edge });
+    return pieces;
+  }
+  for (let r = step; r < radius; r += step) pieces.push({ corners: chained(circle(r, z, 96)), colour: line });
+  const spokes = circle(radius, z, 12).flatMap((place) => [scaled(place, step / radius), place]);
+  pieces.push({ corners: spokes, colour: line }, { corners: chained(circle(radius, z, 96)), colour: edge });
+  pieces.push({ corners: [[0, 0, z], [radius, 0, z]], colour: edge });
+  return pieces;
+}
+
+export function headOf({ silhouette_mm: silhouette, boxes }, colour, edge) {
+  const [least, [radius, height]] = [silhouette[0], silhouette[silhouette.length - 1]];
+  const top = height + HEAD_ABOVE_MM;
+  const outline = [[0, least[1]], ...silhouette, [radius, top], [0, top]];
+  const brass = [205, 154, 66, 255], low = silhouette.filter(([r, h]) => r <= NOZZLE_MM && h <= NOZZLE_MM).length;
+  return {
+    nozzle: { solid: trianglesOf([{ corners: revolved(outline.slice(0, low + 1), ROUND), colour: brass }]) },
+    hotEnd: { solid: trianglesOf([{ corners: revolved(outline.slice(low), ROUND), colour }]) },
+    boxes: boxesOf(boxes, colour, edge),
+  };
+}
+
+const LEFT = { none: 0, printed: 1, straight: 2 };
+
+/** Corners of all faces and, a part each, which of them are its own. */
+export function surfacesOf({ header, array }) {
+  const vertices = array("vertices"), faces = array("faces"), [marks] = array("face_marks");
+  if (!faces[0].length) return null;
+  const places = new Float32Array(9 * faces[0].length);
+  for (let face = 0, at = 0; face < faces[0].length; face++)
+    for (let corner = 0; corner < 3; corner++)
+      for (let axis = 0; axis < 3; axis++) places[at++] = vertices[axis][faces[corner][face]] / 1000;
+  const meshed = header.parts.filter((part) => part.mesh);
+  const parts = meshed.map((part) => ({ part, range: part.mesh.faces.map((face) => 3 * face) }));
+  const surfaces = { places, marks, parts };
+  return { ...surfaces, apart: apartOf(surfaces) };
+}
+
+/** Colours of all corners: red where a face is risky in the way asked for (none, printed, straight), else as inkOf(part) gives them for a face. */
+export function surfaceColours({ marks, parts }, inkOf, risky) {
+  const words = new Uint32Array(3 * marks.length), red = wordOf(RED);
+  for (const described of parts) {
+    const [first, end] = described.range, ink = inkOf(described);
+    for (let face = first / 3; face < end / 3; face++) words.fill(marks[face] & LEFT[risky] ? red : ink(face), 3 * face, 3 * face + 3);
+  }
+  return new Uint8Array(words.buffer);
+}
+
+/** For surfaceColours: every part in its own colour. */
+export const ownInk = ({ part }) => {
+  const word = wordOf(rgb(part.colour), 254);
+  return () => word;
+};
+
+/** A row of the front for the drawing of solids: the colours of its parts, and the planes between them. */
+export function cutsOf({ planes, colours }) {
+  return {
+    count: planes.length,
+    planes: new Float32Array(planes.flatMap(({ normal, offset_mm: offset }) => [...normal, offset])),
+    hues: new Float32Array(colours.flatMap((colour) => rgb(colour).map((x) => x / 255))),
+  };
+}
+
+/** Which way each part goes when the model is drawn apart: along its direction, and with what it stands on. Part -> vector. */
+function apartOf({ places, parts }) {
+  const ways = new Map();
+  parts.forEach(({ part }, k) => {
+    const below = k ? nearest(places, parts.slice(0, k), part.base.centre_mm) : null;
+    ways.set(part, below ? add(ways.get(below), part.direction) : [0, 0, 0]);
+  });
+  return ways;
+}
+
+/** The part whose surface comes nearest to a place. */
+function nearest(places, parts, [x, y, z]) {
+  let best = null, least = Infinity;
+  for (const { part, range } of parts)
+    for (let i = 3 * range[0]; i < 3 * range[1]; i += 3) {
+      const way = (places[i] - x) ** 2 + (places[i + 1] - y) ** 2 + (places[i + 2] - z) ** 2;
+      if (way < least) [best, least] = [part, way];
+    }
+  return best;
+}
+
+/** Two vectors across a direction. */
+export function beside(direction) {
+  const a = unit(cross(Math.abs(direction[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], direction));
+  return [a, cross(direction, a)];
+}
+
+/** The disc of a cut, 72 corners about its middle. */
+function discOf({ normal, centre_mm: centre, radius_mm: radius }) {
+  const [a, b] = beside(normal);
+  return circle(radius * 1.12, 0, 72).map(([u, v]) => add(centre, add(scaled(a, u), scaled(b, v))));
+}
+
+export const based = (parts) => parts.filter((part) => part.base && part.direction && part.base.radius_mm > 0);
+
+/** Discs where the parts are cut, their rims, and an arrow along each part's direction: as many corners a part. */
+export function planesOf(parts, colourOf) {
+  const discs = [], rims = [];
+  for (const part of based(parts)) {
+    const disc = discOf(part.base), colour = [...colourOf(part), 255];
+    discs.push({ corners: disc.flatMap((place, k) => [part.base.centre_mm, place, disc[(k + 1) % disc.length]]), colour });
+    rims.push({ corners: chained(disc), colour });
+  }
+  return { discs: trianglesOf(discs), rims: trianglesOf(rims) };
+}
+
+export function arrowsOf(parts, colourOf, span) {
+  const outline = [[0, 0], [0.036, 0], [0.036, 0.72], [0.1, 0.72], [0, 1]].map((place) => place.map((x) => 0.3 * span * x));
+  const surface = revolved(outline, 24);
+  return trianglesOf(based(parts).map((part) => {
+    const [a, b] = beside(part.direction);
+    const place = ([u, v, w]) => add(part.base.centre_mm, add(add(scaled(a, u), scaled(b, v)), scaled(part.direction, w)));
+    return { corners: surface.map(place), colour: [...colourOf(part), 255] };
+  }));
+}
