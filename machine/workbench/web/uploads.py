@@ -127,7 +127,7 @@ class Uploads:
             await session.take_given(f"take {path.name}", lambda given: named(given, kind, copy))
         except ProfileError as error:
             remove_file(Path(copy))
-            raise ProfileError(str(error).replace(f"{Path(copy).parent}{os.sep}", "")) from None
+            raise ProfileError(f"{error}".replace(f"{Path(copy).parent}{os.sep}", "")) from None
         return True
 
     async def _open(

@@ -173,6 +173,6 @@ def do(task: Callable[..., Value], *given: Any) -> tuple[Value | None, str]:
     try:
         return task(tell, *given), ""
     except UserError as error:
-        return None, str(error)
+        return None, f"{error}"
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence, and the workbench goes on
         return None, bug_in_words(error, sys.argv)
