@@ -297,12 +297,6 @@ def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: P
     return replace(bare, profile=profile, rotation=rotation, cuts=plan.parts, zones=plan.zones, rows=tuple(rows))
 
 
-def with_parts(bench: Bench, count: int) -> Bench:
-    """The bench with the row of the front taken that has `count` parts. Raises KeyError where there is none."""
-    rows = {row.parts: row for row in bench.rows}
-    return with_cuts(bench, planned_parts(rows[count]))
-
-
 def plan_of_bench(bench: Bench, name: str) -> PlanFile:
     """What is to be cut, as a plan's file says it. The model is the one on the bench, so it needs no sha256."""
     orientation = None if bench.rotation == STANDING else bench.rotation
