@@ -366,6 +366,7 @@ class Workbench:
         self.sessions: dict[int, Session] = {}
         self.pools = WorkerPools()
         self._make = make
+        self._benches: list[dict[str, Any]] = []
         self._closing: dict[int, asyncio.Task[str]] = {}
         self._last = 0
 
@@ -376,6 +377,7 @@ class Workbench:
             raise PlanError(f"{MOST_SESSIONS} benches are open, which is the most: close one first")
         self._last += 1
         self.sessions[self._last] = session = self._make(self.pools)
+        session.benches = self._benches
         if like is not None:
             session.history = History(Step("", emptied(like.bench)))
         session.listeners.append(self._list_again)
@@ -406,7 +408,7 @@ class Workbench:
 
     def _list_again(self) -> None:
         benches = [{"number": number, **session.described()} for number, session in self.sessions.items()]
-        for session in self.sessions.values():
-            if session.benches != benches:
-                session.benches = benches
+        if benches != self._benches:
+            self._benches[:] = benches
+            for session in self.sessions.values():
                 session.notify()

@@ -70,7 +70,8 @@ class WorkerPool:
     async def worker(self, tasks: "TaskQueue") -> AsyncIterator[Worker]:
         """A process for one of these tasks, in the order in which they are asked for. Whoever leaves with an error ends it."""
         async with self._places:
-            tasks.check_open()
+            if tasks.closed:
+                raise UserError(CLOSED)
             worker = self._take(tasks)
             self._busy.append(worker)
             try:
@@ -123,7 +124,7 @@ class TaskQueue:
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
         self._lock = asyncio.Lock()
-        self._closed = False
+        self.closed = False
 
     async def warm(self) -> None:
         """Start a process before it is needed, if there may be one more."""
@@ -144,14 +145,9 @@ class TaskQueue:
         result: Value = value
         return result
 
-    def check_open(self) -> None:
-        """Raises UserError when its session is closed."""
-        if self._closed:
-            raise UserError(CLOSED)
-
     def close(self) -> None:
         """End the processes that work for it or hold anything of it; whatever still waits for one is refused."""
-        self._closed = True
+        self.closed = True
         self.pool.end(self)
 
     async def _ask(self, task: Callable[..., Any], *given: Any, tell: Tell = lambda value: None) -> Any:
