@@ -48,7 +48,7 @@ def _defined(body: list[ast.stmt], steps: list[str]) -> bool:
     if not steps:
         return True
     for node in body:
-        if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name == steps[0]:
+        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.name == steps[0]:
             return _defined(node.body if isinstance(node, ast.ClassDef) else [], steps[1:])
         targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
         if any(isinstance(target, ast.Name) and target.id == steps[0] for target in targets):

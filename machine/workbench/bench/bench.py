@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import atan2
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from machine.workbench.bench.values import vector_of
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
 from mdp.overhang import UP
+from mdp.pose import about
 from mdp.search.front import Weights, choose, pays
 from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
@@ -296,12 +298,6 @@ def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: P
     return replace(bare, profile=profile, rotation=rotation, cuts=plan.parts, zones=plan.zones, rows=tuple(rows))
 
 
-def with_parts(bench: Bench, count: int) -> Bench:
-    """The bench with the row of the front taken that has `count` parts. Raises KeyError where there is none."""
-    rows = {row.parts: row for row in bench.rows}
-    return with_cuts(bench, planned_parts(rows[count]))
-
-
 def plan_of_bench(bench: Bench, name: str) -> PlanFile:
     """What is to be cut, as a plan's file says it. The model is the one on the bench, so it needs no sha256."""
     orientation = None if bench.rotation == STANDING else bench.rotation
@@ -318,17 +314,7 @@ def locked_plan(bench: Bench) -> PlanFile:
 def laid_down(bench: Bench, normal: Floats) -> Floats:
     """(3, 3) the rotation that lays a face of this outward normal, of the model as it is read, on the platform the short way."""
     now = np.array(bench.rotation)
-    return np.asarray(_shortest(now @ normal, -UP) @ now)
-
-
-def _shortest(start: Floats, end: Floats) -> Floats:
-    """(3, 3) the least rotation that carries one unit vector into another."""
-    across, along = np.cross(start, end), float(start @ end)
-    if along < -1.0 + 1e-12:  # half a turn, about any axis across
-        axis = np.eye(3)[int(np.argmin(np.abs(start)))]
-        axis = axis - (axis @ start) * start
-        axis /= np.linalg.norm(axis)
-        return np.asarray(2.0 * np.outer(axis, axis) - np.eye(3))
-    x, y, z = across
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + along))
+    across = np.cross(now @ normal, -UP)
+    length = float(np.linalg.norm(across))
+    axis = across / length if length > 0.0 else np.eye(3)[0]  # half a turn about any axis across, or none
+    return np.asarray(about(axis, atan2(length, float(now @ normal @ -UP))) @ now)

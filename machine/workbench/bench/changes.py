@@ -14,13 +14,13 @@ from pydantic import Field
 
 from machine.pipeline.requests import MOST_COPIES
 from machine.planning.stops import parse_stops
-from machine.workbench.bench.bench import Bench, laid_down, with_parts, with_rotation
+from machine.workbench.bench.bench import Bench, laid_down, with_cuts, with_rotation
 from machine.workbench.bench.part_settings import with_part_setting, without_part_settings
 from machine.workbench.bench.values import Direction, Mm, Point, Rotation, check_number
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Floats, Mesh
 from mdp.pose import about
-from mdp.search.plan_file import PlannedPart
+from mdp.search.plan_file import PlannedPart, planned_parts
 from mdp.search.plan_reading import MOST_ZONES
 from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones
 from profiles.errors import PlanError
@@ -59,11 +59,11 @@ def lay(bench: Bench, *, normal: Direction) -> Bench:
 
 def take(bench: Bench, *, parts: int) -> Bench:
     """Take the row of the front that has this number of parts."""
-    numbers = [row.parts for row in bench.rows]
-    if parts not in numbers:
-        allowed = ", ".join(map(str, numbers)) or "nothing, for no parts have been found,"
+    rows = {row.parts: row for row in bench.rows}
+    if parts not in rows:
+        allowed = ", ".join(map(str, rows)) or "nothing, for no parts have been found,"
         raise PlanError(f"parts is {parts}: {allowed} is allowed")
-    taken = with_parts(bench, parts)
+    taken = with_cuts(bench, planned_parts(rows[parts]))
     return bench if taken.cuts == bench.cuts else taken
 
 

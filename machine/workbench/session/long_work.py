@@ -9,8 +9,8 @@ import numpy as np
 from machine.program import Alternative
 from machine.workbench.bench.bench import Bench, locked_plan, rows_to_price, with_front, with_prices, with_rotation
 from machine.workbench.session.base import WAITING, Derived, SessionBase
-from machine.workbench.work.cutting import Found, Searched
-from machine.workbench.work.slices import Sliced, SlicesSoFar
+from machine.workbench.work.cutting import Found, Searched, find_parts, price_row
+from machine.workbench.work.slices import Sliced, SlicesSoFar, compare_bench, slice_bench
 from mdp.decomposition import FrontRow
 from mdp.ranking.ranker import CLASSIC
 from profiles.errors import PlanError, UserError
@@ -31,7 +31,7 @@ class Finding(Derived[Found]):
         super().__init__(
             session,
             lambda bench: None if bench.model is None else (bench.sought, locked_plan(bench).parts),
-            lambda bench: session.long.run("find_parts", bench, *self._how, tell=self.teller()),
+            lambda bench: session.long.run(find_parts, bench, *self._how, tell=self.teller()),
             by_itself=False,
             interrupts=True,
             accept=self._accept_found,
@@ -73,7 +73,7 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
         for row in rows_to_price(bench):
             if not prices_now.stale:
                 with suppress(UserError):  # then it has none
-                    prices[row] = await session.long.run("price_row", bench, row)
+                    prices[row] = await session.long.run(price_row, bench, row)
         return prices
 
     def accept(prices: dict[int, FrontRow]) -> None:
@@ -148,7 +148,7 @@ class Slicing(Derived[Slices]):
             tell(replace(so_far, walls=walls))
 
         files = self._session.new_file(), self._session.new_file()
-        sliced: Sliced = await self._session.long.run("slice_bench", bench, *files, tell=follow)
+        sliced = await self._session.long.run(slice_bench, bench, *files, tell=follow)
         if self.done is not None:
             self.done.sliced.page.unlink(missing_ok=True)
             self.done.sliced.gcode.unlink(missing_ok=True)
@@ -163,7 +163,7 @@ class Comparing(Derived[tuple[Alternative, ...]]):
         super().__init__(
             session,
             lambda bench: None if (slices := slicing.latest()) is None else slices.bench.printed,
-            lambda bench: session.long.run("compare_bench", bench, tell=self.teller()),
+            lambda bench: session.long.run(compare_bench, bench, tell=self.teller()),
             by_itself=False,
             interrupts=True,
         )

@@ -11,9 +11,9 @@ from typing import Any
 from machine.workbench.bench.bench import Bench, with_cuts, with_zones
 from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, snap
 from machine.workbench.bench.values import Asked, vector_of
-from machine.workbench.session.base import Derived, SessionBase, asking
-from machine.workbench.work.models import Resting, Standing
-from mdp.plane import Plane
+from machine.workbench.session.base import Derived, SessionBase, Value, asking
+from machine.workbench.work.cutting import load_kernels, make_ready, near_neck, nearest, try_cuts
+from machine.workbench.work.models import Resting, Standing, mark, rank_resting, stand
 from mdp.read import MANY_FACES
 from mdp.search.neck import REACH_DEG, REACH_SHARE
 from mdp.search.plan_file import PlannedPart
@@ -33,8 +33,9 @@ class Readiness(Derived[None]):
     already; very large models wait for the first plane."""
 
     def __init__(self, session: SessionBase) -> None:
-        self._numbered: Bench | None = None  # the last one
         self._number = 0
+        self._solid: tuple[object, ...] = (None, None, None)  # what is cut on the bench of that number
+        self._profile = session.bench.profile
         self._model = ""  # key of that of the bench that was made ready last
         super().__init__(
             session,
@@ -45,20 +46,20 @@ class Readiness(Derived[None]):
     def load(self) -> None:
         """Load what all planes need, while the first model is read."""
         if not self._number:
-            self._session.start(self._session.hand.run("load_kernels"))
+            self._session.start(self._session.hand.run(load_kernels))
 
-    async def ask(self, task: str, bench: Bench, *given: Any) -> Any:
-        """What a task of work.trials says of a bench."""
+    async def ask(self, task: Callable[..., Value], bench: Bench, *given: Any) -> Value:
+        """What a task says of a bench by its number."""
         return await self._session.hand.run(task, self._number_of(bench), bench, *given)
 
     def _number_of(self, bench: Bench) -> int:
         """The number of a bench, that of the last one where what was made ready for that serves this one, too: planes read of a
         profile what a search does."""
-        before, self._numbered = self._numbered or Bench(bench.profile), bench
-        keys = [of.model and (of.model.key, of.rotation) for of in (before, bench)]
-        alike = keys[0] == keys[1] and before.zones is bench.zones
-        if not alike or effect_of_change(before.profile, bench.profile) >= Effect.REACH:
+        solid, profile = (bench.model and bench.model.key, bench.rotation, bench.zones), bench.profile
+        is_another = any(new is not old for new, old in zip(solid, self._solid, strict=True))
+        if is_another or effect_of_change(self._profile, profile) >= Effect.REACH:
             self._number = next(_numbers)
+        self._solid, self._profile = solid, profile
         return self._number
 
     async def _prepare(self, bench: Bench) -> None:
@@ -68,19 +69,19 @@ class Readiness(Derived[None]):
             return
         self._model = bench.model.key
         self.tell(True)
-        await self._session.hand.run("make_ready", self._number_of(bench), bench)
+        await self._session.hand.run(make_ready, self._number_of(bench), bench)
 
 
 def standing_of(session: SessionBase) -> Derived[Standing]:
     """How the model on the bench stands."""
 
-    async def stand(bench: Bench) -> Standing:
-        standing: Standing = await session.hand.run("stand", bench)
+    async def find(bench: Bench) -> Standing:
+        standing = await session.hand.run(stand, bench)
         if standing.refusal:
             session.refuse(MeshError(standing.refusal))
         return standing
 
-    return Derived(session, _stands_by, stand)
+    return Derived(session, _stands_by, find)
 
 
 def _stands_by(bench: Bench) -> tuple[object, ...] | None:
@@ -105,8 +106,7 @@ def resting_of(session: SessionBase, readiness: Readiness) -> Derived[tuple[Rest
 
     async def rank(bench: Bench) -> tuple[Resting, ...]:
         await readiness.wait()
-        ranked: tuple[Resting, ...] = await session.quick.run("rank_resting", bench.model, session.bench.profile.of_all_parts)
-        return ranked
+        return await session.quick.run(rank_resting, bench.model, session.bench.profile.of_all_parts)
 
     return Derived(session, lambda bench: bench.model, rank)
 
@@ -149,9 +149,9 @@ class PlaneTrials:
         trial = await self.attempt(bench, cuts)
         if trial.rejected and edit.near:
             with self._session.waiting("looking for the nearest place that can be cut"):
-                nearest: Cuts | None = await self._readiness.ask("nearest", bench, edit.orders)
-            if nearest is not None:
-                cuts, trial = nearest, await self.attempt(bench, nearest)
+                nearby = await self._readiness.ask(nearest, bench, edit.orders)
+            if nearby is not None:
+                cuts, trial = nearby, await self.attempt(bench, nearby)
         if trial.rejected:
             self.settle()
             self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
@@ -167,7 +167,7 @@ class PlaneTrials:
         assert bench.model is not None
         reach_mm = REACH_SHARE * hypot(*bench.model.size_mm)
         with self._session.waiting(f"looking for a neck near the plane of part {part}"):
-            neck: Plane | None = await self._readiness.ask("near_neck", bench, bench.cuts, part, reach_mm)
+            neck = await self._readiness.ask(near_neck, bench, bench.cuts, part, reach_mm)
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
             raise PlanError(f"there is no neck near the plane of part {part}: {where}")
@@ -177,7 +177,7 @@ class PlaneTrials:
 
     async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
         """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
-        trial: Trial = await self._readiness.ask("try_cuts", bench, cuts, most_cuts)
+        trial: Trial = await self._readiness.ask(try_cuts, bench, cuts, most_cuts)
         return trial
 
     def _wanted(self, bench: Bench) -> Cuts | None:
@@ -210,7 +210,7 @@ class PlaneTrials:
         """Take other zones; planes that they forbid go, and the reason is told. word: for the step in the history. Raises
         PlanError for what makes no sense, and where a plane that would go is locked."""
         before, removed = self._session.bench, list[str]()
-        bench = with_zones(before, await self._session.quick.run("mark", before, marking))
+        bench = with_zones(before, await self._session.quick.run(mark, before, marking))
         while bench.cuts:
             trial = await self.attempt(bench, bench.cuts)
             if not trial.rejected:

@@ -28,12 +28,13 @@ from machine.workbench.bench.bench import (
 )
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.settings import check_block, key_of, profile_as_given, with_given, with_typed
-from machine.workbench.session.base import Derived, SessionBase, asking
+from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.long_work import Comparing, Finding, Slicing, prices_of
 from machine.workbench.session.planes import PlaneTrials, Readiness, resting_of, standing_of
+from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
-from machine.workbench.work.models import Unscaled
+from machine.workbench.work.models import Unscaled, read_model
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import locate, plan_beside
 from mdp.pose import turned_by
@@ -208,7 +209,7 @@ class Session(SessionBase):
             bench = with_rotation(uncut, project.rotation)
             if plan is not None:
                 marks = NO_ZONES if project.marks_in_plan else bench.zones
-                rows = await self.quick.run("measure_plan", uncut, plan)
+                rows = await self.quick.run(measure_plan, uncut, plan)
                 bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
                 bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
@@ -227,10 +228,10 @@ class Session(SessionBase):
             raise PlanError(f"plan {plan.name}: there is no model on the workbench to cut by it: open {wanted} first")
         with self.waiting(f"cutting by {plan.name}"):
             profile = with_plan_settings(bench.profile.of_all_parts, plan)
-            rows = await self.quick.run("measure_plan", bench, plan)
+            rows = await self.quick.run(measure_plan, bench, plan)
         self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
-    async def make(self, word: str, task: str, *given: Any) -> Any:
+    async def make(self, word: str, task: Callable[..., Value], *given: Any) -> Value:
         """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
         with self.waiting(word):
             return await self.quick.run(task, self.bench, *given)
@@ -238,7 +239,7 @@ class Session(SessionBase):
     async def _draw_pieces(self, bench: Bench) -> Path:
         """The parts as bodies of their own, as `work.pieces` packs them. Raises UserError where they cannot be cut."""
         out, before = self.new_file(), self.pieces.done
-        await self.quick.run("draw_pieces", bench, out)
+        await self.quick.run(draw_pieces, bench, out)
         if before is not None and not self.pieces.stale:
             before.unlink(missing_ok=True)
         return out
@@ -311,7 +312,7 @@ class Session(SessionBase):
     async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
         """The model of a file, whose mesh stays as long as anybody has it. asks: where its size is none that a printer makes, the
         page that wants it is asked for its unit."""
-        model: Model | Unscaled = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file(), plate)
+        model = await self.quick.run(read_model, path, name, profile.of_all_parts, self.new_file(), plate)
         if isinstance(model, Unscaled):
             if asks:
                 self.unscaled = OfUnknownUnit(asking.get(), path, name, model.units)
@@ -342,6 +343,7 @@ class Workbench:
         self.sessions: dict[int, Session] = {}
         self.pools = WorkerPools()
         self._make = make
+        self._benches: list[dict[str, Any]] = []
         self._closing: dict[int, asyncio.Task[str]] = {}
         self._last = 0
 
@@ -352,6 +354,7 @@ class Workbench:
             raise PlanError(f"{MOST_SESSIONS} benches are open, which is the most: close one first")
         self._last += 1
         self.sessions[self._last] = session = self._make(self.pools)
+        session.benches = self._benches
         if like is not None:
             session.history = History(Step("", emptied(like.bench)))
         session.listeners.append(self._list_again)
@@ -382,7 +385,7 @@ class Workbench:
 
     def _list_again(self) -> None:
         benches = [{"number": number, **session.described()} for number, session in self.sessions.items()]
-        for session in self.sessions.values():
-            if session.benches != benches:
-                session.benches = benches
+        if benches != self._benches:
+            self._benches[:] = benches
+            for session in self.sessions.values():
                 session.notify()

@@ -35,6 +35,9 @@ from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
 from machine.workbench.web.prints_line import print_log, print_webcam, prints_line
 from machine.workbench.web.snapshot import marks_key
 from machine.workbench.web.uploads import Uploads
+from machine.workbench.work.cutting import make_folder, make_pictures, make_plan, make_project
+from machine.workbench.work.models import mark_faces, rest_facets
+from machine.workbench.work.slices import share_page
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
@@ -58,11 +61,11 @@ async def profile(session: Session, request: Request) -> Response:
 
 async def plan(session: Session, request: Request) -> Response:
     """The plan's file."""
-    text: str = await session.make("cutting the parts", "make_plan")
+    text = await session.make("cutting the parts", make_plan)
     return Response(text, headers=_saved_as(f"{file_stem(session.bench)}-plan.toml"), media_type="application/toml")
 
 
-def _made_file(word: str, task: str, kind: str, ending: str) -> Act:
+def _made_file(word: str, task: Callable[..., None], kind: str, ending: str) -> Act:
     """A file that a task makes of the parts; word: what the pages wait for; ending: of its name after the model's."""
 
     async def answer(session: Session, request: Request) -> Response:
@@ -97,7 +100,7 @@ async def shared_page(session: Session, request: Request) -> Response:
     if not alternatives:
         return FileResponse(page, headers=_saved_as(name), media_type="text/html")
     out = session.new_file()
-    await session.quick.run("share_page", page, alternatives, out)
+    await session.quick.run(share_page, page, alternatives, out)
     return _once(out, "text/html", name)
 
 
@@ -256,12 +259,12 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("left/{number:int}", uploads.open_left, "POST"),
         route("kept", uploads.list_kept),
         route("kept/{name}", uploads.open_kept, "POST"),
-        route("project.3mf", _made_file("saving the project", "make_project", "model/3mf", ".3mf"), need=Need.MODEL),
+        route("project.3mf", _made_file("saving the project", make_project, "model/3mf", ".3mf"), need=Need.MODEL),
         route("plan.toml", plan, need=Need.PARTS),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces, need=Need.PARTS),
-        route("parts.zip", _made_file("cutting the parts", "make_folder", ZIP, "-parts.zip"), need=Need.PARTS),
-        route("pictures.zip", _made_file("drawing the parts", "make_pictures", ZIP, "-pictures.zip"), need=Need.PARTS),
+        route("parts.zip", _made_file("cutting the parts", make_folder, ZIP, "-parts.zip"), need=Need.PARTS),
+        route("pictures.zip", _made_file("drawing the parts", make_pictures, ZIP, "-pictures.zip"), need=Need.PARTS),
         route("print/{key}", print_page),
         route("print/{key}/text", print_text),
         route("walls/{number:int}/{part:int}", print_walls),
@@ -336,7 +339,7 @@ async def _pedestal(session: Session, request: Request) -> Response:
 
 
 async def _facets(session: Session, request: Request) -> Response:
-    return Response(await session.quick.run("rest_facets", session.bench.model), media_type="application/json")
+    return Response(await session.quick.run(rest_facets, session.bench.model), media_type="application/json")
 
 
 async def _pieces(session: Session, request: Request) -> Response:
@@ -344,7 +347,7 @@ async def _pieces(session: Session, request: Request) -> Response:
 
 
 async def _marks(session: Session, request: Request) -> Response:
-    return Response(await session.quick.run("mark_faces", session.bench), media_type=BYTES)
+    return Response(await session.quick.run(mark_faces, session.bench), media_type=BYTES)
 
 
 def _settings(uploads: Uploads) -> Act:

@@ -1,1 +1,1 @@
-"""Work: what takes time for a bench, in processes of its own. Public: `tasks.TASKS`, `worker_pool.TaskQueue`."""
+"""Work: what takes time for a bench, in processes of its own. Public: the tasks, `worker_pool.TaskQueue`."""

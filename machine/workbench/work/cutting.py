@@ -77,7 +77,7 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
     ranker_named(ranker)
     assert bench.model is not None
     tell(Searched(f"reading {bench.model.faces:,} faces"))
-    mesh, name, profile, locked = turned_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
+    mesh, name, profile, locked = turned_mesh(bench), bench.model.name, bench.profile, locked_plan(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
     price, best = pricing(profile.of_all_parts), None
 
@@ -173,7 +173,8 @@ def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:
 
 def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
     """The model on the bench cut by a plan; prices: the rows of its front measured, too."""
-    mesh, name = turned_mesh(bench, plan), _name(bench)
+    assert bench.model is not None
+    mesh, name = turned_mesh(bench, plan), bench.model.name
     compilers.wait_for(compilers.JUDGE)
     marked = with_shapes(bench, plan, mesh)
     return cut_by_plan(
@@ -195,10 +196,6 @@ def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
     return standing_still(bench.model.mesh(), turned)
-
-
-def _name(bench: Bench) -> str:
-    return "" if bench.model is None else bench.model.name
 
 
 def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:

@@ -1,6 +1,7 @@
 """Models: reading one, how it stands and rests, and the faces that are marked on it, as tasks of the workbench."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from mdp.read import read_model as read_model_file
 from mdp.search.orient import distinct_orientations
 from mdp.search.parts import one_piece
 from mdp.search.plan_file import ZONE_KINDS
-from mdp.zone import Zone
+from mdp.zone import Zone, Zones
 from profiles.errors import MeshError, PlanError
 from profiles.frozen import Vector
 from profiles.profile import Profile
@@ -90,6 +91,11 @@ def rest_facets(tell: Tell, model: Model) -> bytes:
         for normal, corners in resting_facets(model.mesh())
     ]
     return json.dumps(facets).encode()
+
+
+def mark(tell: Tell, bench: Bench, marking: Callable[[Bench], Zones]) -> Zones:
+    """The zones of a bench after a person has changed them."""
+    return marking(bench)
 
 
 def mark_faces(tell: Tell, bench: Bench) -> bytes:

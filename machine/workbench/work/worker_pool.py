@@ -1,23 +1,27 @@
 """Worker pool: processes that do the long work of all benches, a bounded number of them, each for one task at a time.
 
-A process stays warm for a while after its task, with what it has worked out for the bench. A task cannot be interrupted, so one
-that is cancelled is stopped at once by ending its process.
+A task is a function of this room that is given tell() first, to say how far it is; values go there and back pickled. A process
+stays warm for a while after its task, with what it has worked out for the bench. A task cannot be interrupted, so one that is
+cancelled is stopped at once by ending its process.
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Iterator
+import sys
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator
 from contextlib import aclosing, asynccontextmanager, suppress
+from importlib import import_module
 from threading import Thread
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
-from mdp.kernels.workers import CallError, KilledError, Tell, Worker
+from machine.crash import bug_in_words
+from mdp.kernels.workers import CallError, KilledError, Tell, Worker, tell
 from profiles.errors import UserError
 
 CLOSED = "this bench is closed: nothing is worked out for it any more"
 REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
 Value = TypeVar("Value")
-DO, LOAD = "machine.workbench.work.tasks:do", "machine.workbench.work.tasks:load"
+TASKS = "cutting", "models", "slices"  # the files of this room that have them
 
 
 async def heard(values: Iterator[Value]) -> AsyncGenerator[Value, None]:
@@ -66,7 +70,8 @@ class WorkerPool:
     async def worker(self, tasks: "TaskQueue") -> AsyncIterator[Worker]:
         """A process for one of these tasks, in the order in which they are asked for. Whoever leaves with an error ends it."""
         async with self._places:
-            tasks.check_open()
+            if tasks.closed:
+                raise UserError(CLOSED)
             worker = self._take(tasks)
             self._busy.append(worker)
             try:
@@ -119,39 +124,51 @@ class TaskQueue:
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
         self._lock = asyncio.Lock()
-        self._closed = False
+        self.closed = False
 
     async def warm(self) -> None:
         """Start a process before it is needed, if there may be one more."""
         async with self._lock:
             if self.pool.may_start:
                 with suppress(CallError):  # whoever asks the next one gets the error
-                    await self._ask(LOAD)
+                    await self._ask(load)
 
-    async def run(self, task: str, *given: Any, tell: Tell = lambda value: None) -> Any:
+    async def run(self, task: Callable[..., Value], *given: Any, tell: Tell = lambda value: None) -> Value:
         """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
         try:
             async with self._lock:
-                value, trouble = await self._ask(DO, task, *given, tell=tell)
+                value, trouble = await self._ask(do, task, *given, tell=tell)
         except KilledError:
             raise UserError("the process that did this work has ended before it was done: try it again") from None
         if trouble:
             raise UserError(trouble)
-        return value
-
-    def check_open(self) -> None:
-        """Raises UserError when its session is closed."""
-        if self._closed:
-            raise UserError(CLOSED)
+        result: Value = value
+        return result
 
     def close(self) -> None:
         """End the processes that work for it or hold anything of it; whatever still waits for one is refused."""
-        self._closed = True
+        self.closed = True
         self.pool.end(self)
 
-    async def _ask(self, task: str, *given: Any, tell: Tell = lambda value: None) -> Any:
+    async def _ask(self, task: Callable[..., Any], *given: Any, tell: Tell = lambda value: None) -> Any:
         async with self.pool.worker(self) as worker, aclosing(heard(worker.ask(task, *given))) as answers:
             async for done, value in answers:
                 if not done:
                     tell(value)
             return value
+
+
+def load() -> None:
+    """In a worker: load all that tasks need, before the first one is asked for."""
+    for name in TASKS:
+        import_module(f"machine.workbench.work.{name}")
+
+
+def do(task: Callable[..., Value], *given: Any) -> tuple[Value | None, str]:
+    """In a worker: what a task gives, and the sentence of why there is nothing, "" where there is; a bug gets a log file."""
+    try:
+        return task(tell, *given), ""
+    except UserError as error:
+        return None, f"{error}"
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence, and the workbench goes on
+        return None, bug_in_words(error, sys.argv)

@@ -205,7 +205,7 @@ def test_how_copies_stand_is_worked_out_again_for_what_decides_their_places(sett
         bench, stood = Bench(PROFILE, model=model(), copies=3), list[Bench]()
         session = SessionBase(bench, WorkerPools())
 
-        async def run(task: str, standing: Bench) -> SimpleNamespace:
+        async def run(task: Any, standing: Bench) -> SimpleNamespace:
             stood.append(standing)
             return SimpleNamespace(refusal="")
 

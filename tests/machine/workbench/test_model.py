@@ -61,10 +61,9 @@ def read(work: Any, path: Path) -> Any:
 
     async def run() -> Any:
         session = Session(load(), Given(), WorkerPools())
-        tasks = {"read_model": read_model, "stand": stand}
 
-        async def here(task: str, *given: Any, **more: Any) -> Any:
-            return tasks[task](lambda report: None, *given) if task in tasks else ()
+        async def here(task: Any, *given: Any, **more: Any) -> Any:
+            return task(lambda report: None, *given) if task in (read_model, stand) else ()
 
         for queue in (session.quick, session.long, session.hand):
             queue.run = here  # type: ignore[method-assign]

@@ -19,7 +19,6 @@ from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
 from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
-from machine.workbench.work.tasks import TASKS
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
@@ -48,9 +47,9 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
     async def run() -> Session:
         session = Session(load(), Given(), WorkerPools())
 
-        async def nothing(task: str, *given: Any, **more: Any) -> Any:
+        async def nothing(task: Any, *given: Any, **more: Any) -> Any:
             await asyncio.sleep(0)
-            return {"try_cuts": Trial(()), "stand": Standing((40.0, 8.0, 40.0), 0.0, "")}.get(task)
+            return {"try_cuts": Trial(()), "stand": Standing((40.0, 8.0, 40.0), 0.0, "")}.get(task.__name__)
 
         for tasks in (session.quick, session.long, session.hand):
             tasks.run = nothing  # type: ignore[method-assign]
@@ -106,8 +105,8 @@ def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_
     tried: list[tuple[tuple[float, ...], int, float | None]] = []
 
     async def work(session: Session) -> None:
-        async def really(task: str, *asked: Any, **more: Any) -> Any:
-            return TASKS[task](lambda told: None, *asked)
+        async def really(task: Any, *asked: Any, **more: Any) -> Any:
+            return task(lambda told: None, *asked)
 
         def listen() -> None:
             if session.trials.trial is not None:
@@ -159,8 +158,8 @@ def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
     async def work(session: Session) -> None:
         scales = []
 
-        async def read(task: str, *given: Any, **more: Any) -> Any:
-            if task != "read_model":
+        async def read(task: Any, *given: Any, **more: Any) -> Any:
+            if task.__name__ != "read_model":
                 return ()
             profile: Profile = given[2]
             scales.append(profile.process.scale)
@@ -179,8 +178,8 @@ def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
 
 def test_a_scale_that_was_set_for_a_model_is_not_that_of_the_next_one() -> None:
     async def work(session: Session) -> None:
-        async def read(task: str, *given: Any, **more: Any) -> Any:
-            return model(f"{given[1]} at {given[2].process.scale:g}") if task == "read_model" else ()
+        async def read(task: Any, *given: Any, **more: Any) -> Any:
+            return model(f"{given[1]} at {given[2].process.scale:g}") if task.__name__ == "read_model" else ()
 
         session.quick.run = read  # type: ignore[method-assign]
         set_for_one = Given(settings=("process.walls=4", "process.scale=25.4", "process.rotate_deg=[90,0,0]"))
@@ -198,8 +197,8 @@ def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_tol
     best = FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0)
 
     async def work(session: Session) -> None:
-        async def price(task: str, *given: Any, **more: Any) -> Any:
-            return replace(best, time_s=60.0) if task == "price_row" else await asyncio.sleep(9.0)
+        async def price(task: Any, *given: Any, **more: Any) -> Any:
+            return replace(best, time_s=60.0) if task.__name__ == "price_row" else await asyncio.sleep(9.0)
 
         session.long.run = price  # type: ignore[method-assign]
         session.finding.search()
@@ -249,10 +248,10 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
 
 def test_slices_wait_for_the_settings_that_were_asked_for_before() -> None:
     async def work(session: Session) -> None:
-        async def read(task: str, *given: Any, **more: Any) -> Any:
+        async def read(task: Any, *given: Any, **more: Any) -> Any:
             for _ in range(5):
                 await asyncio.sleep(0)
-            return model("a") if task == "read_model" else ()
+            return model("a") if task.__name__ == "read_model" else ()
 
         session.quick.run = read  # type: ignore[method-assign]
         obey(session, {"do": "set", "key": "process.scale", "value": "2"})
@@ -290,12 +289,12 @@ def test_what_a_page_is_refused_no_other_page_is_told_and_its_next_step_takes_it
 
 def test_a_plane_that_is_refused_is_put_at_the_nearest_place_when_that_is_asked_for() -> None:
     def bounded(session: Session) -> None:
-        async def answer(task: str, *given: Any, **more: Any) -> Any:
-            if task == "nearest":
+        async def answer(task: Any, *given: Any, **more: Any) -> Any:
+            if task.__name__ == "nearest":
                 (cuts, part), *_ = given[2]
                 return (*cuts[: part - 2], PlannedPart(UP, 30.0), *cuts[part - 1 :])
-            high = task == "try_cuts" and any(cut.offset_mm > 30.0 for cut in given[2])
-            return Trial((), 2, "too high") if high else Trial(()) if task == "try_cuts" else None
+            high = task.__name__ == "try_cuts" and any(cut.offset_mm > 30.0 for cut in given[2])
+            return Trial((), 2, "too high") if high else Trial(()) if task.__name__ == "try_cuts" else None
 
         session.hand.run = answer  # type: ignore[method-assign]
 
@@ -318,13 +317,13 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
     rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((low,), 1.0, 2.0, 3.0), FrontRow((low, high), 1.0, 1.0, 2.0, chosen=True))
 
     async def work(session: Session) -> None:
-        async def answer(task: str, *given: Any, **more: Any) -> Any:
-            if task != "try_cuts":
-                return Standing((40.0, 8.0, 40.0), 0.0, "") if task == "stand" else None
+        async def answer(task: Any, *given: Any, **more: Any) -> Any:
+            if task.__name__ != "try_cuts":
+                return Standing((40.0, 8.0, 40.0), 0.0, "") if task.__name__ == "stand" else None
             far = given[1].profile.process.place_mm[0] > 50.0 and any(cut.offset_mm > 20.0 for cut in given[2])
             return Trial((), 3, "Z would go too far") if far else Trial(())
 
-        async def price(task: str, bench: Bench, row: int, **more: Any) -> Any:
+        async def price(task: Any, bench: Bench, row: int, **more: Any) -> Any:
             return bench.rows[row]
 
         session.hand.run, session.long.run = answer, price  # type: ignore[method-assign, assignment]
@@ -370,7 +369,7 @@ def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on
     found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
 
     async def work(session: Session) -> None:
-        async def find(task: str, *given: Any, **more: Any) -> Any:
+        async def find(task: Any, *given: Any, **more: Any) -> Any:
             for _ in range(5):
                 await asyncio.sleep(0)
             return Found((found,), ())
@@ -425,7 +424,7 @@ def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a
     priced: list[int] = []
 
     async def work(session: Session) -> None:
-        async def price(task: str, bench: Bench, row: int, **more: Any) -> Any:
+        async def price(task: Any, bench: Bench, row: int, **more: Any) -> Any:
             priced.append(row)
             for _ in range(5):
                 await asyncio.sleep(0)

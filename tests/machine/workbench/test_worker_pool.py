@@ -11,6 +11,8 @@ from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, History, Step, with_model
 from machine.workbench.session.session import Session
 from machine.workbench.work import worker_pool
+from machine.workbench.work.cutting import find_parts, try_cuts
+from machine.workbench.work.models import rank_resting
 from machine.workbench.work.worker_pool import TaskQueue, WorkerPool, WorkerPools
 from mdp.kernels.workers import Worker
 from mdp.model_file import locate
@@ -59,7 +61,7 @@ def run(work: Coroutine[Any, Any, Any], *pools: WorkerPool) -> Any:
 
 async def rank(tasks: TaskQueue) -> float:
     """The height of the best orientation of a tee: 10 mm, as it lies on its face."""
-    resting = await tasks.run("rank_resting", model(), PROFILE)
+    resting = await tasks.run(rank_resting, model(), PROFILE)
     height_mm: float = resting[0].height_mm
     return height_mm
 
@@ -99,7 +101,7 @@ def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_
 
     async def work() -> float:
         begun = asyncio.Event()
-        search = TaskQueue(pool).run("find_parts", tree, tell=lambda report: begun.set())
+        search = TaskQueue(pool).run(find_parts, tree, tell=lambda report: begun.set())
         searching = asyncio.create_task(search)
         await begun.wait()
         ranking = asyncio.create_task(rank(TaskQueue(pool)))
@@ -203,7 +205,7 @@ def test_planes_are_tried_on_their_own_bench_whoever_had_the_process_in_between(
     async def work() -> list[Any]:
         sessions = Session(PROFILE, Given(), pools), Session(PROFILE, Given(), pools)
         benches = bench(tee()), bench(box(20.0, 20.0, 20.0))
-        tried = [await sessions[k].readiness.ask("try_cuts", benches[k], (LEVEL,), 0) for k in (0, 1, 0)]
+        tried = [await sessions[k].readiness.ask(try_cuts, benches[k], (LEVEL,), 0) for k in (0, 1, 0)]
         for session in sessions:
             await session.close()
         return tried

@@ -442,6 +442,27 @@ def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
         obey(page_of(prints_with_one()), {"do": "feed", "print": 1, "percent": percent})
 
 
+@pytest.mark.parametrize(("asked", "said"), [
+    ({"do": "ports", "baud": None}, "baud is null: it must be a whole number"),
+    ({"do": "check", "port": ["sim"]}, "port is .*: it must be a text"),
+    ({"do": "hand", "port": "sim", "sim_speed": float("nan")}, "sim_speed is nan: it must be a number"),
+    ({"do": "by_hand", "print": 1, "does": "dance"}, "does is .dance."),
+    ({"do": "by_hand", "print": 1, "does": "jog", "by_mm": 10**400}, "by_mm is 1000"),
+    ({"do": "begin", "print": "1"}, "print is .1.: it must be a whole number"),
+])  # fmt: skip
+def test_what_has_another_type_than_a_command_takes_is_refused(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(PlanError, match=said):
+        obey(page_of(prints_with_one()), asked)
+
+
+@pytest.mark.parametrize("number", [{}, {"print": None}, {"print": "all"}, {"print": {"number": 1}}, {"print": 7, "more": [1]}])
+def test_an_emergency_stop_is_given_whatever_else_a_page_sends(number: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[int] = []
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
+    obey(page_of(prints_with_one(), "other"), {"do": "emergency", **number})
+    assert stopped == [1]
+
+
 GIVEN = {"percent": 100, "does": "heat"}
 
 
