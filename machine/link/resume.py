@@ -141,11 +141,13 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     span = f"lines {point.line} to {point.last} may have been printed already"
     at = _reported_position(point, status) if alive or (alive is None and not begun) else None
     if at is not None and not status.greeted:
-        before = _approach(point, profile, *at)
-        return ResumePoint(point.line, before, f"the printer has not restarted and knows its place; {span}")
+        return ResumePoint(
+            point.line, _approach(point, profile, *at), f"the printer has not restarted and knows its place; {span}"
+        )
     if not status.greeted:
         _check_begun(status, begun, profile)
-    return ResumePoint(point.line, _homed_approach(point, profile), f"the printer has restarted; {span}", homes=True)
+    before = _approach(point, profile, *position_at_interruption(point, profile), homes=True)
+    return ResumePoint(point.line, before, f"the printer has restarted; {span}", homes=True)
 
 
 def _check_begun(status: PrinterStatus, begun: bool, profile: Profile) -> None:
@@ -236,20 +238,18 @@ def _goal(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
     return standing
 
 
-def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose) -> tuple[str, ...]:
-    """Heat (the tip may be stuck in the plastic), up, back over the print, down, filament, modes."""
+def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose, homes: bool = False) -> tuple[str, ...]:
+    """Heat (the tip may be stuck in the plastic), up, back over the print, down, filament, modes.
+
+    homes: after a restart, the axes are set to where they stand, the tip rises, X and Y are homed.
+    """
     goal, goal_pose = _goal(point, profile)
     pull, push = filament_commands(point.modal, profile)
-    path = return_moves(profile, point.printed, Turn(pose, goal_pose, at, goal))
-    return ("G21", "G90", *heat_commands(point.modal, profile), *pull, "G90", *path, *push, *point.modal.lines())
-
-
-def _homed_approach(point: InterruptedPrint, profile: Profile) -> tuple[str, ...]:
-    """The same after a restart: the axes are called what they stand at, the tip rises, X and Y are homed."""
-    (goal, goal_pose), (at, pose) = _goal(point, profile), position_at_interruption(point, profile)
-    pull, push = filament_commands(point.modal, profile)
-    heat = (*heat_commands(point.modal, profile), *pull, "G90")
-    path = homed_return_moves(profile, point.printed, Turn(pose, goal_pose, at, goal), heat)
+    heat, way = (*heat_commands(point.modal, profile), *pull, "G90"), Turn(pose, goal_pose, at, goal)
+    if homes:
+        path = homed_return_moves(profile, point.printed, way, heat)
+    else:
+        path = ["G21", "G90", *heat, *return_moves(profile, point.printed, way)]
     return (*path, *push, *point.modal.lines())
 
 

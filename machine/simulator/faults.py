@@ -23,14 +23,6 @@ OK_KINDS: tuple[Kind, ...] = get_args(OkKind)
 MOMENT_KINDS: tuple[Kind, ...] = get_args(MomentKind)
 KINDS = BYTE_KINDS + OK_KINDS + MOMENT_KINDS
 
-# Keys of a fault in a file beside kind, place and direction, with the kinds that know them.
-KEYS: dict[str, tuple[Kind, ...]] = {
-    "bit": ("flip",),
-    "number": ("spurious resend",),
-    "seconds": ("delay", "stall", "block", "disconnect"),
-    "text": ("garbage", "error"),
-}
-
 
 @dataclass(frozen=True)
 class Fault:
@@ -115,7 +107,7 @@ def _read_fault(table: Mapping[str, Any], where: str) -> Fault:
         raise _wrong(where, "kind", kind, ", ".join(KINDS))
     units = units_of(kind)
     to = ["to"] if "byte" in units else []
-    known = ["kind", *units, "chance", *to, *(key for key, kinds in KEYS.items() if kind in kinds)]
+    known = ["kind", *units, "chance", *to, *(key for key, kinds, _, _ in VALUES if kind in kinds)]
     for key in table:
         if key not in known:
             raise PrinterError(f"{where}: {key} is not a key of {kind!r}: {', '.join(known)} are allowed")
@@ -126,7 +118,7 @@ def _read_fault(table: Mapping[str, Any], where: str) -> Fault:
     seconds = table.get("seconds", inf)
     if kind == "delay" and not (_is_real(seconds) and 0 <= seconds < inf):
         raise _wrong(where, "seconds", table.get("seconds"), "a number of seconds from 0 up")
-    for key, (fits, allowed) in ALLOWED.items():
+    for key, _, fits, allowed in VALUES:
         if key in table and not fits(table[key]):
             raise _wrong(where, key, table[key], allowed)
     unit = "" if placed == ["chance"] else placed[0]
@@ -154,17 +146,17 @@ def _wrong(where: str, key: str, value: Any, allowed: str) -> PrinterError:
     return PrinterError(f"{where}: {key} is {'missing' if value is None else repr(value)}: {allowed} is allowed")
 
 
-# Key of a fault in a file -> whether a value will do, and what is allowed.
-ALLOWED: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "byte": (lambda value: _is_whole(value, 0), "a whole number from 0 up"),
-    **dict.fromkeys(("answer", "line"), (lambda value: _is_whole(value, 1), "a whole number from 1 up")),
-    "chance": (lambda value: _is_real(value) and 1e-12 <= value <= 1, "a number above 0, at most 1"),
-    "to": (lambda value: value in ("printer", "host"), "printer, host"),
-    "bit": (lambda value: _is_whole(value, 0, 7), "a whole number from 0 to 7"),
-    "number": (lambda value: _is_whole(value, 0), "a whole number from 0 up"),
-    "seconds": (lambda value: _is_real(value) and value >= 0, "a number of seconds from 0 up, inf for ever"),
-    "text": (
-        lambda value: isinstance(value, str) and all(ord(c) < 256 for c in value),
-        "text of characters up to \\u00ff, one for each byte",
-    ),
-}
+# Keys of a fault in a file: the kinds that have them beside place and direction; whether a value will do; what is allowed.
+VALUES: tuple[tuple[str, tuple[Kind, ...], Callable[[Any], bool], str], ...] = (
+    ("byte", (), lambda value: _is_whole(value, 0), "a whole number from 0 up"),
+    ("answer", (), lambda value: _is_whole(value, 1), "a whole number from 1 up"),
+    ("line", (), lambda value: _is_whole(value, 1), "a whole number from 1 up"),
+    ("chance", (), lambda value: _is_real(value) and 1e-12 <= value <= 1, "a number above 0, at most 1"),
+    ("to", (), lambda value: value in ("printer", "host"), "printer, host"),
+    ("bit", ("flip",), lambda value: _is_whole(value, 0, 7), "a whole number from 0 to 7"),
+    ("number", ("spurious resend",), lambda value: _is_whole(value, 0), "a whole number from 0 up"),
+    ("seconds", ("delay", "stall", "block", "disconnect"), lambda value: _is_real(value) and value >= 0,
+     "a number of seconds from 0 up, inf for ever"),
+    ("text", ("garbage", "error"), lambda value: isinstance(value, str) and all(ord(c) < 256 for c in value),
+     "text of characters up to \\u00ff, one for each byte"),
+)  # fmt: skip
