@@ -185,6 +185,33 @@ def test_an_emergency_stop_is_confirmed_by_words_of_a_halt_only(said: bytes, hal
     assert emergency_stop(wire, medium) is halts
 
 
+class Old(Wire):
+    """A printer whose words from before the orders come in portions; to the orders it says nothing."""
+
+    def __init__(self, *old: bytes) -> None:
+        super().__init__(b"")
+        self._old = iter(old)
+
+    def write(self, data: bytes) -> None:
+        """Hear an order."""
+
+    def read(self) -> bytes:
+        """What it said before."""
+        self.now_s += 0.02
+        return next(self._old, b"")
+
+
+@pytest.mark.parametrize(("old", "known"), [
+    ((b"T:20.0 /0.0 B:20.0 /0.0\n",), Heaters.UNPROVED),
+    ((b"T:20.0 /0.0 B:2", b"", b"0.0 /0.0\n"), Heaters.UNPROVED),
+    ((b"Error:Printer halted. kill() called!\n", b"T:20.0 /0.0"), Heaters.HALTED),
+    ((b"", b"T:20.0 /0.0 B:20.0 /0.0\n"), Heaters.OFF),
+], ids=["whole", "torn", "halted", "after the orders"])  # fmt: skip
+def test_what_was_said_before_the_orders_proves_nothing_but_a_halt(old: tuple[bytes, ...], known: Heaters) -> None:
+    wire = Old(*old)
+    assert heaters_off(wire, Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None)) is known
+
+
 def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_with_one() -> None:
     with SimulatedPrinter(SLOW.machine, build=INSISTS) as printer, open_port(printer.path, 115200) as port:
         answer = ask(port)
