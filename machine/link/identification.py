@@ -44,18 +44,13 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of whatever stands at a port. words: the firmware's own line, its error, what it is busy with, or the last words
-    of a stranger.
-
-    letters: axes that M114 reports, the filament's left out; "" when none. limits: letter -> least and greatest
-    value, of a firmware that reports them. revival: what lets a printer that has halted print again.
-    """
+    """The answer of whatever stands at a port."""
 
     kind: Kind
-    words: str = ""
-    letters: str = ""
-    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
-    revival: str = LineRules.revival
+    words: str = ""  # the firmware's own line, its error, what it is busy with, or the last words of a stranger
+    letters: str = ""  # axes that M114 reports, the filament's left out; "" when none
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)  # least and greatest value, where they are reported
+    revival: str = LineRules.revival  # lets a printer that has halted print again
 
     @property
     def firmware(self) -> str:

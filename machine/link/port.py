@@ -40,17 +40,14 @@ with suppress(ImportError):
 
 @dataclass(frozen=True)
 class SerialDevice:
-    """A serial port of this computer. name: the stable one of a USB adapter where there is one, else the path.
+    """A serial port of this computer."""
 
-    model: vendor and product of a USB device; location: the USB socket it is plugged into; "" where they are not known.
-    """
-
-    name: str
+    name: str  # the stable one of a USB adapter where there is one, else the path
     path: str
     description: str
     serial_number: str
-    model: str = ""
-    location: str = ""
+    model: str = ""  # vendor and product of a USB device, "" where they are not known
+    location: str = ""  # the USB socket it is plugged into
 
 
 class RefusedPortError(PortError):

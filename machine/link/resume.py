@@ -53,33 +53,27 @@ NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: q
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """Where a resumed print goes on: the first line of the program to be sent, and commands before it.
+    """Where a resumed print goes on."""
 
-    reason: what is certain about it, in words; homes: X and Y.
-    """
-
-    line: int
-    before: tuple[str, ...]
-    reason: str = ""
-    homes: bool = False
+    line: int  # the first one of the program to be sent
+    before: tuple[str, ...]  # commands ahead of it
+    reason: str = ""  # what is certain about it, in words
+    homes: bool = False  # X and Y
 
 
 @dataclass(frozen=True)
 class InterruptedPrint:
-    """An interrupted print by its journal and its program. line: the first one not surely executed; modal: the state before it;
-    ahead: line -> the state after its command, which may have been done since; stroked: whether anything was printed before.
-    stood_mm: the height of the tip that a person has read off.
-    """
+    """An interrupted print by its journal and its program."""
 
-    line: int
+    line: int  # the first one not surely executed
     last: int
-    modal: ModalState
+    modal: ModalState  # before that line
     position: ProgramPosition
     printed: Printed
-    stroked: bool
-    ahead: Mapping[int, ModalState]
+    stroked: bool  # anything was printed before
+    ahead: Mapping[int, ModalState]  # line -> the state after its command, which may have been done since
     checkpoint: Checkpoint
-    stood_mm: float | None = None
+    stood_mm: float | None = None  # the height of the tip that a person has read off
 
 
 def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile: Profile, limit: int) -> InterruptedPrint:

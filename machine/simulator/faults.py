@@ -26,23 +26,17 @@ KINDS = BYTE_KINDS + OK_KINDS + MOMENT_KINDS
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault, once at a place or again and again by chance.
-
-    at: bytes count from 0 in their direction, answers (lines the printer says) and lines (that the firmware begins to execute)
-    from 1; unit: what `at` counts, "" for the kind's own (units_of). chance: instead of at, the probability at each of them.
-    to_host: of the answers' bytes instead of the commands'. value: which bit is flipped, or the line wrongly asked for; None:
-    the seed decides. seconds: how long a delay, a stall (nothing said), a block (nothing read), a disconnection lasts. text:
-    what is said instead of the kind's own words.
-    """
+    """One fault, once at a place or again and again by chance."""
 
     kind: Kind
+    # Bytes count from 0 in their direction, answers (lines the printer says) and lines (that the firmware begins) from 1.
     at: int | None = None
-    to_host: bool = False
-    value: int | None = None
-    chance: float = 0.0
-    unit: Unit | Literal[""] = ""
-    seconds: float = inf
-    text: str = ""
+    to_host: bool = False  # in the answers' bytes instead of the commands'
+    value: int | None = None  # which bit is flipped, or the line wrongly asked for; None: the seed decides
+    chance: float = 0.0  # instead of `at`, the probability at each place
+    unit: Unit | Literal[""] = ""  # what `at` counts, "": the kind's own (units_of)
+    seconds: float = inf  # how long a delay, a stall (nothing said), a block (nothing read), a disconnection lasts
+    text: str = ""  # what is said instead of the kind's own words
 
     def __post_init__(self) -> None:
         if (self.at is None) == (self.chance == 0.0):

@@ -19,12 +19,12 @@ NEAR = 8  # one acknowledgement too many or few is usual after noise; a Resend f
 
 
 class LineInFlight(NamedTuple):
-    """A line that was sent and is not acknowledged yet. slow_timeout_s: 0 of a quick command."""
+    """A line that was sent and is not acknowledged yet."""
 
     number: int
     size: int
     asks_temperature: bool
-    slow_timeout_s: float
+    slow_timeout_s: float  # 0 of a quick command
     sent_s: float
 
 
