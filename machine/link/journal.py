@@ -138,9 +138,9 @@ class Journal:
             self._noted_s = now_s
             self.write(checkpoint)
 
-    def record_due(self, line: int, lines: int = EVERY_LINES) -> bool:
+    def record_due(self, line: int) -> bool:
         """Whether a record is due before this line is sent, so that the newest one is less than EVERY_LINES lines behind."""
-        return line - self.last.sent >= lines
+        return line - self.last.sent >= EVERY_LINES
 
     def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
         """Write a checkpoint at once; hurry: to the disk, too, for a computer may lose its power with its printer."""

@@ -21,8 +21,9 @@ class Greeting:
     last attempt, 0: none. keeps_numbers: it ignores M110. asked_plainly: PLAIN_QUESTION is under way.
     """
 
-    def __init__(self, firmware: Firmware = MARLIN, rx_bytes: int | None = None, baud: int | None = None) -> None:
-        self.firmware, self.identity, self.heard = firmware, "", ""
+    def __init__(self, rx_bytes: int | None = None, baud: int | None = None) -> None:
+        self.firmware: Firmware = MARLIN  # taken for one of unknown name
+        self.identity = self.heard = ""
         self.capabilities: dict[str, bool] = {}
         self.wanted = self._wanted_before = 0
         self.keeps_numbers = self.asked_plainly = self._skipped = False
