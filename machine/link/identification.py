@@ -88,7 +88,7 @@ def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: F
 
 
 class _Inquiry:
-    """What one asking has brought so far."""
+    """An inquiry at a port, and the answers so far."""
 
     def __init__(self, port: Port, stop: Flag) -> None:
         self._stop = stop
@@ -116,7 +116,7 @@ class _Inquiry:
             raise CancelledError
 
     def answer(self) -> Answer:
-        """What all of it amounts to."""
+        """The answer that all of them amount to."""
         if self._fault:
             if GRBL_SAYS.fullmatch(self._fault):
                 return Answer(Kind.STRANGER, self._fault)
