@@ -126,7 +126,7 @@ class LineRules:
 
 @dataclass(frozen=True)
 class ProbingRules:
-    """How a firmware probes downwards."""
+    """A firmware's command that probes downwards, and its answers."""
 
     command: str  # {low} is the Z to go down to at most, mm, {speed} mm/s, {feed} mm/min
     needs: str  # what it must be built or set up with

@@ -48,7 +48,7 @@ BINARY = getattr(os, "O_BINARY", 0)  # Windows would write carriage returns othe
 
 @dataclass(frozen=True)
 class JournalHeading:
-    """What is printed."""
+    """The program that is printed."""
 
     program: str  # its file
     sha256: str
@@ -58,7 +58,7 @@ class JournalHeading:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """How far a print has come; lines of the program count from 1."""
+    """Progress of a print; lines of the program count from 1."""
 
     sent: int = 0
     acknowledged: int = 0
@@ -129,7 +129,7 @@ class Journal:
 
     @property
     def warning(self) -> str:
-        """The same as a sentence for the person at the print."""
+        """The trouble as a sentence for the person at the print, "" when there is none."""
         return f"this print can no longer be resumed: {self.trouble}" if self.trouble else ""
 
     def update(self, checkpoint: Checkpoint, now_s: float) -> None:

@@ -23,7 +23,7 @@ FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
 
 
 class Command(Enum):
-    """What may be asked of a running print."""
+    """Commands to a running print."""
 
     PAUSE = auto()
     RESUME = auto()

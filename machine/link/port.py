@@ -205,7 +205,7 @@ class _Socket:
         return data
 
     def reset_output_buffer(self) -> None:
-        """What was handed over is the system's."""
+        """Nothing: bytes that were handed over are the system's."""
 
     def close(self) -> None:
         """Hang up."""
@@ -300,7 +300,7 @@ def refusal(name: str, baud: int, error: Exception) -> str:
 
 
 def _absence() -> str:
-    """The same for a port that does not exist, with those that do."""
+    """The refusal of a port that does not exist, with those that do."""
     names = [device.name for device in serial_devices()]
     return f"does not exist: {'there are ' + ', '.join(names) if names else 'no serial port was found'}"
 

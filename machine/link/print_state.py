@@ -114,7 +114,7 @@ class PrintStatus:
 
 @dataclass
 class ProgramPosition:
-    """Where in the program the sender stands, gathered line by line."""
+    """The sender's place in the program, gathered line by line."""
 
     part: int | None = None
     parts: int | None = None

@@ -53,7 +53,7 @@ NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: q
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """Where a resumed print goes on."""
+    """The place where a resumed print goes on."""
 
     line: int  # the first one of the program to be sent
     before: tuple[str, ...]  # commands ahead of it
@@ -214,7 +214,7 @@ def _in_words(status: PrinterStatus) -> str:
 
 
 def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[Floats, Pose] | None:
-    """Where the printer says it stands; None where an axis is missing."""
+    """The position that the printer reports; None where an axis is missing."""
     if status.position is None:
         return None
     reported, letters = status.position, point.modal.axes.letters
@@ -248,7 +248,7 @@ def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose,
 
 
 def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
-    """Where the axes stood when the power went; raises JournalError when tip or table may have been on a way."""
+    """The position of the axes when the power went; raises JournalError when tip or table may have been on a way."""
     state, known = point.checkpoint.state, [value for value in point.checkpoint.pose[:E_AXIS] if value is not None]
     if state in PARKED and len(known) == E_AXIS:
         return np.array(known[:3]), Pose(*known[3:])

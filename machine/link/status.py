@@ -28,7 +28,7 @@ SEVERAL = 3  # coordinates that are not 0 and agree: a printer that has restarte
 
 @dataclass
 class PrinterStatus:
-    """What a printer reports about itself; None: not reported."""
+    """A printer's own report; None: not reported."""
 
     last_number: int | None = None  # of the last line that it has taken
     position: dict[str, float] | None = None

@@ -27,7 +27,7 @@ HEATERS_OFF_S: dict[type[PrinterError], float] = {FirmwareError: 1.0, SilenceErr
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a print ended."""
+    """The end of a print."""
 
     cancelled: bool
     sent: int
@@ -213,7 +213,7 @@ class _Print:
         return heaters
 
     def _hint(self) -> str:
-        """How to go on with what is half printed, or that this is not possible; proved by closing the journal."""
+        """Advice on how a print that was cut off goes on, or that it cannot; proved by closing the journal."""
         if self.journal is None:
             return ""
         self.journal.close()

@@ -123,7 +123,7 @@ class PrinterReports:
 
     @property
     def warnings(self) -> list[str]:
-        """What the printer said about a program that it does not understand; what it said again is counted."""
+        """The printer's words about a program that it does not understand; repetitions are counted."""
         return [text if count == 1 else f"{text} (x {count})" for text, count in self._warned.items()]
 
     def _read_echo(self, text: str) -> None:

@@ -111,7 +111,7 @@ class Heater:
         return self._since_s + self._time_constant_s * log((self._from_c - goal) / (value_c - goal))
 
     def _goal(self) -> tuple[float, float]:
-        """Where it would go without a thermostat, and where the thermostat stops it."""
+        """Its final temperature without a thermostat, and the one at which the thermostat stops it."""
         stop = ROOM_C if self._failed else max(self.target_c, ROOM_C)
         return (self._ceiling_c if stop > self._from_c else ROOM_C), stop
 

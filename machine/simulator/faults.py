@@ -44,7 +44,7 @@ class Fault:
 
     @property
     def counted(self) -> Unit:
-        """What `at` counts, or what `chance` is a chance of."""
+        """The unit that `at` counts, and at each of which `chance` applies."""
         return self.unit or units_of(self.kind)[0]
 
 
@@ -56,7 +56,8 @@ class FaultScript:
     seed: int = 0
 
     def strikes(self, index: int) -> Iterator[int]:
-        """Where the fault of this index strikes, rising; those of a chance lie as far apart as a geometric law throws them."""
+        """The places where the fault of this index strikes, rising; those of a chance lie as far apart as a geometric law throws
+        them."""
         fault = self.faults[index]
         first = 0 if fault.counted == "byte" else 1
         if fault.at is not None:
@@ -69,7 +70,7 @@ class FaultScript:
 
 
 def units_of(kind: Kind) -> tuple[Unit, ...]:
-    """What the place of such a fault may count, the usual one first."""
+    """The units that the place of such a fault may count, the usual one first."""
     if kind in BYTE_KINDS:
         return ("byte",)
     return ("answer",) if kind in OK_KINDS else ("line", "byte", "answer")

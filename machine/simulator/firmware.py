@@ -143,7 +143,7 @@ class SimulatedFirmware:
         return self._receiver.last
 
     def record(self) -> Record:
-        """What was done so far."""
+        """The record so far."""
         return record_of(self.board, self._taken, self._receiver.lost_bytes)
 
     def kill(self, error: str) -> None:

@@ -82,7 +82,7 @@ class Pause:
             exchange.wait(due_s - now_s(), until=lambda: pending.resume or bool(pending.lines))
 
     def _cools_after_s(self) -> float:
-        """How long the nozzle stays hot while nobody does anything, s."""
+        """The time after which a nozzle that nobody attends to is switched off, s."""
         minutes = self.profile.machine.pause_cools_after_min if self.profile is not None else 0.0
         return 60.0 * minutes if minutes and self.modal.nozzle_c > 0 and not self.off else inf
 

@@ -141,5 +141,5 @@ class Questions:
         self.unanswered = self._idle_reports = 0
 
     def end(self) -> None:
-        """What has arrived is known."""
+        """It is known which lines have arrived."""
         self.unanswered = self.first = self.implausible = 0

@@ -163,7 +163,7 @@ class Connection:
                 self._oks.hear_echo(event.text)
 
     def _handle_ok(self, ok: Event, now_s: float) -> None:
-        """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
+        """An `ok` answers M110, a Resend or a line in flight, which depends on the state."""
         unknown = self._oks.take_unknown()
         if ok.line is not None:
             self.window.learn(ok.rx_free)
@@ -271,7 +271,7 @@ class Connection:
             self._enter(signal, now_s)
 
     def _enter(self, signal: Signal, now_s: float) -> None:
-        """What is said on entering a state, and what is known from then on."""
+        """Say what is due on entering a state, and note what is known from then on."""
         match self.state:
             case State.SYNC:
                 self._greet(now_s)

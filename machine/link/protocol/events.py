@@ -17,13 +17,13 @@ class Temperature:
 
     @property
     def words(self) -> str:
-        """How hot it is, for a person; "" where the line does not report it."""
+        """The temperatures in words; "" where the line does not report it."""
         degrees = (("nozzle", self.nozzle_c), ("bed", self.bed_c))
         return ", ".join(f"{name} {now_c:.0f} deg C" for name, now_c in degrees if now_c is not None)
 
 
 class Kind(Enum):
-    """What a line of the printer is."""
+    """Kinds of a printer's lines."""
 
     OK = auto()  # a line was accepted
     RESEND = auto()  # the printer wants this line and all after it again; one `ok` that acknowledges nothing follows
@@ -140,7 +140,7 @@ def _error_kind(folded: str) -> Kind:
 
 
 def _read_report(text: str) -> Event:
-    """What is no answer to a line."""
+    """The event of a line that answers none of ours."""
     if text.startswith("X:"):
         return Event(Kind.POSITION, position=_position(text))
     if text == "wait":

@@ -175,7 +175,7 @@ def _unframed(framed: bytes) -> str:
 
 
 def _slow_timeout_s(command: str) -> float:
-    """How long the answer to a slow command may take, 0 for a quick one. A slow command travels alone."""
+    """The time limit of the answer to a slow command, s, 0 for a quick one. A slow command travels alone."""
     if command[0] == "G" and command[1:2] in ("0", "1"):  # most lines of a program; none of these is slow
         return 0.0
     return command_in(command).answer_s
