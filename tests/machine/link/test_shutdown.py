@@ -10,7 +10,7 @@ from machine.link.medium import Medium
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
-from machine.link.shutdown import Heaters, emergency_stop, heaters_off
+from machine.link.shutdown import Heaters, Orders, emergency_stop, heaters_off
 from machine.link.status import query_status
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
@@ -217,3 +217,22 @@ def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_w
         answer = ask(port)
     assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZAC")
     assert answer.firmware.startswith("Marlin")
+
+
+class Always(Wire):
+    """A printer that says the same at every turn."""
+
+    def read(self) -> bytes:
+        """What it says."""
+        self.now_s += 0.02
+        return self._said
+
+
+def test_what_refuses_every_line_for_its_checksum_is_a_printer() -> None:
+    assert ask(Always(b"Error: Missing checksum\n"), 0.1).kind is Kind.PRINTER  # type: ignore[arg-type]
+
+
+def test_an_error_whose_second_line_never_comes_is_heard_all_the_same() -> None:
+    wire = Wire(b"Error:0\n")
+    orders = Orders(wire, Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None))
+    assert orders.wait_for(lambda event: event.text == "Error:0", 1.0)
