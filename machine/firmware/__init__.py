@@ -23,7 +23,7 @@ def dialects() -> dict[str, Dialect]:
 
 
 def dialect_of(machine: Machine) -> Dialect:
-    """What is written for a machine."""
+    """The dialect that is written for a machine."""
     return dialects()[machine.dialect]
 
 
@@ -33,7 +33,8 @@ def firmware_of(machine: Machine) -> Firmware:
 
 
 def simulation_of(machine: Machine) -> SimulationRules:
-    """How a machine's firmware is simulated; one that opens files itself has no rules of its own and is taken for Marlin."""
+    """The rules by which a machine's firmware is simulated; one that opens files itself has no rules of its own and is taken for
+    Marlin."""
     return firmware_of(machine).simulated or SIMULATED
 
 

@@ -25,34 +25,23 @@ FilamentMode = Literal["set", "apart", "carried"]
 
 @dataclass(frozen=True)
 class Command:
-    """One row of the table; what is left out is False, "" or 0.
+    """One row of the table of commands; what is left out is False, "" or 0."""
 
-    does: in words.
-    moves: what it moves. homes: it seeks the end stops of axes. probes: it seeks contact. Neither may be stopped half way.
-    heats: which heater it sets a target for. heats_with: it does so only with one of these words; "": always.
-    waits: what its ok waits for. answer_s: how long that may take; 0: it is answered at once.
-    motors: it switches motors on or off. changes: it makes the rest of a program mean something else.
-    modal: the firmware remembers it, so a pause and a resume say it again. repeatable: done twice in a row it leaves what it
-    leaves when done once. shows: it displays or names something, and a print is none the worse without it. tunes: a print goes
-    on without it, too, but with a warning.
-    refused: why no program may hold it: the sender alone may give it, or nobody.
-    """
-
-    does: str
+    does: str  # in words
     moves: Moves = ""
-    homes: bool = False
-    probes: bool = False
-    heats: Heats = ""
-    heats_with: str = ""
-    waits: Waits = ""
-    answer_s: float = 0.0
-    motors: bool = False
-    changes: bool = False
-    modal: bool = False
-    repeatable: bool = False
-    shows: bool = False
-    tunes: bool = False
-    refused: str = ""
+    homes: bool = False  # seeks the end stops of axes; like a probing it may not be stopped half way
+    probes: bool = False  # seeks contact
+    heats: Heats = ""  # the heater that it sets a target for
+    heats_with: str = ""  # it does so only with one of these words; "": always
+    waits: Waits = ""  # what its ok waits for
+    answer_s: float = 0.0  # how long that may take; 0: it is answered at once
+    motors: bool = False  # switches motors on or off
+    changes: bool = False  # makes the rest of a program mean something else
+    modal: bool = False  # the firmware remembers it, so a pause and a resume say it again
+    repeatable: bool = False  # done twice in a row it leaves what it leaves when done once
+    shows: bool = False  # displays or names something, and a print is none the worse without it
+    tunes: bool = False  # a print goes on without it, too, but with a warning
+    refused: str = ""  # why no program may hold it: the sender alone may give it, or nobody
 
     @property
     def must_end(self) -> bool:

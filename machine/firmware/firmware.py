@@ -12,10 +12,6 @@ from typing import Literal
 from machine.firmware.dialect import Dialect
 from profiles.errors import PortError
 
-# Coordinates and steps by letter -> the answer to M114.
-PositionReport = Callable[[Mapping[str, float], Mapping[str, int]], str]
-# Nozzle, its target, bed, its target, all deg C -> what M105 answers.
-TemperatureReport = Callable[[float, float, float, float], str]
 BYTE_BITS = 10  # start, eight, stop
 BAUDS = (115200, 250000, 230400, 500000, 1000000, 57600)  # what firmwares are built with, the usual ones first
 SLOWEST_BAUD, FASTEST_BAUD = 1200, 4_000_000  # that an adapter is known to take
@@ -29,30 +25,19 @@ FRAME_CHARACTERS = FRAME_BYTES - len("\n") + NUMBER_DIGITS  # of those that a fi
 
 @dataclass(frozen=True)
 class SimulatedSettings:
-    """Settings of a simulated printer. letters: of X Y Z and what turns the table, the filament last; limits: mm or deg, and
-    steps a mm or degree: of all but the filament; speeds, accelerations: of all, per s and s2; printing, travelling: of M204,
-    mm/s2; jerk: mm/s."""
+    """Settings of a simulated printer, per s and s2."""
 
-    letters: str
-    limits: Sequence[tuple[float, float]]
-    steps: Sequence[float]
+    letters: str  # of X Y Z and what turns the table, the filament last
+    limits: Sequence[tuple[float, float]]  # mm or deg, of all but the filament
+    steps: Sequence[float]  # a mm or degree, of all but the filament
     speeds: Sequence[float]
     accelerations: Sequence[float]
-    printing: float
-    travelling: float
-    jerk: float
+    printing: float  # mm/s2 of M204
+    travelling: float  # mm/s2 of M204
+    jerk: float  # mm/s
     soft_limits: bool
     nozzle_limit_c: float
     bed_limit_c: float
-
-
-# A command and the settings -> the lines that it is answered with before its ok.
-SettingsReport = Callable[[str, SimulatedSettings], list[str]]
-
-
-def no_settings_report(command: str, settings: SimulatedSettings) -> list[str]:
-    """The simulation of a firmware that tells nothing by commands."""
-    return []
 
 
 def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
@@ -71,53 +56,43 @@ def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, be
 
 @dataclass(frozen=True)
 class SimulationRules:
-    """Behaviour of the firmware as a host sees it; {} is the command or the coordinates.
+    """Behaviour of the firmware as a host sees it; {} is the command or the coordinates."""
 
-    identity: the FIRMWARE_NAME line of M115, {axes}: how many; identity_in_ok: it stands behind the ok. banner: said after a
-    restart. numbers: "resend": lines are checked and asked for again; "drop": a bad checksum is dropped in silence, any number
-    is taken; "ignore": number and checksum are cut off unread. queue_lines: kept before the one at work is done; more wait.
-    blocks: planned moves. min_segment_s: shorter moves are stretched while few wait. urgent: where an M112 is seen before its
-    turn ("bytes": an emergency parser, "lines": when its line has been read). unknown, cold, unhomed, out_of_range: what is
-    said of such commands; out_of_range "": the target is clamped without a word. cold_moves: a cold move is made without
-    filament. heater_fault: its own reason when a heater fails. kill: said when it stops for ever; after_kill: said to every line
-    from then on, {}: why it has stopped; answers_killed: commands that are answered otherwise. has_build_options: it is built
-    with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
-    behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
-    it believes itself at its home positions, and keeps only axes that were homed inside the limits.
-    settings: its answers to commands that ask for its settings. answers_blank: an empty line is answered with ok.
-    idle_after_s: when nothing has moved for that long the motors of its first idle_axes go off, which M84 S may forbid; inf: they
-    stay on. idle_shuts_down: heaters go off, too, and nothing moves any more before it is homed; a dwell is a move, and M84 knows
-    no S.
-    """
-
-    identity: str
-    banner: tuple[str, ...]
+    identity: str  # the FIRMWARE_NAME line of M115, {axes}: how many
+    banner: tuple[str, ...]  # said after a restart
+    # resend: lines are checked and asked for again; drop: a line with a bad checksum is dropped in silence, any number is taken;
+    # ignore: number and checksum are cut off unread
     numbers: Literal["resend", "drop", "ignore"]
-    queue_lines: int
-    urgent: Literal["bytes", "lines", ""]
-    unknown: str
-    cold: tuple[str, ...]
-    unhomed: str
-    kill: tuple[str, ...]
-    blocks: int = 15
-    min_segment_s: float = 0.0
-    cold_moves: bool = True
-    out_of_range: str = ""
-    heater_fault: str = ""
-    after_kill: tuple[str, ...] = ()
-    answers_killed: Mapping[str, str] = field(default_factory=dict)
-    has_build_options: bool = False
-    identity_in_ok: bool = False
-    reports_position: bool = False
-    position: PositionReport = position_report
-    temperatures: TemperatureReport = temperature_report
-    settings: SettingsReport = no_settings_report
-    while_heating: str = " W:?"
-    lacks: frozenset[str] = frozenset()
+    queue_lines: int  # kept before the one at work is done; more wait
+    urgent: Literal["bytes", "lines", ""]  # an M112 is seen before its turn: by an emergency parser, or when its line is read
+    unknown: str  # said of a command that it does not know,
+    cold: tuple[str, ...]  # of cold extrusion,
+    unhomed: str  # of a move before homing,
+    kill: tuple[str, ...]  # when it stops for ever
+    blocks: int = 15  # planned moves
+    min_segment_s: float = 0.0  # shorter moves are stretched while few wait
+    cold_moves: bool = True  # a cold move is made without filament
+    out_of_range: str = ""  # said of a target outside the limits; "": the target is clamped without a word
+    heater_fault: str = ""  # its own reason when a heater fails
+    after_kill: tuple[str, ...] = ()  # said to every line once it has stopped for ever, {}: why it has stopped
+    answers_killed: Mapping[str, str] = field(default_factory=dict)  # commands that are answered otherwise then
+    has_build_options: bool = False  # it is built with options that a host can notice (BuildOptions of the simulator)
+    identity_in_ok: bool = False  # the FIRMWARE_NAME line stands behind the ok
+    reports_position: bool = False  # G28 and G92 print it
+    # coordinates and steps by letter -> the answer to M114
+    position: Callable[[Mapping[str, float], Mapping[str, int]], str] = position_report
+    # nozzle, its target, bed, its target, deg C -> the answer to M105
+    temperatures: Callable[[float, float, float, float], str] = temperature_report
+    # a command and the settings -> the lines before its ok
+    settings: Callable[[str, SimulatedSettings], list[str]] = lambda command, settings: []
+    while_heating: str = " W:?"  # behind the temperatures of a command that waits for them
+    lacks: frozenset[str] = frozenset()  # commands it does not know
+    # After a restart it believes itself at its home positions, and keeps only axes that were homed inside the limits.
     starts_at_home: bool = False
-    answers_blank: bool = False
-    idle_after_s: float = inf
-    idle_axes: int = 0
+    answers_blank: bool = False  # an empty line is answered with ok
+    idle_after_s: float = inf  # when nothing has moved for that long
+    idle_axes: int = 0  # the motors of its first axes go off, which M84 S may forbid,
+    # and heaters, too, and nothing moves any more before it is homed; a dwell is a move then, and M84 knows no S.
     idle_shuts_down: bool = False
 
 
@@ -130,61 +105,45 @@ def check_baud(baud: int) -> None:
 
 @dataclass(frozen=True)
 class LineRules:
-    """Rules of the firmware's end of the serial line, on which the sender relies.
+    """Rules of the firmware's end of the serial line, on which the sender relies."""
 
-    resends: it asks again for a damaged line; one that does not drops the line without a word, and a repeat could be done
-    twice, so an unanswered line ends the print. resend_ok: an `ok` that acknowledges nothing follows Resend. places: lines in
-    flight while its numbered answers report no free places; places_plain: while its answers carry no numbers. rx_bytes: what
-    the receive buffer holds. silence_s: how long a line may stay without answer once it was asked about, None: as the
-    stream's timing says. last_number: then the numbers begin anew. reports_rotary_axes: M114 names every axis that a program
-    may move. waiting_moves: how many may wait behind the newest acknowledged one where its answers do not tell, None: any
-    number. revival: what lets it print again after it has halted. keep_awake: said every minute of a pause, or it lets its motors
-    go by itself; "": it does not.
-    """
-
+    # It asks again for a damaged line; one that does not drops the line without a word, and a repeat could be done twice, so an
+    # unanswered line ends the print.
     resends: bool = True
-    resend_ok: bool = True
-    places: int = 1
-    places_plain: int = 1
+    resend_ok: bool = True  # an `ok` that acknowledges nothing follows Resend
+    places: int = 1  # lines in flight while its numbered answers report no free places
+    places_plain: int = 1  # lines in flight while its answers carry no numbers
     rx_bytes: int = 127  # an AVR's 128-byte receive ring holds one byte less; a fuller one loses bytes without a word
+    # How long a line may stay without answer once it was asked about, None: as the stream's timing says.
     silence_s: float | None = None
-    last_number: int = LAST_NUMBER
-    reports_rotary_axes: bool = False
+    last_number: int = LAST_NUMBER  # then the numbers begin anew
+    reports_rotary_axes: bool = False  # M114 names every axis that a program may move
+    # How many moves may wait behind the newest acknowledged one where its answers do not report that, None: any number.
     waiting_moves: int | None = None
-    keep_awake: str = ""
-    revival: str = "switch it off and on, or press its reset button,"
+    keep_awake: str = ""  # sent every minute of a pause, or it lets its motors go by itself; "": it does not
+    revival: str = "switch it off and on, or press its reset button,"  # lets it print again after it has halted
 
 
 @dataclass(frozen=True)
 class ProbingRules:
-    """{low} is the Z to go down to at most, mm, {speed} mm/s, {feed} mm/min.
+    """A firmware's command that probes downwards, and its answers."""
 
-    contact: pattern of the answer with the tip's Z at contact; "": M114 is asked where the tip has stopped, at {low} when
-    nothing was met. corrected: pattern of an answer whose Z the firmware has corrected by the probe's offset that it knows
-    itself. limited: {low} is kept; otherwise it goes on to the axis' end. silent: what it says when nothing was met; early: when
-    the probe senses something before it moves. needs: what it must be built or set up with.
-    """
-
-    command: str
-    needs: str
-    contact: str = ""
-    corrected: str = ""
-    limited: bool = True
-    silent: str = ""
-    early: str = ""
+    command: str  # {low} is the Z to go down to at most, mm, {speed} mm/s, {feed} mm/min
+    needs: str  # what it must be built or set up with
+    contact: str = ""  # pattern of the answer with the tip's Z at contact; "": M114 is asked, at {low} when nothing was met
+    corrected: str = ""  # pattern of an answer whose Z the firmware has corrected by the probe's offset that it knows itself
+    limited: bool = True  # {low} is kept; otherwise it goes on to the axis' end
+    silent: str = ""  # the answer when nothing was met
+    early: str = ""  # the answer when the probe senses something before it moves
 
 
 @dataclass(frozen=True)
 class Firmware:
-    """A firmware. name: as people call it. signs: words of its FIRMWARE_NAME line in M115, lower case; (): it is not recognised.
+    """A firmware and its dialects; none of one that prints what is written for another."""
 
-    dialects: name in machine.dialect -> what is written for it; none of a firmware that prints what is written for another.
-    line: its end of the serial line. simulated: None: the simulated printer behaves as Marlin. probing: None: it is not asked to.
-    """
-
-    name: str
-    signs: tuple[str, ...] = ()
-    dialects: Mapping[str, Dialect] = field(default_factory=dict)
+    name: str  # as people call it
+    signs: tuple[str, ...] = ()  # words of its FIRMWARE_NAME line in M115, lower case; (): it is not recognised
+    dialects: Mapping[str, Dialect] = field(default_factory=dict)  # by their names in machine.dialect
     line: LineRules = field(default_factory=LineRules)
-    simulated: SimulationRules | None = None
-    probing: ProbingRules | None = None
+    simulated: SimulationRules | None = None  # None: the simulated printer behaves as Marlin
+    probing: ProbingRules | None = None  # None: it is not asked to probe

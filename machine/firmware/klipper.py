@@ -104,7 +104,7 @@ AXES = replace(
 
 
 def stepper_name(axis: RotaryAxis) -> str:
-    """What the [manual_stepper] of a rotary axis is called."""
+    """The name of the [manual_stepper] of a rotary axis."""
     return axis.stepper or f"stepper_{axis.letter.lower()}"
 
 

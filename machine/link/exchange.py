@@ -66,7 +66,7 @@ class Exchange:
         self.settle()
 
     def ask_position(self) -> dict[str, float] | None:
-        """Where the printer says it stands, letter -> mm or deg, all moves over; None when it does not report it."""
+        """The position that the printer reports, letter -> mm or deg, all moves over; None when it does not report it."""
         self.send("M400")
         self.settle()
         self._position = None

@@ -91,7 +91,7 @@ class Feed:
         self._finish()
 
     def _approach(self, resume_point: ResumePoint) -> None:
-        """What stands before the first line of a resumed print, proved by the printer's own position."""
+        """The commands before the first line of a resumed print, proved by the printer's own position."""
         self.set_state(PrintState.RESUMING)
         self.history = self._new_history(resume_point.line - 1)
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
@@ -136,7 +136,7 @@ class Feed:
                 self._program_pause = text.partition(PAUSE_REMARK)[2].strip()
 
     def _before(self, command: str) -> None:
-        """What is due before the next command of the program."""
+        """Do what is due before the next command of the program."""
         if self.pending.lines:
             for own in self.pending.next_lines(self.modal):
                 self.exchange.send(own)

@@ -44,18 +44,13 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of whatever stands at a port. words: the firmware's own line, its error, what it is busy with, or the last words
-    of a stranger.
-
-    letters: axes that M114 reports, the filament's left out; "" when none. limits: letter -> least and greatest
-    value, of a firmware that reports them. revival: what lets a printer that has halted print again.
-    """
+    """The answer of whatever stands at a port."""
 
     kind: Kind
-    words: str = ""
-    letters: str = ""
-    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
-    revival: str = LineRules.revival
+    words: str = ""  # the firmware's own line, its error, what it is busy with, or the last words of a stranger
+    letters: str = ""  # axes that M114 reports, the filament's left out; "" when none
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)  # least and greatest value, where they are reported
+    revival: str = LineRules.revival  # lets a printer that has halted print again
 
     @property
     def firmware(self) -> str:
@@ -93,7 +88,7 @@ def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: F
 
 
 class _Inquiry:
-    """What one asking has brought so far."""
+    """An inquiry at a port, and the answers so far."""
 
     def __init__(self, port: Port, stop: Flag) -> None:
         self._stop = stop
@@ -121,7 +116,7 @@ class _Inquiry:
             raise CancelledError
 
     def answer(self) -> Answer:
-        """What all of it amounts to."""
+        """The answer that all of them amount to."""
         if self._fault:
             if GRBL_SAYS.fullmatch(self._fault):
                 return Answer(Kind.STRANGER, self._fault)

@@ -48,42 +48,36 @@ BINARY = getattr(os, "O_BINARY", 0)  # Windows would write carriage returns othe
 
 @dataclass(frozen=True)
 class JournalHeading:
-    """What is printed: the program's file with its SHA-256, the name for people, and the resolved profile as plain values."""
+    """The program that is printed."""
 
-    program: str
+    program: str  # its file
     sha256: str
-    name: str
-    profile: dict[str, Any]
+    name: str  # for people
+    profile: dict[str, Any]  # the resolved one as plain values
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Lines of the program, from 1: sent, acknowledged, surely executed; the newest acknowledged wire number; the pose X Y Z tilt
-    turn E after the acknowledged line (of a tip that was taken away from the print, where it stands), unwrapped, None where it is
-    not known; what the print was doing.
-    """
+    """Progress of a print; lines of the program count from 1."""
 
     sent: int = 0
     acknowledged: int = 0
-    executed: int = 0
-    number: int = 0
+    executed: int = 0  # surely
+    number: int = 0  # on the wire, of the newest acknowledged line
+    # X Y Z tilt turn E after the acknowledged line, unwrapped, or where the tip stands that has left the print; None: not known.
     pose: tuple[float | None, ...] = ()
-    state: str = "printing"
+    state: str = "printing"  # what the print was doing
 
 
 @dataclass(frozen=True)
 class JournalContents:
-    """A journal that was read: its heading and its newest checkpoint.
-
-    torn: records that a power cut of the computer has damaged. records: number of the newest one, from 1; 0 when nothing was
-    recorded. computer_ran_on: the computer has surely not restarted since the print began, so all that was recorded is there.
-    """
+    """A journal that was read."""
 
     heading: JournalHeading
-    last: Checkpoint
-    torn: int
-    records: int
-    computer_ran_on: bool
+    last: Checkpoint  # the newest
+    torn: int  # records that a power cut of the computer has damaged
+    records: int  # number of the newest one, from 1; 0 when nothing was recorded
+    computer_ran_on: bool  # it has surely not restarted since the print began, so all that was recorded is there
 
     @property
     def finished(self) -> bool:
@@ -135,7 +129,7 @@ class Journal:
 
     @property
     def warning(self) -> str:
-        """The same as a sentence for the person at the print."""
+        """The trouble as a sentence for the person at the print, "" when there is none."""
         return f"this print can no longer be resumed: {self.trouble}" if self.trouble else ""
 
     def update(self, checkpoint: Checkpoint, now_s: float) -> None:
@@ -144,9 +138,9 @@ class Journal:
             self._noted_s = now_s
             self.write(checkpoint)
 
-    def record_due(self, line: int, lines: int = EVERY_LINES) -> bool:
+    def record_due(self, line: int) -> bool:
         """Whether a record is due before this line is sent, so that the newest one is less than EVERY_LINES lines behind."""
-        return line - self.last.sent >= lines
+        return line - self.last.sent >= EVERY_LINES
 
     def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
         """Write a checkpoint at once; hurry: to the disk, too, for a computer may lose its power with its printer."""

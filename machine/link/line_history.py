@@ -77,7 +77,7 @@ class LineHistory:
 
     @property
     def waiting(self) -> int:
-        """How many moves may still wait in the planner."""
+        """The number of moves that may still wait in the planner."""
         return len(self._planned)
 
     @property
@@ -161,7 +161,7 @@ class Barriers:
         return due
 
     def check_due(self, command: str, tracked: bool, now_s: float) -> bool:
-        """Where the position is to be looked at: at a layer's end, or in a travel where the printer reports little."""
+        """Whether the position is to be checked: at a layer's end, or in a travel where the printer reports little."""
         ended, self.layer_ended = self.layer_ended, False
         if tracked:
             due = ended and now_s - self._checked_s >= CHECK_S

@@ -34,17 +34,14 @@ class Wire(Protocol):
 
 @dataclass(frozen=True)
 class Medium:
-    """Access to a line and to the clock: opens a line (name, baud; raises PortError), gives the time (s), and waits (s).
+    """Access to lines and to the clock."""
 
-    devices: the serial ports that there are, where a lost one may have come back. lost_s: the longest wait for a port that was
-    lost in mid-print; a person finds the plug in two minutes, and a hot nozzle should not stand in the print for longer. timing:
-    the time limits of the printer's answers.
-    """
-
-    open: Callable[[str, int], Wire] = open_port
+    open: Callable[[str, int], Wire] = open_port  # a line by its name, at a baud rate; raises PortError
     now_s: Callable[[], float] = monotonic
     wait: Callable[[float], None] = sleep
-    devices: Callable[[], tuple[SerialDevice, ...]] = serial_devices
+    devices: Callable[[], tuple[SerialDevice, ...]] = serial_devices  # where a lost port may have come back
+    # The longest wait for a port that was lost in mid-print: a person finds the plug in two minutes, and a hot nozzle should not
+    # stand in the print for longer.
     lost_s: float = 120.0
     timing: Timing = field(default_factory=Timing)
 

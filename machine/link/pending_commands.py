@@ -23,7 +23,7 @@ FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
 
 
 class Command(Enum):
-    """What may be asked of a running print."""
+    """Commands to a running print."""
 
     PAUSE = auto()
     RESUME = auto()
@@ -73,19 +73,17 @@ class EmergencyError(Exception):
 
 @dataclass
 class PendingCommands:
-    """The requests that were accepted. pause_s: since when a pause is wanted; resume: the print is to go on; lines: commands to
-    be sent between those of the program; message: why the newest request cannot be granted.
-    """
+    """The requests that were accepted."""
 
     axes: Axes
     limit: int = LINE_LIMIT
     control: Control = field(default_factory=Control)
-    pause_s: float | None = None
-    resume: bool = False
-    lines: deque[str] = field(default_factory=deque)
+    pause_s: float | None = None  # since when a pause is wanted
+    resume: bool = False  # the print is to go on
+    lines: deque[str] = field(default_factory=deque)  # commands to be sent between those of the program
     feed_percent: float = 100.0
     flow_percent: float = 100.0
-    message: str = ""
+    message: str = ""  # why the newest request cannot be granted
 
     def poll(self, state: PrintState, now_s: float) -> None:
         """Take what was asked since. Raises CancelledError, EmergencyError."""

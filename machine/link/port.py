@@ -40,17 +40,14 @@ with suppress(ImportError):
 
 @dataclass(frozen=True)
 class SerialDevice:
-    """A serial port of this computer. name: the stable one of a USB adapter where there is one, else the path.
+    """A serial port of this computer."""
 
-    model: vendor and product of a USB device; location: the USB socket it is plugged into; "" where they are not known.
-    """
-
-    name: str
+    name: str  # the stable one of a USB adapter where there is one, else the path
     path: str
     description: str
     serial_number: str
-    model: str = ""
-    location: str = ""
+    model: str = ""  # vendor and product of a USB device, "" where they are not known
+    location: str = ""  # the USB socket it is plugged into
 
 
 class RefusedPortError(PortError):
@@ -208,7 +205,7 @@ class _Socket:
         return data
 
     def reset_output_buffer(self) -> None:
-        """What was handed over is the system's."""
+        """Nothing: bytes that were handed over are the system's."""
 
     def close(self) -> None:
         """Hang up."""
@@ -303,7 +300,7 @@ def refusal(name: str, baud: int, error: Exception) -> str:
 
 
 def _absence() -> str:
-    """The same for a port that does not exist, with those that do."""
+    """The refusal of a port that does not exist, with those that do."""
     names = [device.name for device in serial_devices()]
     return f"does not exist: {'there are ' + ', '.join(names) if names else 'no serial port was found'}"
 

@@ -75,13 +75,7 @@ def follows(before: PrintState, after: PrintState) -> bool:
 
 @dataclass(frozen=True)
 class PrintStatus:
-    """A moment of a print. None: not known (yet).
-
-    file_line: line in the program's file of the newest acknowledged command, from 1; file, bytes_read: what a print server
-    prints, and how far into it. layers: of the part; at: where the axes stand, by their letters, mm and deg. message: the newest
-    word to the person watching; warning: what that person must know from now on, beside every message; "" when there is none.
-    heat_age_s: since the temperatures were reported. homed: a printer in hand may be moved.
-    """
+    """A moment of a print. None: not known (yet)."""
 
     state: PrintState = PrintState.PRINTING
     elapsed_s: float = 0.0
@@ -94,17 +88,17 @@ class PrintStatus:
     part: int | None = None
     parts: int | None = None
     layer: int | None = None
-    layers: int | None = None
-    file_line: int = 0
-    file: str = ""
-    bytes_read: int | None = None
-    at: Mapping[str, float] = field(default_factory=dict)
+    layers: int | None = None  # of the part
+    file_line: int = 0  # line in the program's file of the newest acknowledged command, from 1
+    file: str = ""  # what a print server prints,
+    bytes_read: int | None = None  # and how far into it
+    at: Mapping[str, float] = field(default_factory=dict)  # where the axes stand, by their letters, mm and deg
     feed_percent: float = 100.0
     flow_percent: float = 100.0
-    message: str = ""
-    warning: str = ""
-    heat_age_s: float = 0.0
-    homed: bool = False
+    message: str = ""  # the newest word to the person watching
+    warning: str = ""  # what that person must know from now on, beside every message; "" when there is none
+    heat_age_s: float = 0.0  # since the temperatures were reported
+    homed: bool = False  # a printer in hand may be moved
 
     @property
     def heat_is_old(self) -> bool:
@@ -120,7 +114,7 @@ class PrintStatus:
 
 @dataclass
 class ProgramPosition:
-    """Where in the program the sender stands, gathered line by line."""
+    """The sender's place in the program, gathered line by line."""
 
     part: int | None = None
     parts: int | None = None

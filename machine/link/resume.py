@@ -57,33 +57,27 @@ NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: q
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """Where a resumed print goes on: the first line of the program to be sent, and commands before it.
+    """The place where a resumed print goes on."""
 
-    reason: what is certain about it, in words; homes: X and Y.
-    """
-
-    line: int
-    before: tuple[str, ...]
-    reason: str = ""
-    homes: bool = False
+    line: int  # the first one of the program to be sent
+    before: tuple[str, ...]  # commands ahead of it
+    reason: str = ""  # what is certain about it, in words
+    homes: bool = False  # X and Y
 
 
 @dataclass(frozen=True)
 class InterruptedPrint:
-    """An interrupted print by its journal and its program. line: the first one not surely executed; modal: the state before it;
-    ahead: line -> the state after its command, which may have been done since; stroked: whether anything was printed before.
-    stood_mm: the height of the tip that a person has read off.
-    """
+    """An interrupted print by its journal and its program."""
 
-    line: int
+    line: int  # the first one not surely executed
     last: int
-    modal: ModalState
+    modal: ModalState  # before that line
     position: ProgramPosition
     printed: Printed
-    stroked: bool
-    ahead: Mapping[int, ModalState]
+    stroked: bool  # anything was printed before
+    ahead: Mapping[int, ModalState]  # line -> the state after its command, which may have been done since
     checkpoint: Checkpoint
-    stood_mm: float | None = None
+    stood_mm: float | None = None  # the height of the tip that a person has read off
 
 
 def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile: Profile, limit: int) -> InterruptedPrint:
@@ -145,11 +139,13 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     span = f"lines {point.line} to {point.last} may have been printed already"
     at = _reported_position(point, status) if alive or (alive is None and not begun) else None
     if at is not None and not status.greeted:
-        before = _approach(point, profile, *at)
-        return ResumePoint(point.line, before, f"the printer has not restarted and knows its place; {span}")
+        return ResumePoint(
+            point.line, _approach(point, profile, *at), f"the printer has not restarted and knows its place; {span}"
+        )
     if not status.greeted:
         _check_begun(status, begun, profile)
-    return ResumePoint(point.line, _homed_approach(point, profile), f"the printer has restarted; {span}", homes=True)
+    before = _approach(point, profile, *position_at_interruption(point, profile), homes=True)
+    return ResumePoint(point.line, before, f"the printer has restarted; {span}", homes=True)
 
 
 def _check_begun(status: PrinterStatus, begun: bool, profile: Profile) -> None:
@@ -222,7 +218,7 @@ def _in_words(status: PrinterStatus) -> str:
 
 
 def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[Floats, Pose] | None:
-    """Where the printer says it stands; None where an axis is missing."""
+    """The position that the printer reports; None where an axis is missing."""
     if status.position is None:
         return None
     reported, letters = status.position, point.modal.axes.letters
@@ -240,25 +236,23 @@ def _goal(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
     return standing
 
 
-def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose) -> tuple[str, ...]:
-    """Heat (the tip may be stuck in the plastic), up, back over the print, down, filament, modes."""
+def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose, homes: bool = False) -> tuple[str, ...]:
+    """Heat (the tip may be stuck in the plastic), up, back over the print, down, filament, modes.
+
+    homes: after a restart, the axes are set to where they stand, the tip rises, X and Y are homed.
+    """
     goal, goal_pose = _goal(point, profile)
     pull, push = filament_commands(point.modal, profile)
-    path = return_moves(profile, point.printed, Turn(pose, goal_pose, at, goal))
-    return ("G21", "G90", *heat_commands(point.modal, profile), *pull, "G90", *path, *push, *point.modal.lines())
-
-
-def _homed_approach(point: InterruptedPrint, profile: Profile) -> tuple[str, ...]:
-    """The same after a restart: the axes are called what they stand at, the tip rises, X and Y are homed."""
-    (goal, goal_pose), (at, pose) = _goal(point, profile), position_at_interruption(point, profile)
-    pull, push = filament_commands(point.modal, profile)
-    heat = (*heat_commands(point.modal, profile), *pull, "G90")
-    path = homed_return_moves(profile, point.printed, Turn(pose, goal_pose, at, goal), heat)
+    heat, way = (*heat_commands(point.modal, profile), *pull, "G90"), Turn(pose, goal_pose, at, goal)
+    if homes:
+        path = homed_return_moves(profile, point.printed, way, heat)
+    else:
+        path = ["G21", "G90", *heat, *return_moves(profile, point.printed, way)]
     return (*path, *push, *point.modal.lines())
 
 
 def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
-    """Where the axes stood when the power went; raises JournalError when tip or table may have been on a way."""
+    """The position of the axes when the power went; raises JournalError when tip or table may have been on a way."""
     state, known = point.checkpoint.state, [value for value in point.checkpoint.pose[:E_AXIS] if value is not None]
     if state in PARKED and len(known) == E_AXIS:
         return np.array(known[:3]), Pose(*known[3:])

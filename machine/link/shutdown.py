@@ -196,7 +196,7 @@ class HeaterGuard:
 
     @property
     def revival(self) -> str:
-        """What a person does about a printer that has halted."""
+        """Advice on a printer that has halted."""
         return f"{self._exchange.connection.greeting.firmware.line.revival} before the next print"
 
 

@@ -28,16 +28,13 @@ SEVERAL = 3  # coordinates that are not 0 and agree: a printer that has restarte
 
 @dataclass
 class PrinterStatus:
-    """The number of the last line the printer has taken, where it says it stands, its temperatures; None: not reported.
+    """A printer's own report; None: not reported."""
 
-    greeted: the firmware said its greeting meanwhile: it has just restarted. fault: its own words for an error, "" for none.
-    """
-
-    last_number: int | None = None
+    last_number: int | None = None  # of the last line that it has taken
     position: dict[str, float] | None = None
     temperature: Temperature = field(default_factory=Temperature)
-    greeted: bool = False
-    fault: str = ""
+    greeted: bool = False  # the firmware said its greeting meanwhile: it has just restarted
+    fault: str = ""  # its own words for an error
 
     def _read(self, event: Event) -> None:
         """Any event; a board that restarts begins its line numbers anew."""

@@ -27,10 +27,7 @@ HEATERS_OFF_S: dict[type[PrinterError], float] = {FirmwareError: 1.0, SilenceErr
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a print ended. heaters_off, after a cancel: whether the printer's own report proves it; None when
-    the program ran to its own end, or when nothing of it had been sent. halted: the printer has stopped for good; what lets
-    it print again, "" when it lives.
-    """
+    """The end of a print."""
 
     cancelled: bool
     sent: int
@@ -39,8 +36,9 @@ class Outcome:
     elapsed_s: float
     firmware: str
     warnings: tuple[str, ...]
+    # After a cancel: the printer's own report proves it. None: the program ran to its own end, or nothing of it had been sent.
     heaters_off: bool | None = None
-    halted: str = ""
+    halted: str = ""  # the printer has stopped for good: what lets it print again
 
 
 def print_lines(
@@ -215,7 +213,7 @@ class _Print:
         return heaters
 
     def _hint(self) -> str:
-        """How to go on with what is half printed, or that this is not possible; proved by closing the journal."""
+        """Advice on how a print that was cut off goes on, or that it cannot; proved by closing the journal."""
         if self.journal is None:
             return ""
         self.journal.close()

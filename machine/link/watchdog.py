@@ -26,12 +26,12 @@ SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prom
 
 @dataclass
 class HeaterWatch:
-    """One heater's way to its target: how far (K) it may stay from it for how long (s), and what counts as getting nearer (K)."""
+    """One heater's way to its target."""
 
     name: str
-    off_c: float
-    off_s: float
-    nearer_c: float = 2.0
+    off_c: float  # how far it may stay from it, K,
+    off_s: float  # for how long
+    nearer_c: float = 2.0  # what counts as getting nearer, K
     target_c: float | None = None
     nearest_c: float = inf  # least distance from the target since it was set or reached
     nearest_s: float = 0.0  # when that was
@@ -123,7 +123,7 @@ class PrinterReports:
 
     @property
     def warnings(self) -> list[str]:
-        """What the printer said about a program that it does not understand; what it said again is counted."""
+        """The printer's words about a program that it does not understand; repetitions are counted."""
         return [text if count == 1 else f"{text} (x {count})" for text, count in self._warned.items()]
 
     def _read_echo(self, text: str) -> None:

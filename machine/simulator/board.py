@@ -48,28 +48,21 @@ class Order(NamedTuple):
 
 @dataclass(frozen=True)
 class BuildOptions:
-    """Build options. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits. queue: Marlin's BUFSIZE,
-    lines kept before the one at work is done; None: its default.
-
-    realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT; waits: its NO_TIMEOUTS, `wait` every
-    second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none); must_home: X Y Z are not moved before they
-    are homed (Klipper, RepRapFirmware, Marlin's NO_MOTION_BEFORE_HOMING); home_start: after a restart it believes itself at its
-    home positions as Marlin does, otherwise at 0 0 0; checksums: it refuses lines without number and checksum.
-    """
+    """Build options of a simulated firmware."""
 
     advanced_ok: bool = True
     emergency_parser: bool = True
     busy: bool = True
     autoreport: bool = True
-    rx_ring: int | None = None
-    realtime: bool = False
-    geometry: bool = True
-    waits: bool = False
-    resend_ok: bool = True
-    must_home: bool = False
-    home_start: bool = True
-    checksums: bool = False
-    queue: int | None = None
+    rx_ring: int | None = None  # bytes of a UART's receive ring that overflows; None: USB, which waits
+    realtime: bool = False  # Marlin's REALTIME_REPORTING_COMMANDS
+    geometry: bool = True  # its M115_GEOMETRY_REPORT
+    waits: bool = False  # its NO_TIMEOUTS, `wait` every second when idle
+    resend_ok: bool = True  # an `ok` follows each Resend (Smoothieware has none)
+    must_home: bool = False  # X Y Z are not moved before they are homed (Klipper, RRF, Marlin's NO_MOTION_BEFORE_HOMING)
+    home_start: bool = True  # after a restart it believes itself at its home positions as Marlin does, otherwise at 0 0 0
+    checksums: bool = False  # lines without number and checksum are refused
+    queue: int | None = None  # Marlin's BUFSIZE, lines kept before the one at work is done; None: its default
 
 
 def build_options(machine: Machine, baud: int | None) -> BuildOptions:
@@ -118,7 +111,7 @@ class Heater:
         return self._since_s + self._time_constant_s * log((self._from_c - goal) / (value_c - goal))
 
     def _goal(self) -> tuple[float, float]:
-        """Where it would go without a thermostat, and where the thermostat stops it."""
+        """Its final temperature without a thermostat, and the one at which the thermostat stops it."""
         stop = ROOM_C if self._failed else max(self.target_c, ROOM_C)
         return (self._ceiling_c if stop > self._from_c else ROOM_C), stop
 

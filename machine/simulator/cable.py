@@ -17,7 +17,7 @@ LATE_S = 1e-9  # the firmware is asked this much late, because a clock in anothe
 
 
 class _FaultQueue:
-    """Where faults strike that count the same thing, in order."""
+    """The places where faults that count the same unit strike, in order."""
 
     def __init__(self, script: FaultScript, unit: Unit, to_host: bool | None = None) -> None:
         chosen = [k for k, fault in enumerate(script.faults) if fault.counted == unit and to_host in (None, fault.to_host)]
@@ -50,7 +50,7 @@ class _Direction:
             self._held.append((self.open_s, data))
 
     def take(self, now_s: float) -> bytes:
-        """What has arrived by now; order is kept, so one late byte holds up all behind it."""
+        """The bytes that have arrived by now; order is kept, so one late byte holds up all behind it."""
         out = []
         while self._held and self._held[0][0] <= now_s:
             out.append(self._held.popleft()[1])
@@ -109,7 +109,7 @@ class Cable:
         return min((t for t in times if t > now_s), default=inf)
 
     def exchange(self, data: bytes, now_s: float = 0.0) -> bytes:
-        """What the host hears after these bytes."""
+        """Take the host's bytes; returns those that it receives."""
         until_s = inf if self._speed == inf else now_s * self._speed
         if self._clean:
             answers = self._firmware.advance(until_s) if until_s < inf else b""
@@ -219,7 +219,7 @@ class Cable:
             self._out.put(self._spurious_bytes(fault))
 
     def _spurious_bytes(self, fault: Fault) -> bytes:
-        """What comes to the host although no answer of the firmware says it."""
+        """Bytes that come to the host although the firmware has not sent them."""
         if fault.kind == "spurious resend":
             number = max(1, self._firmware.last_number - self._rng.randint(0, 8)) if fault.value is None else fault.value
             return b"Resend: %d\nok\n" % number
@@ -229,7 +229,7 @@ class Cable:
 
 
 def _damaged_ok(fault: Fault, line: bytes) -> bytes:
-    """What arrives of an `ok`."""
+    """The bytes of a damaged `ok` that arrive."""
     return {"swallow ok": b"", "truncate ok": b"o\n", "double ok": line + line}[fault.kind]
 
 
@@ -264,7 +264,7 @@ class _Wire:
         return arrived
 
     def clear(self) -> None:
-        """What is on its way is lost."""
+        """The bytes on their way are lost."""
         self._bytes.clear()
         self._free_s = 0.0
 
@@ -297,7 +297,7 @@ class Uart:
         self._now_s = self._sends_until_s = 0.0
 
     def exchange(self, data: bytes, now_s: float) -> bytes:
-        """What has arrived at the host by now; data: what it writes now."""
+        """Take the bytes that the host writes now; returns those that have arrived there."""
         while (at_s := self._next_s()) < now_s:
             self._exchange_at(at_s)
         self._in.put(data, now_s)

@@ -26,7 +26,8 @@ ENDSTOP_MM = 0.01
 
 
 def command_of(board: Board, name: str) -> Command | None:
-    """What a command does; None: the firmware does not know it. Names without a number are macros, which few firmwares take.
+    """The function of a command; None: the firmware does not know it. Names without a number are macros, which few firmwares
+    take.
 
     HOME_AB and the like are macros of a machine's own.
     """

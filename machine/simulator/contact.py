@@ -34,7 +34,8 @@ def plate_z(machine: Machine, pose: Pose, x: float, y: float) -> float:
 
 
 def ball_z(machine: Machine, ball: TrueBall, pose: Pose, x: float, y: float, flat_mm: float = 0.0) -> float:
-    """The same of the ball, for a tip with a flat end of radius flat_mm: its nearer edge touches first."""
+    """Z at which a tip meets the ball, -inf beside it; for a tip with a flat end of radius flat_mm: its nearer edge touches
+    first."""
     centre = machine_points(machine, pose, np.array([ball.centre_mm]))[0]
     aside = max(hypot(x - centre[0], y - centre[1]) - flat_mm, 0.0)
     return float(centre[2]) + sqrt(ball.radius_mm**2 - aside**2) if aside < ball.radius_mm else -inf
@@ -67,7 +68,7 @@ class ProbedTable:
         return plate if self.ball is None else max(plate, ball_z(self.machine, self.ball, pose, x, y, self.flat_mm))
 
     def stop_z(self, positions: list[float], low_mm: float) -> float:
-        """Where the nozzle's tip is when the probe stops a move down to low_mm: nan where it triggers at no time."""
+        """Z of the nozzle's tip when the probe stops a move down to low_mm: nan where it triggers at no time."""
         x, y, z, tilt, turn = positions
         met = self.surface_z(x + self.offset_mm[0], y + self.offset_mm[1], tilt, turn) - self.offset_mm[2]
         met += self._random.gauss(0.0, self.noise_mm) if self.noise_mm else 0.0

@@ -23,34 +23,20 @@ OK_KINDS: tuple[Kind, ...] = get_args(OkKind)
 MOMENT_KINDS: tuple[Kind, ...] = get_args(MomentKind)
 KINDS = BYTE_KINDS + OK_KINDS + MOMENT_KINDS
 
-# Keys of a fault in a file beside kind, place and direction, with the kinds that know them.
-KEYS: dict[str, tuple[Kind, ...]] = {
-    "bit": ("flip",),
-    "number": ("spurious resend",),
-    "seconds": ("delay", "stall", "block", "disconnect"),
-    "text": ("garbage", "error"),
-}
-
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault, once at a place or again and again by chance.
-
-    at: bytes count from 0 in their direction, answers (lines the printer says) and lines (that the firmware begins to execute)
-    from 1; unit: what `at` counts, "" for the kind's own (units_of). chance: instead of at, the probability at each of them.
-    to_host: of the answers' bytes instead of the commands'. value: which bit is flipped, or the line wrongly asked for; None:
-    the seed decides. seconds: how long a delay, a stall (nothing said), a block (nothing read), a disconnection lasts. text:
-    what is said instead of the kind's own words.
-    """
+    """One fault, once at a place or again and again by chance."""
 
     kind: Kind
+    # Bytes count from 0 in their direction, answers (lines the printer says) and lines (that the firmware begins) from 1.
     at: int | None = None
-    to_host: bool = False
-    value: int | None = None
-    chance: float = 0.0
-    unit: Unit | Literal[""] = ""
-    seconds: float = inf
-    text: str = ""
+    to_host: bool = False  # in the answers' bytes instead of the commands'
+    value: int | None = None  # which bit is flipped, or the line wrongly asked for; None: the seed decides
+    chance: float = 0.0  # instead of `at`, the probability at each place
+    unit: Unit | Literal[""] = ""  # what `at` counts, "": the kind's own (units_of)
+    seconds: float = inf  # how long a delay, a stall (nothing said), a block (nothing read), a disconnection lasts
+    text: str = ""  # what is said instead of the kind's own words
 
     def __post_init__(self) -> None:
         if (self.at is None) == (self.chance == 0.0):
@@ -58,7 +44,7 @@ class Fault:
 
     @property
     def counted(self) -> Unit:
-        """What `at` counts, or what `chance` is a chance of."""
+        """The unit that `at` counts, and at each of which `chance` applies."""
         return self.unit or units_of(self.kind)[0]
 
 
@@ -70,7 +56,8 @@ class FaultScript:
     seed: int = 0
 
     def strikes(self, index: int) -> Iterator[int]:
-        """Where the fault of this index strikes, rising; those of a chance lie as far apart as a geometric law throws them."""
+        """The places where the fault of this index strikes, rising; those of a chance lie as far apart as a geometric law throws
+        them."""
         fault = self.faults[index]
         first = 0 if fault.counted == "byte" else 1
         if fault.at is not None:
@@ -83,7 +70,7 @@ class FaultScript:
 
 
 def units_of(kind: Kind) -> tuple[Unit, ...]:
-    """What the place of such a fault may count, the usual one first."""
+    """The units that the place of such a fault may count, the usual one first."""
     if kind in BYTE_KINDS:
         return ("byte",)
     return ("answer",) if kind in OK_KINDS else ("line", "byte", "answer")
@@ -115,7 +102,7 @@ def _read_fault(table: Mapping[str, Any], where: str) -> Fault:
         raise _wrong(where, "kind", kind, ", ".join(KINDS))
     units = units_of(kind)
     to = ["to"] if "byte" in units else []
-    known = ["kind", *units, "chance", *to, *(key for key, kinds in KEYS.items() if kind in kinds)]
+    known = ["kind", *units, "chance", *to, *(key for key, kinds, _, _ in VALUES if kind in kinds)]
     for key in table:
         if key not in known:
             raise PrinterError(f"{where}: {key} is not a key of {kind!r}: {', '.join(known)} are allowed")
@@ -126,7 +113,7 @@ def _read_fault(table: Mapping[str, Any], where: str) -> Fault:
     seconds = table.get("seconds", inf)
     if kind == "delay" and not (_is_real(seconds) and 0 <= seconds < inf):
         raise _wrong(where, "seconds", table.get("seconds"), "a number of seconds from 0 up")
-    for key, (fits, allowed) in ALLOWED.items():
+    for key, _, fits, allowed in VALUES:
         if key in table and not fits(table[key]):
             raise _wrong(where, key, table[key], allowed)
     unit = "" if placed == ["chance"] else placed[0]
@@ -154,17 +141,17 @@ def _wrong(where: str, key: str, value: Any, allowed: str) -> PrinterError:
     return PrinterError(f"{where}: {key} is {'missing' if value is None else repr(value)}: {allowed} is allowed")
 
 
-# Key of a fault in a file -> whether a value will do, and what is allowed.
-ALLOWED: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "byte": (lambda value: _is_whole(value, 0), "a whole number from 0 up"),
-    **dict.fromkeys(("answer", "line"), (lambda value: _is_whole(value, 1), "a whole number from 1 up")),
-    "chance": (lambda value: _is_real(value) and 1e-12 <= value <= 1, "a number above 0, at most 1"),
-    "to": (lambda value: value in ("printer", "host"), "printer, host"),
-    "bit": (lambda value: _is_whole(value, 0, 7), "a whole number from 0 to 7"),
-    "number": (lambda value: _is_whole(value, 0), "a whole number from 0 up"),
-    "seconds": (lambda value: _is_real(value) and value >= 0, "a number of seconds from 0 up, inf for ever"),
-    "text": (
-        lambda value: isinstance(value, str) and all(ord(c) < 256 for c in value),
-        "text of characters up to \\u00ff, one for each byte",
-    ),
-}
+# Keys of a fault in a file: the kinds that have them beside place and direction; whether a value will do; what is allowed.
+VALUES: tuple[tuple[str, tuple[Kind, ...], Callable[[Any], bool], str], ...] = (
+    ("byte", (), lambda value: _is_whole(value, 0), "a whole number from 0 up"),
+    ("answer", (), lambda value: _is_whole(value, 1), "a whole number from 1 up"),
+    ("line", (), lambda value: _is_whole(value, 1), "a whole number from 1 up"),
+    ("chance", (), lambda value: _is_real(value) and 1e-12 <= value <= 1, "a number above 0, at most 1"),
+    ("to", (), lambda value: value in ("printer", "host"), "printer, host"),
+    ("bit", ("flip",), lambda value: _is_whole(value, 0, 7), "a whole number from 0 to 7"),
+    ("number", ("spurious resend",), lambda value: _is_whole(value, 0), "a whole number from 0 up"),
+    ("seconds", ("delay", "stall", "block", "disconnect"), lambda value: _is_real(value) and value >= 0,
+     "a number of seconds from 0 up, inf for ever"),
+    ("text", ("garbage", "error"), lambda value: isinstance(value, str) and all(ord(c) < 256 for c in value),
+     "text of characters up to \\u00ff, one for each byte"),
+)  # fmt: skip

@@ -143,7 +143,7 @@ class SimulatedFirmware:
         return self._receiver.last
 
     def record(self) -> Record:
-        """What was done so far."""
+        """The record so far."""
         return record_of(self.board, self._taken, self._receiver.lost_bytes)
 
     def kill(self, error: str) -> None:
@@ -205,17 +205,12 @@ class SimulatedFirmware:
         board = self.board
         if order == "M112":
             self._stop_at_once()
-        elif order == "M108":
-            board.impatient = True
-            if board.waits_for_heat or board.waits_for_person:
-                self._wake_s = board.now_s
         elif order == "M410" and board.homes:  # Endstops::validate_homing_move: the end stop was not met
             board.note("Homing Failed", trouble=True)
             self._shut_down(("echo:Homing Failed",), "")
-        elif order == "M410":
-            board.motion.halt(board.now_s)
-            board.note("M410")
-            if self._wake_s is not None:
+        elif (command := command_of(board, order)) is not None:
+            command(board, Order(order, ""))
+            if self._wake_s is not None and (order == "M410" or board.waits_for_heat or board.waits_for_person):
                 self._wake_s = board.now_s
 
     def _fetch(self) -> None:

@@ -34,13 +34,13 @@ class TcpKinematics:
         self._pose: tuple[float, float] | None = None
 
     def positions(self, tip: Axes) -> list[float]:
-        """Where the axes stand when the tip is at a point: R (tip - origin) + shift."""
+        """Positions of the axes when the tip is at a point: R (tip - origin) + shift."""
         self._turn(tip[3], tip[4])
         x, y, z = (p - o for p, o in zip(tip[:3], self._origin, strict=True))
         return [a * x + b * y + c * z + s for (a, b, c), s in zip(self._rotation, self._shift, strict=True)] + list(tip[3:5])
 
     def tip(self, positions: Axes) -> list[float]:
-        """Where the tip is on the table when the axes stand so."""
+        """The tip's place on the table at these positions of the axes."""
         self._turn(positions[3], positions[4])
         x, y, z = (p - s for p, s in zip(positions[:3], self._shift, strict=True))
         columns = zip(*self._rotation, strict=True)
@@ -103,7 +103,7 @@ class Motion:
         self._printing = self._travelling = inf  # mm/s2 set by M204 for X Y Z; inf: what the axes allow
 
     def target(self, words: WordValues, extrude: bool = True) -> list[float]:
-        """Where a G0 or G1 leads, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
+        """The end of a G0 or G1, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
         destination = self._wanted(words)
         if self.soft_limits:
             self._clamp(destination)
@@ -123,7 +123,7 @@ class Motion:
                 destination[axis] = min(max(destination[axis], low), high) if limited else destination[axis]
 
     def turned(self, angles_deg: Mapping[int, float]) -> list[float]:
-        """Where a turn of single axes to the program's coordinates leads."""
+        """The end of a turn of single axes to the program's coordinates."""
         destination = self.position[:]
         for axis, angle in angles_deg.items():
             destination[axis] = angle - self.modes.offset[axis]
@@ -153,18 +153,18 @@ class Motion:
 
     @property
     def feed_mm_s(self) -> float:
-        """What F asks for, before M220; deg/s where only the table turns."""
+        """The feed rate of F, before M220; deg/s where only the table turns."""
         return self.modes.feed / 60.0
 
     def pieces(self, target: Sequence[float]) -> list[list[float]]:
-        """Where the straight moves to a target end: one, but many when the firmware follows the turning table."""
+        """Ends of the straight moves to a target: one, but many when the firmware follows the turning table."""
         here = self.position
         if not self.follows or target[3:5] == here[3:5]:
             return [list(target)]
         return _evenly(here, target, max(1, ceil(self._seconds(here, target) * SEGMENTS_PER_S)))
 
     def arc(self, words: WordValues, clockwise: bool, extrude: bool) -> list[list[float]]:
-        """Where the chords of a G2 or G3 end; [] for what Marlin answers with "Bad arc parameters"."""
+        """Ends of the chords of a G2 or G3; [] for what Marlin answers with "Bad arc parameters"."""
         scale = self.modes.unit_mm
         start, end = self.position, self.target(words, extrude)
         begin, finish = (start[0], start[1]), (end[0], end[1])
@@ -197,7 +197,7 @@ class Motion:
             self.planner.add(block, self.jerk_mm_s, now_s)
 
     def _seconds(self, here: Sequence[float], destination: Sequence[float]) -> float:
-        """How long F makes a followed move last."""
+        """Duration of a followed move at F, s."""
         return _length(here, destination) / (self.feed_mm_s * self.feed_share)
 
     def _meet_ends(self, end: list[float]) -> None:
@@ -254,7 +254,7 @@ class Motion:
                 bounds[axis] = most
 
     def settings(self) -> SimulatedSettings:
-        """What the firmware stands at."""
+        """The firmware's present settings."""
         machine = self._machine
         there = range(6) if machine.tilts else (0, 1, 2, 5)
         usual = min(self.accelerations[:2])
@@ -302,7 +302,7 @@ class Motion:
         self.position[:5] = self._tcp.tip(positions) if self.follows else positions
 
     def at(self, now_s: float) -> list[float]:
-        """Where the axes really are now, X Y Z tilt turn."""
+        """The real position of the axes now, X Y Z tilt turn."""
         self.planner.run(now_s)
         return list(self.planner.at(now_s, self._real))[:5]
 
@@ -312,7 +312,7 @@ class Motion:
         return [round((position - offset) * steps) for position, offset, steps in now]
 
     def coordinates(self) -> list[float]:
-        """Where the program believes to be when all planned moves are over."""
+        """The program's coordinates when all planned moves are over."""
         return [p + s for p, s in zip(self.position, self.modes.offset, strict=True)]
 
 
@@ -321,6 +321,6 @@ def _evenly(here: Sequence[float], target: Sequence[float], count: int) -> list[
 
 
 def _length(a: Sequence[float], b: Sequence[float]) -> float:
-    """What F measures: the way of X Y Z; when they stand still that of the rotary axes; else the filament."""
+    """The length that F measures: the way of X Y Z; when they stand still that of the rotary axes; else the filament."""
     x, y, z, tilt, turn, filament = (q - p for p, q in zip(a, b, strict=True))
     return sqrt(x * x + y * y + z * z) or hypot(tilt, turn) or abs(filament)

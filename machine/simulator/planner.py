@@ -56,7 +56,7 @@ class Block:
         self.end_s = begin_s + duration_s
 
     def share(self, now_s: float) -> float:
-        """How much of the way lies behind it, 0 to 1."""
+        """The share of the way that lies behind it, 0 to 1."""
         t, a, length = now_s - self.begin_s, self.acceleration, self.length
         if t >= self.duration_s:
             return 1.0
@@ -69,7 +69,7 @@ class Block:
         return ((self.v0 + self.peak) * 0.5 * rising_s + self.peak * (t - rising_s)) / length
 
     def at(self, now_s: float) -> list[float]:
-        """Where the axes are on it."""
+        """The position of the axes on it."""
         share = self.share(now_s)
         return [a + share * (b - a) for a, b in zip(self.start, self.end, strict=True)]
 
@@ -216,7 +216,7 @@ class Planner:
         return stop
 
     def at(self, now_s: float, idle: Axes) -> Axes:
-        """Where the axes are; idle: where they are when nothing is planned."""
+        """The position of the axes; idle: their position when nothing is planned."""
         if self._current is not None:
             return self._current.at(now_s)
         return self._waiting[0].start if self._waiting else idle

@@ -117,7 +117,7 @@ class Receiver:
         return (line[1:star] if star >= 0 else line[1:]).lstrip(b"-+0123456789").lstrip(b" ")
 
     def _complaint(self, line: bytes) -> str | None:
-        """What is wrong with a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
+        """The error of a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
         star = line.rfind(b"*")
         renumbers = b"M110" in line
         second = line.find(b"N", line.find(b"M110")) if renumbers else 0

@@ -17,38 +17,30 @@ from profiles.machine import Machine
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """n executed moves in order, those still planned included; homing is an event, no move.
-
-    start, end: (n, 6) machine X Y Z mm, tilt turn deg, filament mm (running total); feed (n,) mm/s as programmed;
-    begin_s, duration_s (n,) of the virtual clock; first: how many moves before these are not kept; moves, strokes,
-    pushed_mm, moving_s: count of all moves and strokes, filament of the strokes, time of all moves; events (virtual s, what) and
-    those of them that no program asks for; targets and fan at the end; clamped: coordinates outside the soft limits;
-    unknown: commands not understood; underruns: how often the planner ran dry in mid-motion; slowed: moves slowed down since
-    the host sent too few; lost_bytes: what a full receive ring dropped.
-    """
+    """n executed moves in order, those still planned included; homing is an event, no move."""
 
     machine: Machine
-    start: Floats
-    end: Floats
-    feed_mm_s: Floats
-    begin_s: Floats
-    duration_s: Floats
-    first: int
-    moves: int
-    strokes: int
-    pushed_mm: float
-    moving_s: float
-    events: tuple[tuple[float, str], ...]
-    troubles: tuple[tuple[float, str], ...]
-    nozzle_target_c: float
+    start: Floats  # (n, 6) machine X Y Z mm, tilt turn deg, filament mm (running total)
+    end: Floats  # (n, 6)
+    feed_mm_s: Floats  # (n,) as programmed
+    begin_s: Floats  # (n,) of the virtual clock
+    duration_s: Floats  # (n,)
+    first: int  # how many moves before these are not kept
+    moves: int  # count of all moves,
+    strokes: int  # of all strokes,
+    pushed_mm: float  # filament of the strokes,
+    moving_s: float  # time of all moves
+    events: tuple[tuple[float, str], ...]  # (virtual s, what)
+    troubles: tuple[tuple[float, str], ...]  # those events that no program asks for
+    nozzle_target_c: float  # at the end
     bed_target_c: float
     fan: float
-    clamped: int
-    unknown: int
+    clamped: int  # coordinates outside the soft limits
+    unknown: int  # commands not understood
     lines: int
-    lost_bytes: int
-    underruns: int
-    slowed: int
+    lost_bytes: int  # dropped by a full receive ring
+    underruns: int  # how often the planner ran dry in mid-motion
+    slowed: int  # moves slowed down since the host sent too few
 
     def happened(self, what: str) -> bool:
         """Whether an event that begins so is on record."""

@@ -95,12 +95,12 @@ class SimulatedPrinter:
 
     @property
     def path(self) -> str:
-        """What to open; another one after a disconnection."""
+        """The path to open; another one after a disconnection."""
         return self._terminal.path
 
     @property
     def record(self) -> Record:
-        """What has been executed so far."""
+        """The record so far."""
         with self._lock:
             return self._firmware.record()
 
@@ -133,7 +133,7 @@ class SimulatedPrinter:
             self._terminal.close()
 
     def _pause_s(self, now_s: float) -> float | None:
-        """How long nothing happens unless the host says something; None: for ever."""
+        """The time until something happens though the host is silent, s; None: for ever."""
         due_s = self._line.due_s(now_s)
         return None if due_s == inf else max(0.0, due_s - (monotonic() - self._began_s))
 
@@ -187,14 +187,14 @@ class Terminal:
         return self.readable_ends()
 
     def read(self) -> bytes:
-        """What the host has written."""
+        """The bytes that the host has written."""
         try:
             return os.read(self._master, READ_BYTES)
         except (BlockingIOError, OSError):
             return b""
 
     def write(self, data: bytes) -> int:
-        """How many bytes the terminal took."""
+        """Write to the host; returns how many bytes the terminal took."""
         try:
             return os.write(self._master, data)
         except BlockingIOError:
@@ -269,7 +269,7 @@ class Server:
         return [] if self._host is None else [self._host.fileno()]
 
     def read(self) -> bytes:
-        """What the host has written; a host that comes or goes writes nothing."""
+        """The bytes that the host has written; a host that comes or goes writes nothing."""
         try:
             if self._host is None:
                 self._host, _ = self._server.accept()
@@ -303,7 +303,7 @@ class Server:
             self._others.popleft().close()
 
     def write(self, data: bytes) -> int:
-        """How many bytes the connection took; without a host they are lost."""
+        """Write to the host; returns how many bytes the connection took; without a host they are lost."""
         try:
             return len(data) if self._host is None else self._host.send(data)
         except BlockingIOError:

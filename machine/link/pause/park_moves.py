@@ -38,7 +38,7 @@ STILL_DEG = 0.01
 def plan_park(
     modal: ModalState, profile: Profile | None, bounds: PrintedBounds | None
 ) -> tuple[list[str], list[str], Park | None]:
-    """How to leave a print that stands at modal's place, all moves over, and how to come back: commands away from the print,
+    """The way out of a print that stands at modal's place, all moves over, and the way back: commands away from the print,
     and back to it. The third value is None where the tip stays because its place is not known or no way is clear.
     """
     pull, push = filament_commands(modal, profile)
@@ -87,7 +87,7 @@ def fill_commands(modal: ModalState, profile: Profile) -> list[str]:
 
 
 def _filament(modal: ModalState, profile: Profile | None) -> tuple[float, float, float]:
-    """How much to pull back (what the program has pulled already counts), mm, how fast, mm/s, and how much more to push."""
+    """Filament to pull back (less what the program has pulled already), mm, its speed, mm/s, and the extra to push, mm."""
     material = profile.material if profile is not None else None
     whole = material.retract_mm if material is not None else PULL_MM
     speed = material.retract_speed_mm_s if material is not None else PULL_MM_S
@@ -172,8 +172,8 @@ def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
 
 
 def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequence[str]) -> list[str]:
-    """The same for a firmware that has forgotten where its axes stand: they are set, `heat` is done, the tip rises, X and Y are
-    homed.
+    """return_moves() for a firmware that has forgotten where its axes stand: they are set, `heat` is done, the tip rises, X and Y
+    are homed.
 
     machine.gcode.resume takes the place of that where the profile has it. Raises JournalError, MoveError, ProfileError.
     """

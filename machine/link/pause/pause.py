@@ -27,19 +27,16 @@ NEAR_C = 10.0  # a print that is to be colder than that shows that its firmware 
 
 @dataclass
 class Pause:
-    """modal: the firmware's state where the print stopped; what a person sets meanwhile is taken into it.
-
-    stands: X Y Z tilt turn E where the tip waits, None on its way; aside: it has left the print; off: its nozzle is switched off.
-    """
+    """A pause from the last move of the print to the next one."""
 
     exchange: Exchange
     pending: PendingCommands
     reports: PrinterReports
-    modal: ModalState
+    modal: ModalState  # the firmware's where the print stopped, with what a person sets meanwhile
     profile: Profile | None
-    stands: Coordinates | None = None
-    aside: bool = False
-    off: bool = False
+    stands: Coordinates | None = None  # X Y Z tilt turn E where the tip waits, None on its way
+    aside: bool = False  # the tip has left the print
+    off: bool = False  # its nozzle is switched off
     printing_c: float = 0.0  # the nozzle's target where the print stopped
 
     def run(self, bounds: PrintedBounds | None, why: str) -> Iterator[tuple[PrintState, str]]:
@@ -85,7 +82,7 @@ class Pause:
             exchange.wait(due_s - now_s(), until=lambda: pending.resume or bool(pending.lines))
 
     def _cools_after_s(self) -> float:
-        """How long the nozzle stays hot while nobody does anything, s."""
+        """The time after which a nozzle that nobody attends to is switched off, s."""
         minutes = self.profile.machine.pause_cools_after_min if self.profile is not None else 0.0
         return 60.0 * minutes if minutes and self.modal.nozzle_c > 0 and not self.off else inf
 

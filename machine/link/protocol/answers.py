@@ -116,13 +116,11 @@ class Resends:
 
 @dataclass
 class Questions:
-    """Questions without an answer. unanswered: in a row; first: line number of the first one; implausible: the line that was
-    asked for although it cannot be meant, 0: none.
-    """
+    """Questions that stay without an answer."""
 
-    unanswered: int = 0
-    first: int = 0
-    implausible: int = 0
+    unanswered: int = 0  # in a row
+    first: int = 0  # line number of the first one
+    implausible: int = 0  # the line that was asked for although it cannot be meant, 0: none
     _idle_reports: int = 0
 
     def ask(self) -> bool:
@@ -143,5 +141,5 @@ class Questions:
         self.unanswered = self._idle_reports = 0
 
     def end(self) -> None:
-        """What has arrived is known."""
+        """It is known which lines have arrived."""
         self.unanswered = self.first = self.implausible = 0

@@ -23,8 +23,6 @@ Bytes become events (decoder), an event or the passing of time amounts to a sign
                        tick -> Timeouts -------^
 """
 
-from machine.firmware import Firmware
-from machine.firmware.marlin import MARLIN
 from machine.link.protocol import verdict
 from machine.link.protocol.answers import ASKED_LIMIT, QUESTION, QUESTIONS_MOST, Acknowledgement, Questions, Resends
 from machine.link.protocol.decoder import LineDecoder
@@ -45,8 +43,7 @@ class Connection:
     tick(). `halted`: the firmware says that it has stopped for good. `greeting` is what the printer answered to M115, `window`
     counts the lines, `resends` those that were repeated.
 
-    firmware: taken for one of unknown name; rx_bytes: what the machine's receive buffer holds, None: as its firmware's;
-    baud: for messages.
+    rx_bytes: what the machine's receive buffer holds, None: as its firmware's; baud: for messages.
     """
 
     def __init__(
@@ -55,13 +52,12 @@ class Connection:
         now_s: float = 0.0,
         *,
         limit: int = LINE_LIMIT,
-        firmware: Firmware = MARLIN,
         rx_bytes: int | None = None,
         baud: int | None = None,
     ) -> None:
         self.state = State.DRAIN
         self.fault: PrinterError | None = None
-        self.greeting = Greeting(firmware, rx_bytes, baud)
+        self.greeting = Greeting(rx_bytes, baud)
         self.window = Window(limit, self.greeting.rx_bytes)
         self.resends = Resends()
         self._decoder, self._oks, self._questions = LineDecoder(), Acknowledgement(), Questions()
@@ -167,7 +163,7 @@ class Connection:
                 self._oks.hear_echo(event.text)
 
     def _handle_ok(self, ok: Event, now_s: float) -> None:
-        """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
+        """An `ok` answers M110, a Resend or a line in flight, which depends on the state."""
         unknown = self._oks.take_unknown()
         if ok.line is not None:
             self.window.learn(ok.rx_free)
@@ -275,7 +271,7 @@ class Connection:
             self._enter(signal, now_s)
 
     def _enter(self, signal: Signal, now_s: float) -> None:
-        """What is said on entering a state, and what is known from then on."""
+        """Say what is due on entering a state, and note what is known from then on."""
         match self.state:
             case State.SYNC:
                 self._greet(now_s)

@@ -17,13 +17,13 @@ class Temperature:
 
     @property
     def words(self) -> str:
-        """How hot it is, for a person; "" where the line does not report it."""
+        """The temperatures in words; "" where the line does not report it."""
         degrees = (("nozzle", self.nozzle_c), ("bed", self.bed_c))
         return ", ".join(f"{name} {now_c:.0f} °C" for name, now_c in degrees if now_c is not None)
 
 
 class Kind(Enum):
-    """What a line of the printer is."""
+    """Kinds of a printer's lines."""
 
     OK = auto()  # a line was accepted
     RESEND = auto()  # the printer wants this line and all after it again; one `ok` that acknowledges nothing follows
@@ -44,23 +44,17 @@ class Kind(Enum):
 
 
 class Event(NamedTuple):
-    """A line of the printer. text: what of its words matters.
-
-    line: the number that an ok acknowledges or a Resend asks for; it and the free places of the planner and of the receive buffer
-    come with Marlin's ADVANCED_OK. temperature, position (letter -> mm or deg, rotary letters included), identity (the
-    FIRMWARE_NAME words): in a line of their own or behind an ok (M105; Smoothieware, Klipper). area: least and greatest value of
-    each axis.
-    """
+    """A line of the printer. Temperature, position and identity come in a line of their own or behind an ok."""
 
     kind: Kind
-    text: str = ""
-    line: int | None = None
-    planner_free: int | None = None
-    rx_free: int | None = None
+    text: str = ""  # those of its words that matter
+    line: int | None = None  # that an ok acknowledges or a Resend asks for
+    planner_free: int | None = None  # free places of the planner, by Marlin's ADVANCED_OK
+    rx_free: int | None = None  # free places of the receive buffer
     temperature: Temperature | None = None
-    position: dict[str, float] | None = None
-    identity: str = ""
-    area: tuple[tuple[float, float], ...] = ()
+    position: dict[str, float] | None = None  # letter -> mm or deg, rotary letters included
+    identity: str = ""  # the FIRMWARE_NAME words
+    area: tuple[tuple[float, float], ...] = ()  # least and greatest value of each axis
 
     @property
     def unknown_command(self) -> str:
@@ -146,7 +140,7 @@ def _error_kind(folded: str) -> Kind:
 
 
 def _read_report(text: str) -> Event:
-    """What is no answer to a line."""
+    """The event of a line that answers none of ours."""
     if text.startswith("X:"):
         return Event(Kind.POSITION, position=_position(text))
     if text == "wait":

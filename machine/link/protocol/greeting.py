@@ -21,8 +21,9 @@ class Greeting:
     last attempt, 0: none. keeps_numbers: it ignores M110. asked_plainly: PLAIN_QUESTION is under way.
     """
 
-    def __init__(self, firmware: Firmware = MARLIN, rx_bytes: int | None = None, baud: int | None = None) -> None:
-        self.firmware, self.identity, self.heard = firmware, "", ""
+    def __init__(self, rx_bytes: int | None = None, baud: int | None = None) -> None:
+        self.firmware: Firmware = MARLIN  # taken for one of unknown name
+        self.identity = self.heard = ""
         self.capabilities: dict[str, bool] = {}
         self.wanted = self._wanted_before = 0
         self.keeps_numbers = self.asked_plainly = self._skipped = False
@@ -30,7 +31,7 @@ class Greeting:
 
     @property
     def rx_bytes(self) -> int:
-        """What the receive buffer holds: the machine's own, else as usual with its firmware."""
+        """Bytes that the receive buffer holds: the machine's own, else as usual with its firmware."""
         return self._rx_bytes or self.firmware.line.rx_bytes
 
     @property
@@ -40,12 +41,14 @@ class Greeting:
 
     @property
     def waiting_moves(self) -> int | None:
-        """How many moves may wait behind the newest acknowledged one; None: any number, as of a firmware that has no name."""
+        """The number of moves that may wait behind the newest acknowledged one; None: any number, as of a firmware that has no
+        name."""
         return None if identify(self.identity) is None else self.firmware.line.waiting_moves
 
     @property
     def keep_awake(self) -> str:
-        """What keeps its motors on in a pause; of a firmware that has no name M84 might switch them off (Smoothieware's does)."""
+        """The command that keeps its motors on in a pause; of a firmware that has no name M84 might switch them off
+        (Smoothieware's does)."""
         return "" if identify(self.identity) is None else self.firmware.line.keep_awake
 
     def learn(self, answer: Event) -> None:
@@ -57,7 +60,7 @@ class Greeting:
             self.capabilities[name] = present == "1"
 
     def attempt(self, decoder: LineDecoder) -> int | PrinterError:
-        """How to greet once more: the number of the first line, 0: after M110. Or why there is no sense in it.
+        """The next attempt to greet: the number of the first line, 0: after M110. Or why there is no sense in it.
 
         A firmware that ignores M110 goes on with a number of its own: it asks for it after two attempts, or one without M110.
         """

@@ -9,7 +9,7 @@ from enum import Enum
 
 
 class State(Enum):
-    """Where the conversation stands."""
+    """States of the conversation."""
 
     DRAIN = "port just opened, or the printer just started: old answers and the banner are listened to"
     SYNC = "M110 sent, the line numbers are not agreed yet"
@@ -24,7 +24,7 @@ class State(Enum):
 
 
 class Signal(Enum):
-    """What an event or the passing of time amounts to."""
+    """Signals, to which events and the passing of time amount."""
 
     HUSH = "nothing heard for a while"
     SYNCED = "M110 was answered"

@@ -67,7 +67,7 @@ class Timeouts:
         self._measured = True
 
     def signal(self, state: State, window: Window, rules: LineRules, questions: int, now_s: float) -> Signal | None:
-        """What the time that has passed amounts to in a state, after a number of questions without an answer."""
+        """The signal to which the time that has passed amounts in a state, after a number of questions without an answer."""
         timing = self._timing
         if state is State.DRAIN:  # old words have run dry, or chatter has been listened to for long enough
             return Signal.HUSH if self._silent_for(timing.drain_s, timing.sync_s, now_s) else None
@@ -87,7 +87,7 @@ class Timeouts:
         return now_s - self.heard_s >= silence_s or now_s - self._entered_s >= most_s
 
     def _answer_s(self, state: State, window: Window, rules: LineRules, questions: int) -> float:
-        """How long an answer may take."""
+        """The time limit of the answer that is awaited, s."""
         timing = self._timing
         known_s = timing.stall_s if self._busy_known else timing.stall_mute_s
         if state is not State.PROBING:

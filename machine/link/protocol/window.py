@@ -19,12 +19,12 @@ NEAR = 8  # one acknowledgement too many or few is usual after noise; a Resend f
 
 
 class LineInFlight(NamedTuple):
-    """A line that was sent and is not acknowledged yet. slow_timeout_s: 0 of a quick command."""
+    """A line that was sent and is not acknowledged yet."""
 
     number: int
     size: int
     asks_temperature: bool
-    slow_timeout_s: float
+    slow_timeout_s: float  # 0 of a quick command
     sent_s: float
 
 
@@ -175,7 +175,7 @@ def _unframed(framed: bytes) -> str:
 
 
 def _slow_timeout_s(command: str) -> float:
-    """How long the answer to a slow command may take, 0 for a quick one. A slow command travels alone."""
+    """The time limit of the answer to a slow command, s, 0 for a quick one. A slow command travels alone."""
     if command[0] == "G" and command[1:2] in ("0", "1"):  # most lines of a program; none of these is slow
         return 0.0
     return command_in(command).answer_s

@@ -10,6 +10,7 @@ import pytest
 from machine.link.medium import Medium, Wire
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintStatus
+from machine.link.protocol.framing import FAR_NUMBER
 from machine.link.stream import Outcome, print_lines
 from machine.printing.serial_log import tap
 from machine.simulator.faults import Fault, FaultScript
@@ -327,6 +328,21 @@ def test_a_firmware_that_restarted_behind_the_lost_port_is_seen_by_its_place(dia
     with pytest.raises(PrinterError, match=r"was not answered|can no longer be trusted"):
         watcher.run(PROGRAM)
     assert len(strokes(watcher.printer)) < len(planned(PROGRAM))
+
+
+@pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
+def test_a_cancel_while_a_printer_that_is_there_again_is_asked_for_its_place_switches_its_heaters_off(dialect: str) -> None:
+    watcher = watched({}, Fault("disconnect", at=30, unit="line", seconds=2.0), profile=UNASKING[dialect])
+    note = watcher.traffic
+
+    def cancel_when_asked(direction: str, data: bytes) -> None:
+        note(direction, data)
+        if direction == ">" and b"N%d " % FAR_NUMBER in data:
+            watcher.control.stop.set()
+
+    watcher.traffic = cancel_when_asked  # type: ignore[method-assign]
+    outcome = watcher.run(PROGRAM)
+    assert (outcome.cancelled, outcome.heaters_off) == (True, True)
 
 
 def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:

@@ -10,7 +10,7 @@ from machine.link.medium import Medium
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
 from machine.link.print_state import PrintStatus
-from machine.link.shutdown import Heaters, emergency_stop, heaters_off
+from machine.link.shutdown import Heaters, Orders, emergency_stop, heaters_off
 from machine.link.status import query_status
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
@@ -185,8 +185,54 @@ def test_an_emergency_stop_is_confirmed_by_words_of_a_halt_only(said: bytes, hal
     assert emergency_stop(wire, medium) is halts
 
 
+class Old(Wire):
+    """A printer whose words from before the orders come in portions; to the orders it says nothing."""
+
+    def __init__(self, *old: bytes) -> None:
+        super().__init__(b"")
+        self._old = iter(old)
+
+    def write(self, data: bytes) -> None:
+        """Hear an order."""
+
+    def read(self) -> bytes:
+        """What it said before."""
+        self.now_s += 0.02
+        return next(self._old, b"")
+
+
+@pytest.mark.parametrize(("old", "known"), [
+    ((b"T:20.0 /0.0 B:20.0 /0.0\n",), Heaters.UNPROVED),
+    ((b"T:20.0 /0.0 B:2", b"", b"0.0 /0.0\n"), Heaters.UNPROVED),
+    ((b"Error:Printer halted. kill() called!\n", b"T:20.0 /0.0"), Heaters.HALTED),
+    ((b"", b"T:20.0 /0.0 B:20.0 /0.0\n"), Heaters.OFF),
+], ids=["whole", "torn", "halted", "after the orders"])  # fmt: skip
+def test_what_was_said_before_the_orders_proves_nothing_but_a_halt(old: tuple[bytes, ...], known: Heaters) -> None:
+    wire = Old(*old)
+    assert heaters_off(wire, Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None)) is known
+
+
 def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_with_one() -> None:
     with SimulatedPrinter(SLOW.machine, build=INSISTS) as printer, open_port(printer.path, 115200) as port:
         answer = ask(port)
     assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZAC")
     assert answer.firmware.startswith("Marlin")
+
+
+class Always(Wire):
+    """A printer that says the same at every turn."""
+
+    def read(self) -> bytes:
+        """What it says."""
+        self.now_s += 0.02
+        return self._said
+
+
+def test_what_refuses_every_line_for_its_checksum_is_a_printer() -> None:
+    assert ask(Always(b"Error: Missing checksum\n"), 0.1).kind is Kind.PRINTER  # type: ignore[arg-type]
+
+
+def test_an_error_whose_second_line_never_comes_is_heard_all_the_same() -> None:
+    wire = Wire(b"Error:0\n")
+    orders = Orders(wire, Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None))
+    assert orders.wait_for(lambda event: event.text == "Error:0", 1.0)

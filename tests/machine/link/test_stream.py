@@ -26,7 +26,7 @@ from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, LocalProtocolError, PortError, PrinterError, SilenceError
 from profiles.profile import load
 from tests.machine.peers import PATIENCE_S
-from tests.machine.virtual_printer import HEALED, random_script
+from tests.machine.virtual_printer import HEALED, PATH, VirtualPrinter, random_script
 
 MACHINE = load().machine
 QUICK = replace(SERIAL, timing=Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=1.0, drain_s=0.05, quiet_s=0.03))
@@ -130,6 +130,16 @@ def test_of_lines_that_are_read_once_the_total_is_not_known() -> None:
     with SimulatedPrinter(MACHINE) as printer:
         print_lines(iter(["G21", "G90"]), printer.path, 250000, on_progress=shown.append, medium=PATIENT)
     assert (shown[-1].acknowledged, shown[-1].total) == (2, None)
+
+
+def test_how_long_a_line_may_be_follows_from_the_machine_s_firmware() -> None:
+    lines = ["G21", "M117 " + "x" * 95]
+    duet = load(settings=["machine.dialect=reprapfirmware"])
+    printer = VirtualPrinter(duet.machine)
+    assert print_lines(lines, PATH, medium=printer.medium, profile=duet).acknowledged == 2
+    for profile in (load(), None):
+        with pytest.raises(LocalProtocolError, match="at most 95"):
+            print_lines(lines, PATH, medium=VirtualPrinter(MACHINE).medium, profile=profile)
 
 
 @pytest.mark.parametrize("bad", ["G1 X1 ö", "G1 X5 (Y2", "M117 " + "x" * 90, "G1 X1*5", "M112", "M0 wait"])

@@ -528,7 +528,8 @@ def test_two_lines_of_sixty_three_bytes_fill_the_ring_of_an_avr() -> None:
 def numbered_to(last: int, advanced: bool = True) -> Table:
     """A greeted printer whose numbers begin anew after `last`."""
     table = Table()
-    table.connection = Connection(PATIENT, 0.0, firmware=replace(MARLIN, line=replace(MARLIN.line, last_number=last)))
+    table.connection = Connection(PATIENT, 0.0)
+    table.connection.greeting.firmware = replace(MARLIN, line=replace(MARLIN.line, last_number=last))
     table.wait(0.6)
     table.say(b"ok N0 P15 B3\nok N1 P15 B3\nok T:20.00 /0.00\n" if advanced else b"ok\nok\nok T:20.00 /0.00\n")
     table.wire()
