@@ -3,6 +3,7 @@
 import errno
 import grp
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
 from machine.printing import ports
-from machine.printing.checks import exceeded_limit, firmware_mismatch, machine_mismatch
+from machine.printing.checks import check_destination, check_machine, exceeded_limit, firmware_mismatch, machine_mismatch
+from machine.printing.destination import SerialPort
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
@@ -48,6 +50,7 @@ def talking_at(rate: int) -> Words:
     return lambda data, baud: right(data, baud) if baud == rate else bytes(byte | 0x80 for byte in data) * 3
 
 
+AT = SerialPort("/dev/ttyACM0")
 STRANGERS: dict[str, tuple[Words, str]] = {
     "rubbish": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only rubbish comes from PORT at 115200 baud"),
     "silence": (lambda data, baud: b"", "nothing answers at PORT: is the printer switched on, and is 115200 baud"),
@@ -261,6 +264,22 @@ def test_a_firmware_is_called_by_name_and_version(words: str, name: str) -> None
 @pytest.mark.parametrize("letters", ["", "XYZAC", "XYZABC"])
 def test_a_firmware_that_tells_enough_or_nothing_is_not_refused(letters: str) -> None:
     assert firmware_mismatch(Answer(Kind.PRINTER, "FIRMWARE_NAME:Marlin 2", letters), MACHINE) == ""
+
+
+def test_a_machine_whose_firmware_opens_files_itself_is_refused_at_a_port_whatever_answers() -> None:
+    machine = load(machine="linuxcnc_xyzac").machine
+    for refuse in (partial(check_machine, None), partial(check_machine, None, force=True), partial(check_destination, AT)):
+        with pytest.raises(PrinterError, match="speaks linuxcnc, which opens files itself: use export"):
+            refuse(machine=machine)
+
+
+def test_force_goes_past_another_firmware_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    klipper = Answer(Kind.PRINTER, "FIRMWARE_NAME:Klipper")
+    with pytest.raises(PrinterError, match="the printer's firmware is Klipper, but generic A/C table writes for marlin"):
+        check_machine(klipper, MACHINE)
+    assert not check_machine(klipper, MACHINE, force=True)
+    assert "the printer's firmware is Klipper" in capsys.readouterr().err
+    assert check_machine(None, MACHINE)
 
 
 def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:
