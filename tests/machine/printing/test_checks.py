@@ -14,8 +14,17 @@ from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
 from machine.printing import ports
-from machine.printing.checks import check_destination, check_machine, exceeded_limit, firmware_mismatch, machine_mismatch
+from machine.printing.checks import (
+    check,
+    check_destination,
+    check_machine,
+    exceeded_limit,
+    firmware_mismatch,
+    machine_mismatch,
+    machine_sentences,
+)
 from machine.printing.destination import SerialPort
+from machine.printing.servers.server import Identity
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
@@ -268,18 +277,18 @@ def test_a_firmware_that_tells_enough_or_nothing_is_not_refused(letters: str) ->
 
 def test_a_machine_whose_firmware_opens_files_itself_is_refused_at_a_port_whatever_answers() -> None:
     machine = load(machine="linuxcnc_xyzac").machine
-    for refuse in (partial(check_machine, None), partial(check_machine, None, force=True), partial(check_destination, AT)):
+    for refuse in (partial(check_machine, None), partial(check_destination, AT)):
         with pytest.raises(PrinterError, match="speaks linuxcnc, which opens files itself: use export"):
             refuse(machine=machine)
 
 
 def test_force_goes_past_another_firmware_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
-    klipper = Answer(Kind.PRINTER, "FIRMWARE_NAME:Klipper")
+    klipper = Identity("", Answer(Kind.PRINTER, "FIRMWARE_NAME:Klipper"))
     with pytest.raises(PrinterError, match="the printer's firmware is Klipper, but generic A/C table writes for marlin"):
-        check_machine(klipper, MACHINE)
-    assert not check_machine(klipper, MACHINE, force=True)
+        check_machine(klipper.printer, MACHINE)
+    assert not check(machine_sentences(klipper, MACHINE), force=True)
     assert "the printer's firmware is Klipper" in capsys.readouterr().err
-    assert check_machine(None, MACHINE)
+    assert check(machine_sentences(Identity(""), MACHINE), force=False)
 
 
 def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:
