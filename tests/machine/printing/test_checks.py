@@ -10,9 +10,11 @@ import pytest
 import serial
 
 from machine.cli.cli import main
+from machine.dryrun.dryrun import dry_run
 from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
+from machine.pipeline.programs import LoadedProgram
 from machine.printing import ports
 from machine.printing.checks import (
     check,
@@ -22,9 +24,11 @@ from machine.printing.checks import (
     firmware_mismatch,
     machine_mismatch,
     machine_sentences,
+    program_sentences,
 )
 from machine.printing.destination import SerialPort
 from machine.printing.servers.server import Identity
+from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
@@ -289,6 +293,15 @@ def test_force_goes_past_another_firmware_and_says_so(capsys: pytest.CaptureFixt
     assert not check(machine_sentences(klipper, MACHINE), force=True)
     assert "the printer's firmware is Klipper" in capsys.readouterr().err
     assert check(machine_sentences(Identity(""), MACHINE), force=False)
+
+
+@pytest.mark.parametrize(("coordinates", "refused"), [("table", True), ("workpiece", False)])
+def test_x_y_z_are_held_against_the_limits_where_they_are_places_of_the_axes(coordinates: str, refused: bool) -> None:
+    profile, lines = load(settings=[f"machine.coordinates={coordinates}"]), ("G28", "G1 Z50 F600", "G1 X50 F600")
+    loaded = LoadedProgram("part.gcode", Program(lines, dry_run(lines, profile), None), profile)
+    narrow = Identity("", Answer(Kind.PRINTER, "", "XYZAC", {"X": (-5.0, 5.0)}))
+    sentences = "".join(program_sentences(narrow, loaded, force=True))
+    assert ("but the printer's firmware allows -5 to 5" in sentences) is refused
 
 
 def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:

@@ -535,6 +535,19 @@ def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.Monke
         over.set()
 
 
+def test_a_server_that_answers_nothing_but_errors_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(follow, "LOST_S", 0.2)
+    looks = iter(range(300))
+
+    def status() -> PrintStatus:
+        if (look := next(looks)) == 0:
+            return PrintStatus(PrintState.PRINTING, file="box.gcode")
+        raise ServerError("octoprint:host refuses") if look < 299 else ZeroDivisionError
+
+    with pytest.raises(ServerError, match="octoprint:host refuses; no answer for 0 s: the print may go on, look at the printer"):
+        follow_unanswered(status)
+
+
 def test_an_error_of_a_thread_is_not_lost() -> None:
     def broken() -> PrintStatus:
         raise ZeroDivisionError
