@@ -261,6 +261,17 @@ def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: st
 
 
 @every_kind
+def test_a_key_that_a_server_repeats_stands_in_no_message_and_no_log(kind: str) -> None:
+    logged: list[bytes] = []
+    with stand_in(kind) as (job, address), session_with(address, lambda direction, data: logged.append(data)) as server:
+        server.greet()
+        job.refuse[UPLOADS[kind]] = (500, f"no such key: {KEY}".encode())
+        with pytest.raises(ServerError, match=r"no such key: \*\*\*") as refused:
+            server.upload(UPLOAD, unheard)
+    assert KEY not in str(refused.value) + str(logged)
+
+
+@every_kind
 def test_half_an_upload_is_no_file(kind: str) -> None:
     with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
