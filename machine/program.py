@@ -49,10 +49,12 @@ def joints_of_print(program: Program, profile: Profile) -> "tuple[Joint, ...]":
 
 @dataclass(frozen=True)
 class Alternative:
-    """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
-    length of the seams between parts; stairs_mm2: what stairs count; interface_mm3: plastic that one piece would not have, by
-    the part that stands there; joints: what they bear; findings: how many its dry run has; message: why it cannot be printed
-    so, or "". None: it cannot be printed so."""
+    """One way to print a model, with its figures; None among them: it cannot be printed this way, and message says why.
+
+    risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm: length of the seams between
+    parts; stairs_mm2: area that stair-stepping blemishes; interface_mm3: plastic that one piece would not have, by the part that
+    stands there; joints: their loads; findings: the number in its dry run.
+    """
 
     name: str
     orientation: str

@@ -46,11 +46,11 @@ def check(sentences: Iterable[str], force: bool) -> bool:
     return not found
 
 
-def check_machine(answer: Answer | None, machine: Machine, force: bool = False) -> bool:
-    """Refuse a machine whose firmware takes no lines, or is not that of the printer at a port; True when nothing speaks against
-    it. answer: None: nothing is known of the printer. Raises PrinterError."""
+def check_machine(answer: Answer | None, machine: Machine) -> None:
+    """Refuse a machine whose firmware takes no lines, or is not that of the printer at a port. answer: None: nothing is known of
+    the printer. Raises PrinterError."""
     check_dialect(machine)
-    return check([firmware_mismatch(answer, machine)], force)
+    check([firmware_mismatch(answer, machine)], force=False)
 
 
 def check_destination(destination: Destination, machine: Machine) -> None:

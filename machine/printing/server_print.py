@@ -69,10 +69,12 @@ class ServerPrinter:
             raise ServerError(f"{error}; whether it prints {file} is not known: look at the printer") from None
 
     def print(self, loaded: LoadedProgram) -> End:
-        """Hand it over, have it printed and show it until it ends or the person leaves.
+        """Hand it over, have it printed where the job says so, and show it until it ends or the person leaves.
 
         Raises ServerError, FirmwareError after an emergency stop.
         """
+        if not self._job.starts:
+            return self.send(loaded)
         person, server, upload = self.person, self.server, GcodeUpload(loaded.name, loaded.program.lines)
         try:
             file = hand_over(server, upload, loaded.name, self._scene(), person)

@@ -141,12 +141,12 @@ def machine_with(machine: Machine, numbers: Floats) -> Machine:
 def _residuals(machine: Machine, touches: Sequence[Touch], height_mm: float) -> Callable[[Floats], Floats]:
     """Where touches lie from the mark, x y z each, by the numbers of the machine; of a touch on the plate the height over the
     table alone."""
-    here, told = _positions(touches), _told(touches)
+    here, measured = _positions(touches), _measured(touches)
     heights_mm = np.array([0.0 if touch.on_plate else height_mm for touch in touches])
 
     def residuals(numbers: Floats) -> Floats:
         seen = workpiece_path(machine_with(machine, numbers), here)
-        off: Floats = (seen - np.column_stack([np.tile(numbers[6:8], (len(here), 1)), heights_mm]))[told]
+        off: Floats = (seen - np.column_stack([np.tile(numbers[6:8], (len(here), 1)), heights_mm]))[measured]
         return off
 
     return residuals
@@ -174,9 +174,9 @@ def calibrate(
     if mark_angle_deg is not None:
         calibrated, mark = _set_turn_zero(calibrated, mark, mark_angle_deg)
     _check_sound(machine, calibrated)
-    told = _told(touches)
-    errors = np.zeros(told.shape)
-    errors[told] = residuals(numbers)
+    measured = _measured(touches)
+    errors = np.zeros(measured.shape)
+    errors[measured] = residuals(numbers)
     return Calibration(calibrated, mark, tuple((float(x), float(y), float(z)) for x, y, z in errors), sigma)
 
 
@@ -194,17 +194,17 @@ def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, dir
     signed = [_with_signs(machine, *signs) for signs in SIGNS]
     best = [(np.inf, np.zeros(0)) for _ in signed]
     for start_deg in STARTS_DEG:
-        for k, each in enumerate(signed):
-            fit = _fit(each, touches, mark_height_mm, _start(each, touches, start_deg))
+        for k, candidate in enumerate(signed):
+            fit = _fit(candidate, touches, mark_height_mm, _start(candidate, touches, start_deg))
             best[k] = min(best[k], fit, key=lambda fit: fit[0])
         if min(cost for cost, _ in best) < GOOD_MM**2:
             break
     if directions:
         worth = HOPELESS * min(cost for cost, _ in best)
-        for k, each in enumerate(signed):
+        for k, candidate in enumerate(signed):
             cost, numbers = best[k]
             if cost <= worth:
-                best[k] = _fit(each, touches, mark_height_mm, np.append(numbers, np.zeros(len(DIRECTIONS))))
+                best[k] = _fit(candidate, touches, mark_height_mm, np.append(numbers, np.zeros(len(DIRECTIONS))))
     first, second = sorted(range(len(SIGNS)), key=lambda k: best[k][0])[:2]
     cost, numbers = best[first]
     if best[second][0] < APART**2 * cost + LEAST_MM**2:
@@ -292,7 +292,7 @@ def _set_turn_zero(
     return machine.model_copy(update={"turn": turn}), (radius * cos(angle), radius * sin(angle), mark_mm[2])
 
 
-def _told(touches: Sequence[Touch]) -> np.ndarray:
+def _measured(touches: Sequence[Touch]) -> np.ndarray:
     """(n, 3) which of x y z each touch measures."""
     return np.array([[not touch.on_plate, not touch.on_plate, True] for touch in touches])
 

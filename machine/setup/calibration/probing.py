@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from machine.kinematics.table import machine_points, workpiece_points
-from machine.setup.calibration.fit import Touch, estimate
+from machine.setup.calibration.fit import Touch, estimate, slope_of
 from machine.setup.calibration.program import TILTS_DEG, clipped_head, safe_z_mm, steepest_tilts, turns_deg
 from mdp.clearance import find_obstacle
 from mdp.head import Ring, bodies, directions
@@ -70,28 +70,21 @@ def ball_centre(contacts_mm: Floats, radius_mm: float, flat_mm: float = 0.0, see
     """
     numbers = np.array([*contacts_mm[:, :2].mean(axis=0), contacts_mm[:, 2].max() - radius_mm, flat_mm])
     count = 4 if seek_flat else 3
+
+    def heights(numbers: Floats) -> Floats:
+        return contact_heights(numbers[:3], radius_mm, numbers[3], contacts_mm[:, :2])
+
     for _ in range(ROUNDS):
-        off = contacts_mm[:, 2] - contact_heights(numbers[:3], radius_mm, numbers[3], contacts_mm[:, :2])
-        if not np.isfinite(off).all():
+        off, slope = contacts_mm[:, 2] - heights(numbers), slope_of(heights, numbers)[:, :count]
+        if not (np.isfinite(off).all() and np.isfinite(slope).all()):
             break
-        step = np.linalg.lstsq(_slope(numbers, radius_mm, contacts_mm[:, :2])[:, :count], off, rcond=None)[0]
+        step = np.linalg.lstsq(slope, off, rcond=None)[0]
         numbers[:count] += np.clip(step, -0.3 * radius_mm, 0.3 * radius_mm)
         if np.abs(step).max() < SETTLED_MM:
             return numbers[:3]
     raise PrinterError(
         f"the contacts are not those of a ball {2.0 * radius_mm:g} mm in diameter: is it {option('ball-mm')}, firm and clean?"
     )
-
-
-def _slope(numbers: Floats, radius_mm: float, places_mm: Floats) -> Floats:
-    """(n, 4) derivatives of the contact heights by x, y, z of the centre and by the flat."""
-    away = places_mm - numbers[:2]
-    distance = np.hypot(*away.T)
-    aside = np.maximum(distance - numbers[3], 0.0)
-    steep = aside / np.sqrt(radius_mm**2 - aside**2)
-    across = steep[:, None] * away / np.maximum(distance, 1e-12)[:, None]
-    slope: Floats = np.column_stack([across, np.ones(len(away)), steep])
-    return slope
 
 
 def find_in_the_way(machine: Machine, pose: Pose, ball: Ball, tips_mm: Floats, touches_by_nozzle: bool) -> str | None:

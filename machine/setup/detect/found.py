@@ -98,8 +98,8 @@ def axis_readings(
         if not low < high:
             raise ProfileError(f"{name}: {source} tells limits from {low:g} to {high:g}: the first must be below the second")
         limits = Reading([low, high], source)
-    told = {SPEED: speed, ACCELERATION: acceleration, LIMITS: limits}
-    return {key: reading for key, reading in told.items() if reading is not None}
+    readings = {SPEED: speed, ACCELERATION: acceleration, LIMITS: limits}
+    return {key: reading for key, reading in readings.items() if reading is not None}
 
 
 def rounded(value: Value) -> Value:

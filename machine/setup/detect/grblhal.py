@@ -56,8 +56,8 @@ def read(config: ConfigText) -> Found:
 def _axis(config: ConfigText, values: dict[int, float], index: int, letter: str) -> AxisReadings:
     speed, acceleration, travel = (values.get(first + index) or None for first in (SPEEDS, ACCELERATIONS, TRAVELS))
     low, high = (None, None) if travel is None else _envelope(values, index, travel)
-    told = reading(speed, f"${SPEEDS + index}", 1.0 / MINUTE_S), reading(acceleration, f"${ACCELERATIONS + index}")
-    return axis_readings(f"{config.name}: axis {letter}", *told, low, high, f"${TRAVELS + index}")
+    rates = reading(speed, f"${SPEEDS + index}", 1.0 / MINUTE_S), reading(acceleration, f"${ACCELERATIONS + index}")
+    return axis_readings(f"{config.name}: axis {letter}", *rates, low, high, f"${TRAVELS + index}")
 
 
 def _envelope(values: dict[int, float], index: int, travel: float) -> tuple[float, float]:

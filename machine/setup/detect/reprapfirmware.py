@@ -177,8 +177,8 @@ def _model(config: ConfigText) -> dict[str, Any]:
 
 def _drive(drive: Table, name: str, source: str) -> AxisReadings:
     speed, acceleration, low, high = (number(drive.get(field)) for field in ("speed", "acceleration", "min", "max"))
-    told = reading(speed, source, 1.0 / MINUTE_S), reading(acceleration, source)
-    return axis_readings(name, *told, low, high, source)
+    rates = reading(speed, source, 1.0 / MINUTE_S), reading(acceleration, source)
+    return axis_readings(name, *rates, low, high, source)
 
 
 def _tables(value: Any) -> list[Table]:

@@ -72,8 +72,6 @@ def _carried_out(job: PrintJob, person: AtPage) -> End:
             person.tell(webcam=_webcam(printer))
         if person.ask("") is None:
             return NOT_BEGUN
-        if isinstance(printer, ServerPrinter) and not job.starts:
-            return printer.send(loaded)
         return printer.print(loaded)
 
 

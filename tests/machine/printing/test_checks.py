@@ -3,17 +3,32 @@
 import errno
 import grp
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
 import serial
 
 from machine.cli.cli import main
+from machine.dryrun.dryrun import dry_run
 from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
+from machine.pipeline.programs import LoadedProgram
 from machine.printing import ports
-from machine.printing.checks import exceeded_limit, firmware_mismatch, machine_mismatch
+from machine.printing.checks import (
+    check,
+    check_destination,
+    check_machine,
+    exceeded_limit,
+    firmware_mismatch,
+    machine_mismatch,
+    machine_sentences,
+    program_sentences,
+)
+from machine.printing.destination import SerialPort
+from machine.printing.servers.server import Identity
+from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.messages import terminal_words
@@ -49,6 +64,7 @@ def talking_at(rate: int) -> Words:
     return lambda data, baud: right(data, baud) if baud == rate else bytes(byte | 0x80 for byte in data) * 3
 
 
+AT = SerialPort("/dev/ttyACM0")
 STRANGERS: dict[str, tuple[Words, str]] = {
     "rubbish": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only rubbish comes from PORT at 115200 baud"),
     "silence": (lambda data, baud: b"", "nothing answers at PORT: is the printer switched on, and is 115200 baud"),
@@ -262,6 +278,31 @@ def test_a_firmware_is_called_by_name_and_version(words: str, name: str) -> None
 @pytest.mark.parametrize("letters", ["", "XYZAC", "XYZABC"])
 def test_a_firmware_that_tells_enough_or_nothing_is_not_refused(letters: str) -> None:
     assert firmware_mismatch(Answer(Kind.PRINTER, "FIRMWARE_NAME:Marlin 2", letters), MACHINE) == ""
+
+
+def test_a_machine_whose_firmware_opens_files_itself_is_refused_at_a_port_whatever_answers() -> None:
+    machine = load(machine="linuxcnc_xyzac").machine
+    for refuse in (partial(check_machine, None), partial(check_destination, AT)):
+        with pytest.raises(PrinterError, match="speaks linuxcnc, which opens files itself: use export"):
+            refuse(machine=machine)
+
+
+def test_force_goes_past_another_firmware_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    klipper = Identity("", Answer(Kind.PRINTER, "FIRMWARE_NAME:Klipper"))
+    with pytest.raises(PrinterError, match="the printer's firmware is Klipper, but generic A/C table writes for marlin"):
+        check_machine(klipper.printer, MACHINE)
+    assert not check(machine_sentences(klipper, MACHINE), force=True)
+    assert "the printer's firmware is Klipper" in capsys.readouterr().err
+    assert check(machine_sentences(Identity(""), MACHINE), force=False)
+
+
+@pytest.mark.parametrize(("coordinates", "refused"), [("table", True), ("workpiece", False)])
+def test_x_y_z_are_held_against_the_limits_where_they_are_places_of_the_axes(coordinates: str, refused: bool) -> None:
+    profile, lines = load(settings=[f"machine.coordinates={coordinates}"]), ("G28", "G1 Z50 F600", "G1 X50 F600")
+    loaded = LoadedProgram("part.gcode", Program(lines, dry_run(lines, profile), None), profile)
+    narrow = Identity("", Answer(Kind.PRINTER, "", "XYZAC", {"X": (-5.0, 5.0)}))
+    sentences = "".join(program_sentences(narrow, loaded, force=True))
+    assert ("but the printer's firmware allows -5 to 5" in sentences) is refused
 
 
 def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:

@@ -11,14 +11,20 @@ import pytest
 from machine.cli.cli import main
 from machine.cli.terminal.at_terminal import AtTerminal
 from machine.cli.terminal.keys import LEAVING
+from machine.dryrun.dryrun import dry_run
 from machine.link.pending_commands import CancelledError
-from machine.printing.job import Scene
+from machine.pipeline.programs import LoadedProgram
+from machine.printing.destination import parse_server_address
+from machine.printing.job import PrintJob, Scene
 from machine.printing.serial_log import SerialLog
-from machine.printing.server_print import hand_over
+from machine.printing.server_print import ServerPrinter, hand_over
 from machine.printing.servers import follow
 from machine.printing.servers.http import VARIABLE
 from machine.printing.servers.octoprint import OctoPrint
 from machine.printing.servers.server import GcodeUpload, Sent
+from machine.program import Program
+from profiles.errors import ServerError
+from profiles.profile import load
 from tests.machine.person import HASTY, ROOT, Person
 from tests.machine.printing.servers.stand_ins import KEY, session_with, stand_in
 
@@ -248,3 +254,23 @@ def test_a_person_who_gives_up_breaks_the_upload_off(tmp_path: Path, capsys: pyt
             hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode", scene(tmp_path), GivingUp())
         assert job.files == {}
     assert f"upload broken off: {address} keeps nothing of a.gcode" in capsys.readouterr().err
+
+
+def test_a_server_that_another_has_given_a_print_meanwhile_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    profile, lines = load(), ("G28", "G1 X10 F600")
+    loaded = LoadedProgram("a.gcode", Program(lines, dry_run(lines, profile), None), profile)
+    with stand_in("moonraker") as (job, address), session_with(address) as server:
+        server.greet()
+        hold = server.upload
+
+        def upload(program: GcodeUpload, sent: Sent) -> str:
+            job.files["other.gcode"] = b"G28\n"
+            job.start("other.gcode")
+            return hold(program, sent)
+
+        monkeypatch.setattr(server, "upload", upload)
+        order = PrintJob(parse_server_address(address))
+        printer = ServerPrinter(order, server, SerialLog(tmp_path / "log", "a.gcode"), AtTerminal())
+        with pytest.raises(ServerError, match=r"is printing other\.gcode now: wait until that is done"):
+            printer.print(loaded)
+        assert "POST /printer/print/start" not in job.asked

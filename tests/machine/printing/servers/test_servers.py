@@ -261,6 +261,17 @@ def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: st
 
 
 @every_kind
+def test_a_key_that_a_server_repeats_stands_in_no_message_and_no_log(kind: str) -> None:
+    logged: list[bytes] = []
+    with stand_in(kind) as (job, address), session_with(address, lambda direction, data: logged.append(data)) as server:
+        server.greet()
+        job.refuse[UPLOADS[kind]] = (500, f"no such key: {KEY}".encode())
+        with pytest.raises(ServerError, match=r"no such key: \*\*\*") as refused:
+            server.upload(UPLOAD, unheard)
+    assert KEY not in str(refused.value) + str(logged)
+
+
+@every_kind
 def test_half_an_upload_is_no_file(kind: str) -> None:
     with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
@@ -533,6 +544,19 @@ def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.Monke
             follow_unanswered(lambda: PrintStatus(PrintState.READY if over.wait(60.0) else PrintState.FAILED))
     finally:
         over.set()
+
+
+def test_a_server_that_answers_nothing_but_errors_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(follow, "LOST_S", 0.2)
+    looks = iter(range(300))
+
+    def status() -> PrintStatus:
+        if (look := next(looks)) == 0:
+            return PrintStatus(PrintState.PRINTING, file="box.gcode")
+        raise ServerError("octoprint:host refuses") if look < 299 else ZeroDivisionError
+
+    with pytest.raises(ServerError, match="octoprint:host refuses; no answer for 0 s: the print may go on, look at the printer"):
+        follow_unanswered(status)
 
 
 def test_an_error_of_a_thread_is_not_lost() -> None:

@@ -27,6 +27,12 @@ def test_exact_touches_give_exact_numbers(name: str, tilt: Wrong, turn: Wrong) -
     assert fitted.mark_mm == pytest.approx(MARK, abs=1e-6)
 
 
+def test_along_the_tilt_axis_its_point_stays_where_the_profile_has_it() -> None:
+    machine = really(machine_of("generic_ac"), {"point_mm": (5.0, 0.0, -12.0)}, {})
+    real = really(machine, {"point_mm": (5.0, 1.0, -11.0)}, {})
+    assert calibrate(machine, touched(real), MARK[2]).machine.tilt.point_mm == pytest.approx((5.0, 1.0, -11.0))
+
+
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("name", "tilt", "turn"), WRONG[::2])
 def test_touches_a_hundredth_off_give_centres_to_two_hundredths(name: str, tilt: Wrong, turn: Wrong, seed: int) -> None:

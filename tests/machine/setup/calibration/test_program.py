@@ -21,6 +21,13 @@ def test_the_program_of_every_machine_is_clear_and_inside_its_limits(name: str) 
     assert len(touches.poses) == 12
 
 
+@pytest.mark.parametrize(("name", "tilts_deg"), [
+    ("generic_ac", {-60.0, 0.0, 60.0}), ("fractal5pro", {0.0, 30.0, 60.0}), ("linuxcnc_xyzac", {-60.0, 0.0, 45.0}),
+])  # fmt: skip
+def test_the_tilts_are_the_steepest_to_both_sides_or_two_to_one(name: str, tilts_deg: set[float]) -> None:
+    assert {pose.tilt_deg for pose in plan_touches(machine_of(name), 20.0).poses} == tilts_deg
+
+
 def test_a_machine_with_three_axes_has_nothing_to_calibrate() -> None:
     with pytest.raises(MoveError, match="there is no rotary axis"):
         plan_touches(machine_of("three_axis"), 20.0)
