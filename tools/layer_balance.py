@@ -11,8 +11,7 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.columns import Bars, Lattice, Mask, laid, lattice_over
-from machine.dryrun.interfaces import Interface
+from machine.dryrun.interfaces import Bars, Interface, Lattice, Mask, laid, lattice_over
 from machine.dryrun.strokes import Beads
 from machine.gcode.reader.parsed import ParsedProgram
 from mdp.mesh import Floats, Indices
