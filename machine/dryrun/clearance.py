@@ -127,18 +127,11 @@ def _turns(program: ParsedProgram, deposited: Beads, machine: Machine) -> list[F
         for some in pieces(before - done):
             new = np.arange(done, before)[some][counted[done:before][some]]
             bead = 0.5 * float(program.remarks.width_mm[program.remark[deposited.rows[new]]].max(initial=0.0))
-            points = [printed.points_mm, *_ends(deposited.segments(new))]
-            printed = hull(np.vstack(points), max(bead, printed.bead_mm))
+            points = np.vstack([printed.points_mm, deposited.segments(new).reshape(-1, 3)])
+            printed = hull(points, max(bead, printed.bead_mm))
         done = before
         problems += _turn(program, int(row), printed, machine)
     return problems
-
-
-def _ends(segments: Floats) -> tuple[Floats, Floats]:
-    """The ends of (m, 2, 3) segments, without beginnings that are ends of those before them."""
-    begins = np.ones(len(segments), dtype=np.bool_)
-    begins[1:] = (segments[1:, 0] != segments[:-1, 1]).any(axis=1)
-    return segments[begins, 0], segments[:, 1]
 
 
 def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> Iterator[Finding]:

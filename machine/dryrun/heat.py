@@ -195,11 +195,11 @@ def _profile(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
         which = f"{count} numbers of {machine.name} are" if count > 1 else f"one number of {machine.name} is"
         message = f"{which} in no source, measure them (docs/calibration.md): {', '.join(machine.uncalibrated)}"
         yield Finding("warning", "uncalibrated", 0, 0, 0, message)
-    for place in program.unsupported:
-        where = f", most of them in layer {place.layer}" if place.layer else ""
-        why = f": {place.reason}" if place.reason else ""
-        message = f"{place.mm2:g} mm² of risky faces of part {place.part} could be given no support{where}{why}"
-        yield Finding("warning", "unsupported", place.line, place.part, place.layer, message)
+    for line, part, area in program.unsupported:
+        where = f", most of them in layer {area.layer}" if area.layer else ""
+        why = f": {area.reason}" if area.reason else ""
+        message = f"{area.mm2:g} mm² of risky faces of part {part} could be given no support{where}{why}"
+        yield Finding("warning", "unsupported", line, part, area.layer, message)
 
 
 def _unknown_commands(program: ParsedProgram) -> list[Finding]:

@@ -147,15 +147,9 @@ def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
         return []
     half_mm = 0.5 * deposited.width_mm
     reach_mm = float(half_mm[purged].max() + half_mm[laid].max()) - ROUNDING_MM
-    lines, beads = (deposited.segments(which)[:, :, :2] for which in (purged, laid))
-    near = (
-        (beads.max(axis=1) > lines.min(axis=(0, 1)) - reach_mm) & (beads.min(axis=1) < lines.max(axis=(0, 1)) + reach_mm)
-    ).all(axis=1)
-    if not near.any():
-        return []
-    import shapely  # takes 30 ms to load; needed only where beads lie beside the purge
+    import shapely  # takes 30 ms to load; needed only by programs with a purge
 
-    laid, lines, beads = laid[near], shapely.linestrings(lines), shapely.linestrings(beads[near])
+    lines, beads = (shapely.linestrings(deposited.segments(which)[:, :, :2]) for which in (purged, laid))
     line, bead = shapely.STRtree(beads).query(lines, "dwithin", reach_mm)
     between_mm = shapely.distance(lines[line], beads[bead]) - half_mm[purged[line]] - half_mm[laid[bead]]
     overlapping = np.flatnonzero(between_mm < -ROUNDING_MM)

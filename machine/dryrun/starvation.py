@@ -7,7 +7,6 @@ while fewer than half of the places are taken, so that the sender catches up; th
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,25 +29,6 @@ GREETING = 3  # lines sent before the program
 FREE_BAUD = 1e12  # a line that takes no time
 OK_BYTES = float(len("ok N12345 P15 B3\n"))  # during which the printer reads nothing
 NONE = -1
-
-
-class SerialLine(NamedTuple):
-    """How blocks come: (m,) bytes of the line of each, (m,) of other lines before it, bytes in flight at most, seconds a byte."""
-
-    own: Floats
-    ahead: Floats
-    ring: float
-    byte_s: float
-
-
-class Planned(NamedTuple):
-    """The planner at work. state: [begin, duration, end speed, gate]; span: [current, last, first, end] block, NONE: none;
-    entry2: (m + 1,) squares of the speeds at which blocks begin.
-    """
-
-    state: Floats
-    span: NDArray[np.int64]
-    entry2: Floats
 
 
 def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: int) -> DryRun:
@@ -79,7 +59,7 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
     blocks, moving = blocks_of(program.changes(), program.feed / 60.0, standstills(program), machine, accelerations)
     own, ahead = _bytes(lines, program.line[moving])
     flags = np.zeros((2, len(own)), dtype=np.bool_)
-    line = SerialLine(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)
+    line = own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud
     time_s = _play(blocks, line, machine.junction_speed_mm_s, flags[0], flags[1])
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
     whole[:, moving] = flags
@@ -102,9 +82,9 @@ def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:
 
 
 @no_nrt
-def _run(now: float, planned: Planned, blocks: Blocks) -> None:
-    """Begin and end what begins and ends until now."""
-    state, span, entry2 = planned.state, planned.span, planned.entry2
+def _run(now: float, state: Floats, span: Indices, entry2: Floats, blocks: Blocks) -> None:
+    """Begin and end the blocks of the planner until now. state: [begin, duration, end speed, gate]; span: [current, last, first,
+    end] block, NONE: none; entry2: (m + 1,) squares of the speeds at which blocks begin."""
     while True:
         if span[0] != NONE:
             end = state[0] + state[1]
@@ -125,37 +105,38 @@ def _run(now: float, planned: Planned, blocks: Blocks) -> None:
 
 
 @no_nrt
-def _wait_for_room(now: float, places: int, planned: Planned, blocks: Blocks) -> float:
+def _wait_for_room(now: float, places: int, state: Floats, span: Indices, entry2: Floats, blocks: Blocks) -> float:
     """The time from which on fewer than `places` blocks are planned."""
-    state, span = planned.state, planned.span
-    _run(now, planned, blocks)
+    _run(now, state, span, entry2, blocks)
     while span[3] - span[2] + (1 if span[0] != NONE else 0) >= places:
         now = max(now, state[0] + state[1] if span[0] != NONE else state[3])
-        _run(now, planned, blocks)
+        _run(now, state, span, entry2, blocks)
     return now
 
 
 @kernel
-def _play(blocks: Blocks, line: SerialLine, jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]) -> float:
-    """Seconds until the last block is over; slowed and stopped (m,) are filled in, some cruise speeds lowered."""
-    n = len(blocks.length)
-    corner2, taken = floats(n, 0.0), floats(n, 0.0)
-    planned = Planned(floats(4, 0.0), np.empty(4, np.int64), floats(n + 1, 0.0))
-    state, span, cruise, length = planned.state, planned.span, blocks.cruise, blocks.length
+def _play(
+    blocks: Blocks, line: tuple[Floats, Floats, float, float], jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]
+) -> float:
+    """Seconds until the last block is over; slowed and stopped (m,) are filled in, some cruise speeds lowered. line: (m,) bytes
+    of the line of each block, (m,) of other lines before it, bytes in flight at most, seconds a byte."""
+    n, (own, ahead, ring, byte_s) = len(blocks.length), line
+    corner2, taken, cruise, length = floats(n, 0.0), floats(n, 0.0), blocks.cruise, blocks.length
+    state, span, entry2 = floats(4, 0.0), np.empty(4, np.int64), floats(n + 1, 0.0)
     span[0], span[1], span[2], span[3] = NONE, NONE, 0, 0
     sent, flight, oldest, now = 0.0, 0.0, 0, 0.0
     for i in range(n):
-        flight += line.own[i]
-        while oldest < i and (flight > line.ring or i - oldest >= BUFSIZE):
-            flight -= line.own[oldest]
+        flight += own[i]
+        while oldest < i and (flight > ring or i - oldest >= BUFSIZE):
+            flight -= own[oldest]
             oldest += 1
-        begin = max(sent, taken[oldest - 1] + OK_BYTES * line.byte_s) if oldest > 0 else sent
-        sent = begin + (line.ahead[i] + line.own[i]) * line.byte_s
-        now = max(sent, now + OK_BYTES * line.byte_s) if line.own[i] > 0 else now
+        begin = max(sent, taken[oldest - 1] + OK_BYTES * byte_s) if oldest > 0 else sent
+        sent = begin + (ahead[i] + own[i]) * byte_s
+        now = max(sent, now + OK_BYTES * byte_s) if own[i] > 0 else now
         if blocks.halts[i]:
-            now = _wait_for_room(now, 1, planned, blocks)
+            now = _wait_for_room(now, 1, state, span, entry2, blocks)
             span[1] = NONE
-        now = _wait_for_room(now, PLANNED_BLOCKS, planned, blocks)
+        now = _wait_for_room(now, PLANNED_BLOCKS, state, span, entry2, blocks)
         taken[i] = now
         queued = span[3] - span[2] + (1 if span[0] != NONE else 0)
         if 2 <= queued < PLANNED_BLOCKS // 2 + 1 and length[i] / cruise[i] < MIN_SEGMENT_S:
@@ -173,7 +154,7 @@ def _play(blocks: Blocks, line: SerialLine, jerk: float, slowed: NDArray[np.bool
         after2 = 0.0
         for k in range(i, span[2] - 1, -1):
             square = min(corner2[k], after2 + 2.0 * blocks.acceleration[k] * length[k])
-            if square == planned.entry2[k] and k < i:
+            if square == entry2[k] and k < i:
                 break
-            planned.entry2[k] = after2 = square
-    return _wait_for_room(now, 1, planned, blocks)
+            entry2[k] = after2 = square
+    return _wait_for_room(now, 1, state, span, entry2, blocks)

@@ -129,7 +129,7 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
         support_mm3=support_mm3(run),
         risky_mm2=max(way.risky_mm2, 0.0),
         message=run.errors[0].message if run.errors else "",
-        unsupported_mm2=sum(area.mm2 for area in run.program.unsupported),
+        unsupported_mm2=sum(area.mm2 for _, _, area in run.program.unsupported),
         seam_mm=seam_mm,
         stairs_mm2=stairs_mm2,
         interface_mm3=program.interface_mm3,

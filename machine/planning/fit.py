@@ -8,6 +8,7 @@ convex hulls.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import product
 from math import ceil, dist, hypot
 from typing import NamedTuple
@@ -181,8 +182,7 @@ class Plate:
         raised = {model: standing_at(model, MIDDLE, self._up_mm) for model in dict.fromkeys(models)}
         self._parts = [raised[model].parts for model in models]
         self._around_mm = {raised[model].parts[0]: self._width_around(model) for model in raised}
-        self._hulls: dict[Part, Floats] = {}
-        self._known: dict[tuple[object, ...], bool] = {}
+        self._hull, self._is_reached, self._passes = cache(self._find_hull), cache(self._find_reached), cache(self._find_passed)
 
     def arrange(self) -> list[Place] | Misfit:
         """The middles (workpiece x, y, mm) of the models' boxes about their place on the plate; or what does not fit."""
@@ -270,34 +270,26 @@ class Plate:
             and all(self._passes(part, pose, self._parts[k][n], _away(places[model], places[k])) for k, n in before)
         ]
 
-    def _is_reached(self, part: Part, pose: Pose, place: Place) -> bool:
+    def _find_reached(self, part: Part, pose: Pose, place: Place) -> bool:
         """Whether a part at a place is within the axes' limits, and clear of the table."""
-        key = part, pose, place
-        if key not in self._known:
-            points = self._hull(part).reshape(-1, 3) + np.array([*place, 0.0])
-            self._known[key] = find_obstacle(self._machine, pose, points) is None
-        return self._known[key]
+        points = self._hull(part).reshape(-1, 3) + np.array([*place, 0.0])
+        return find_obstacle(self._machine, pose, points) is None
 
-    def _passes(self, part: Part, pose: Pose, standing: Part, away_mm: Place) -> bool:
+    def _find_passed(self, part: Part, pose: Pose, standing: Part, away_mm: Place) -> bool:
         """Whether the head passes a part of another model that stands away_mm from the part's own."""
-        key = part, pose, standing, away_mm
-        if key not in self._known:
-            beside = self._hull(standing) + np.array([*away_mm, 0.0])
-            base_mm = part.base.offset_mm - part.lifted_mm  # with its raft
-            self._known[key] = passes_clear(self._machine, pose, (self._hull(part), beside), base_mm, CELLS_MM)
-        return self._known[key]
+        beside = self._hull(standing) + np.array([*away_mm, 0.0])
+        base_mm = part.base.offset_mm - part.lifted_mm  # with its raft
+        return passes_clear(self._machine, pose, (self._hull(part), beside), base_mm, CELLS_MM)
 
-    def _hull(self, part: Part) -> Floats:
+    def _find_hull(self, part: Part) -> Floats:
         """(m, 3, 3) corners of the faces of a part's hull; on the plate with its brim, raft or support."""
-        if part not in self._hulls:
-            hull = convex_hull(part.mesh.vertices)
-            if self._around_mm.get(part, 0.0) > 0.0:
-                low = hull.vertices[hull.vertices[:, 2] <= part.lifted_mm + PLATFORM_TOLERANCE_MM]
-                brims = (low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND).reshape(-1, 3)
-                plate = brims - [0.0, 0.0, part.lifted_mm]  # where a raft is as high as the part is lifted
-                hull = convex_hull(np.vstack([hull.vertices, brims, plate]))
-            self._hulls[part] = hull.vertices[hull.faces]
-        return self._hulls[part]
+        hull = convex_hull(part.mesh.vertices)
+        if self._around_mm.get(part, 0.0) > 0.0:
+            low = hull.vertices[hull.vertices[:, 2] <= part.lifted_mm + PLATFORM_TOLERANCE_MM]
+            brims = (low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND).reshape(-1, 3)
+            plate = brims - [0.0, 0.0, part.lifted_mm]  # where a raft is as high as the part is lifted
+            hull = convex_hull(np.vstack([hull.vertices, brims, plate]))
+        return hull.vertices[hull.faces]
 
 
 def _away(here: Place, there: Place) -> Place:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.reader.parsed import ParsedProgram
 from machine.program import Alternative, Program, joints_of_print
-from machine.view import layers, paths, scene
+from machine.view import paths, scene
 from machine.view.encoding import pack
 from machine.view.parts import front_records, page_colours
 from machine.view.report import parts_report, print_report, with_alternatives
@@ -32,8 +32,8 @@ def of_parts(decomposition: Decomposition, profile: Profile, alternatives: Seque
         "report": parts_report(decomposition, profile, joints, alternatives),
     }
     run, none = dry_run((), profile), np.zeros(0, dtype=np.int64)  # a page without paths
-    by_layer = layers.layers_of(run.program, 1.0)
-    table = layers.columns(run.program, by_layer, run.times_s, run.times_s, none)
+    by_layer = paths.layers_of(run.program, 1.0)
+    table = paths.layer_columns(run.program, by_layer, run.times_s, run.times_s, none)
     return pack(header, paths.columns(run, profile, by_layer, run.times_s, none) | table | scene.surfaces(decomposition, profile))
 
 
@@ -47,13 +47,13 @@ def of_print(
     live: bool = False,
 ) -> bytes:
     """A whole print. known: the machine is the one it was made for; live: it follows a running print."""
-    run, by_layer = program.run, layers.layers_of(program.run.program, profile.process.layer_height_mm)
+    run, by_layer = program.run, paths.layers_of(program.run.program, profile.process.layer_height_mm)
     ends_s, shown = paths.end_times_s(run), paths.shown_rows(run.program)
     rows = paths.columns(run, profile, by_layer, ends_s, shown)
     height = np.zeros(len(ends_s))
     height[shown] = rows["height"].values
     count, joints = len(ends_s), joints_of_print(program, profile)
-    parts = layers.sums_of_parts(run.program, by_layer, ends_s)
+    parts = paths.sums_of_parts(run.program, by_layer, ends_s)
     patterns, text = line_patterns(program.lines, rows)
     source, decomposition = _source(program), program.decomposition
     solids = [] if decomposition is None else scene.solids(decomposition, profile, joints)
@@ -80,7 +80,7 @@ def of_print(
             ours=source != "foreign",
         ),
     }
-    table = layers.columns(run.program, by_layer, ends_s, height, shown)
+    table = paths.layer_columns(run.program, by_layer, ends_s, height, shown)
     return pack(header, rows | text | table | scene.surfaces(decomposition, profile))
 
 

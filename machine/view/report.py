@@ -15,9 +15,8 @@ from machine.dryrun.dryrun import DryRun, summary
 from machine.gcode.reader.parsed import MoveKind
 from machine.program import Alternative, Program
 from machine.quantities import duration, filament_g, newtons, percent, price_in_words
-from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
-from machine.view.paths import PRIME, WIPE, page_kinds
+from machine.view.paths import PRIME, WIPE, Layers, page_kinds
 from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, standing_still

@@ -6,7 +6,6 @@ what it takes compressed by itself.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -99,23 +98,9 @@ def _with_holes(text: str, moves: Wholes) -> str:
     return str(left.tobytes(), "utf-8")
 
 
-@dataclass(frozen=True, eq=False)
-class _Numbers:
-    """Numbers as they are written, all (n,).
-
-    digits: as one whole number with its sign; behind: how many of them are behind the point; sound: it is a number; plain: it has
-    digits before the point, as many as it needs; bare: it has none there; trimmed: it ends with no needless 0.
-    """
-
-    digits: Wholes
-    behind: Wholes
-    sound: Mask
-    plain: Mask
-    bare: Mask
-    trimmed: Mask
-
-
-def _numbers(letters: NDArray[np.uint8], start: Wholes, end: Wholes) -> _Numbers:
+def _numbers(letters: NDArray[np.uint8], start: Wholes, end: Wholes) -> tuple[Wholes, Wholes, list[Mask]]:
+    """(n,) numbers as they are written: their digits as one whole number with its sign, how many of these are behind the point,
+    and whether each may be one in full; without its last zeros; without the zero before its point."""
     minus = letters[start] == MINUS
     first, count = start + minus, len(start)
     digits, behind, points = (np.zeros(count, dtype=np.int64) for _ in range(3))
@@ -132,14 +117,12 @@ def _numbers(letters: NDArray[np.uint8], start: Wholes, end: Wholes) -> _Numbers
     leading = letters[np.minimum(first, len(letters) - 1)] == ZERO
     sound &= (points == (behind > 0)) & (before + behind > 0) & ~(minus & (digits == 0))
     trimmed = (behind == 0) | (letters[end - 1] != ZERO)
-    return _Numbers(
-        np.where(minus, -digits, digits), behind, sound, (before == 1) | ((before > 1) & ~leading), before == 0, trimmed
-    )
+    plain = (before == 1) | ((before > 1) & ~leading)  # as many digits before the point as needed
+    return np.where(minus, -digits, digits), behind, [sound & plain, sound & trimmed & plain, sound & trimmed & (before == 0)]
 
 
-def _form(number: _Numbers, value: Wholes, digits: int) -> Wholes:
-    """In which of the three forms whole values with `digits` digits behind the point are the numbers, from 1; 0: in none."""
-    scale = 10 ** np.maximum(digits - number.behind, 0)
-    same = number.sound & (number.behind <= digits) & (number.digits * scale == value)
-    full, short = same & number.plain & (number.behind == digits), same & number.trimmed
-    return np.select([full, short & number.plain, short & number.bare], [1, 2, 3], 0)
+def _form(number: tuple[Wholes, Wholes, list[Mask]], value: Wholes, digits: int) -> Wholes:
+    """The form, from 1, in which numbers are whole values with `digits` digits behind the point; 0: in none of the three."""
+    written, behind, (full, short, bare) = number
+    same = (behind <= digits) & (written * 10 ** np.maximum(digits - behind, 0) == value)
+    return np.select([same & full & (behind == digits), same & short, same & bare], [1, 2, 3], 0)

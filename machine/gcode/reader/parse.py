@@ -12,7 +12,7 @@ from machine.gcode.line_text import FREE_TEXT, begins_layer, begun_part, command
 from machine.gcode.lines import Lines
 from machine.gcode.modes import MODES
 from machine.gcode.reader.codes import BARE_WORDS, VALUED, do_command, do_macro, flush
-from machine.gcode.reader.parsed import MoveKind, ParsedProgram, Remarks, Unheld, pieces
+from machine.gcode.reader.parsed import MoveKind, ParsedProgram, Remarks, pieces
 from machine.gcode.reader.plain_moves import read_plain_moves
 from machine.gcode.reader.state import Reader, reader_of
 from machine.gcode.settings import PART_TOTALS, read_totals
@@ -22,6 +22,7 @@ from mdp.mesh import Floats, Indices
 from profiles.errors import GcodeError
 from profiles.machine import Machine
 from slicer.estimate.timing import axis_speeds, lengths
+from slicer.paths import Unsupported
 
 LONGEST_LINE = 2000
 CONDITIONS = ("IF", "ELIF", "ELSE", "WHILE")
@@ -107,7 +108,7 @@ def _remark(reader: Reader, text: str) -> None:
         area, _, rest = value.partition("@")
         layer, _, reason = rest.partition(" ")
         worst = int(layer) if re.fullmatch("[0-9]{1,6}", layer) else 0
-        reader.unsupported.append(Unheld(reader.number, reader.part, _positive(area), worst, reason))
+        reader.unsupported.append((reader.number, reader.part, Unsupported(_positive(area), worst, reason)))
 
 
 def _positive(text: str) -> float:

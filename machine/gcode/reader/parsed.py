@@ -16,6 +16,7 @@ from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from mdp.pose import Pose
 from profiles.machine import Machine
+from slicer.paths import Unsupported
 
 AT_ONCE = 8_192  # rows
 Indices32 = NDArray[np.int32]
@@ -42,17 +43,6 @@ class Event:
     row: int
 
 
-@dataclass(frozen=True)
-class Unheld:
-    """An area without support, from an ;UNSUPPORTED: comment; layer 0 and an empty reason: not given."""
-
-    line: int
-    part: int
-    mm2: float
-    layer: int
-    reason: str
-
-
 class Remarks(NamedTuple):
     """The state that comments and M204 set for the rows that follow, (k,) each: part, layer, type, width and height of a bead,
     acceleration in mm/s2, inf where the axes' limits count."""
@@ -73,7 +63,8 @@ class ParsedProgram:
     where G28 or G92 set a position. e_mm: filament pushed by the move. feed: F in units per minute. remark: which of remarks
     holds for the row. types: the ;TYPE: names. layers: number of layer changes. parts: their numbers in order. replaced: line
     number and command of every text with characters that a serial line does not carry. announced: how many parts `;PART:1 of 3`
-    announces, 0 without such a comment; part_totals: from ;CONTENTS: comments."""
+    announces, 0 without such a comment; part_totals: from ;CONTENTS: comments; unsupported: line, part and area of each
+    ;UNSUPPORTED: comment, whose layer is 0 and whose reason is empty where it names none."""
 
     line: Indices32
     start: Floats
@@ -89,7 +80,7 @@ class ParsedProgram:
     replaced: tuple[tuple[int, str], ...]
     layers: int
     parts: tuple[int, ...]
-    unsupported: tuple[Unheld, ...]
+    unsupported: tuple[tuple[int, int, Unsupported], ...]
     announced: int
     part_totals: tuple[PartTotals, ...]
 

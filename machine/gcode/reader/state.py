@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from machine.firmware import Dialect, dialect_of
 from machine.gcode.commands import BED, NOZZLE
 from machine.gcode.modes import E_AXIS, Modes, axes_of
-from machine.gcode.reader.parsed import OWN, Event, Unheld
+from machine.gcode.reader.parsed import OWN, Event
 from machine.gcode.settings import PartTotals
 from mdp.mesh import Floats
 from profiles.machine import Machine
+from slicer.paths import Unsupported
 
 DEFAULT_FEED = 1500.0
 REMARK_COLUMNS = 6  # columns of remark_rows: part, layer, type, width, height, acceleration
@@ -82,7 +83,7 @@ class Reader:
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
     replaced: list[tuple[int, str]] = field(default_factory=list)  # lines whose text is shown otherwise than written
-    unsupported: list[Unheld] = field(default_factory=list)
+    unsupported: list[tuple[int, int, Unsupported]] = field(default_factory=list)
 
     def make_room(self, place: list[float], rows: int) -> None:
         """Room for a number of further rows, the first of which begins at a place (X Y Z tilt turn, then anything)."""

@@ -5,9 +5,18 @@ from math import cos, nextafter, pi, radians, sin, tan
 import numpy as np
 import pytest
 
-from machine.dryrun.columns import NOTHING, Bars, inside_loops, laid, lattice_over, tops
 from machine.dryrun.dryrun import dry_run, summary
-from machine.dryrun.interfaces import InterfaceBalance, balance_of, interfaces
+from machine.dryrun.interfaces import (
+    NOTHING,
+    Bars,
+    InterfaceBalance,
+    balance_of,
+    inside_loops,
+    interfaces,
+    laid,
+    lattice_over,
+    tops,
+)
 from tests.machine.dryrun.bent import bent
 from tests.machine.dryrun.planted import Lines, layers, on, word
 from tools.checks.plastic import over_room, wall_edges

@@ -9,7 +9,7 @@ from shapely import LineString, MultiLineString, MultiPolygon, box
 from shapely.affinity import translate
 
 from machine.dryrun import DryRun, dry_run
-from machine.dryrun.filling import fill, filled_share
+from machine.dryrun.agreement import fill, filled_share
 from machine.dryrun.height_field import CELL_MM, Field, depth_of, empty_field, highest_first, lay_bead
 from mdp.head import head_of
 from profiles.profile import load

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trimesh.triangles import closest_point
 
-from machine.dryrun.agreement import fit_shift, inside, outside_mm
-from machine.dryrun.filling import ROUND_MM, fill
+from machine.dryrun.agreement import ROUND_MM, fill, fit_shift, inside, outside_mm
 from mdp.mesh import Floats, Mesh
 from mdp.sweep.rays import nearest_faces
 from tests.mdp.solids import random_solid

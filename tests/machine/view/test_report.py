@@ -8,8 +8,7 @@ import pytest
 
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.program import Alternative, Program, joints_of_print
-from machine.view.layers import Layers, layers_of, sums_of_parts
-from machine.view.paths import end_times_s
+from machine.view.paths import Layers, end_times_s, layers_of, sums_of_parts
 from machine.view.report import LAID, parts_report, print_report
 from mdp.joint import joints_of
 from profiles.profile import load

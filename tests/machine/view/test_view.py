@@ -18,8 +18,7 @@ from machine.kinematics.table import workpiece_path
 from machine.program import Program
 from machine.view.contents import of_parts, of_print
 from machine.view.encoding import Column, pack
-from machine.view.layers import layers_of
-from machine.view.paths import shown_rows
+from machine.view.paths import layers_of, shown_rows
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from profiles.profile import Profile, load
