@@ -59,11 +59,8 @@ def draw(text: str, out: Path) -> None:
         x, y = zip(*sorted(zip(values[panel.x], values[panel.y], strict=True)), strict=True)
         axes.plot(x, y, "o-", color="#2b6cb0")
         axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
-        axes.set(
-            **{"xscale": "log", "yscale": "log"}
-            if panel.logarithmic
-            else {"xlim": (0.0, 1.05 * max(x)), "ylim": (0.0, 1.1 * max(y))}
-        )
+        room = {"xlim": (0.0, 1.05 * max(x)), "ylim": (0.0, 1.1 * max(y))}
+        axes.set(**{"xscale": "log", "yscale": "log"} if panel.logarithmic else room)
         axes.grid(color="#dddddd")
     figure.savefig(out, metadata={"Date": None, "Description": described(text)})
 
