@@ -20,9 +20,7 @@ from tools.bench.harness import OURS, Used, heading, options_of, row
 
 def bench(given: argparse.Namespace) -> None:
     """Print one row a model."""
-    heading(
-        "model", "core s", "wall s", "memory MB", "lines", "PrusaSlicer core s", "wall s", "lines", "core ratio", "wall ratio"
-    )
+    heading("model", "core s", "wall s", "memory MB", "lines", "PrusaSlicer core s", "wall s", "lines", "core ratio", "wall")
     for model in given.models:
         mesh = mesh_of(m3.Manifold.cube((20.0, 20.0, 10.0))) if model == "box" else harness.standing(model, given.height)
         with tempfile.TemporaryDirectory() as name:

@@ -52,14 +52,15 @@ def draw(text: str, out: Path) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    matplotlib.rcParams["svg.hashsalt"] = "scale"  # the same bytes at each call
+    matplotlib.rcParams |= {"svg.hashsalt": "scale", "svg.fonttype": "none"}  # the same bytes at each call
     columns, figure = tables(text), Figure(figsize=(10.0, 5.6), layout="constrained")
     for panel, axes in zip(PANELS, figure.subplots(2, 3).flat, strict=True):
         values = columns[panel.table]
         x, y = zip(*sorted(zip(values[panel.x], values[panel.y], strict=True)), strict=True)
         axes.plot(x, y, "o-", color="#2b6cb0")
         axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
-        axes.set(**{"xscale": "log", "yscale": "log"} if panel.logarithmic else {"xlim": (0.0, None), "ylim": (0.0, None)})
+        room = {"xlim": (0.0, 1.05 * max(x)), "ylim": (0.0, 1.1 * max(y))}
+        axes.set(**{"xscale": "log", "yscale": "log"} if panel.logarithmic else room)
         axes.grid(color="#dddddd")
     figure.savefig(out, metadata={"Date": None, "Description": described(text)})
 
