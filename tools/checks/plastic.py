@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.dryrun.columns import Lattice, Mask
-from machine.dryrun.interfaces import Interface, interfaces
+from machine.dryrun.interfaces import Interface, Lattice, Mask, interfaces
 from machine.pipeline.pictures import write_png
 from mdp.mesh import Floats
 from tools.checks.harness import files, options_of, played, table
