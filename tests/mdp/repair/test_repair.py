@@ -224,7 +224,7 @@ def test_a_body_that_passes_through_itself_counts_once(lean_deg: int) -> None:
 
     mesh, notes = mended(from_manifold(ring.warp_batch(bent).rotate((lean_deg, 0, 0))))
     assert mesh.volume_mm3 == pytest.approx(np.pi * (20**2 - 10**2) * 10, rel=0.02)
-    assert notes[0].startswith("united a body that passes through itself with itself")
+    assert notes[0].startswith("resolved a self-intersecting body")
 
 
 def test_a_speck_is_left_out() -> None:
