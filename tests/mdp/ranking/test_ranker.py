@@ -159,7 +159,12 @@ def test_a_name_that_is_no_ranker_is_told_with_those_that_are() -> None:
 
 @pytest.mark.parametrize(
     ("content", "sentence"),
-    [(None, "there is no such file"), (b"", "is no ONNX file"), (b"solid", "is no ONNX file"), (5000, "is no ONNX file")],
+    [
+        (None, "there is no such file"),
+        (b"", "is not an ONNX file"),
+        (b"solid", "is not an ONNX file"),
+        (5000, "is not an ONNX file"),
+    ],
 )
 def test_a_missing_a_foreign_and_a_truncated_file_are_a_sentence(
     tmp_path: Path, content: bytes | int | None, sentence: str
