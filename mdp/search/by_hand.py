@@ -1,8 +1,8 @@
-"""Planes by hand: a person's cuts made in turn, completed by the search where they are left open, or rejected with the reason.
+"""User-defined planes: cuts made in turn, completed by the search where a value is missing, or rejected with the reason.
 
-Only what cannot be printed forbids a person's plane: it misses the model, cuts the platform, lets something float, is out of
-the machine's reach, lets the head meet the table, leaves a sliver or a base that the nozzle could break, or passes through a zone
-that stays whole. That a cut gains little, makes a small part or a long seam is the person's to judge.
+A plane is rejected only if it cannot be printed: it misses the model, cuts the plate, leaves a floating piece, is out of the
+machine's reach, makes the head meet the table, leaves a sliver or a base that the nozzle could break, or passes through a
+[[keep]] zone. A small gain, a small part or a long seam is the user's own decision.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,21 +29,20 @@ from mdp.zone import FARTHEST_MM, Grown, Painted
 from profiles.errors import PlanError
 
 EQUAL_MM2 = 1e-6
-SHIFT_MM, MOST_SHIFTS = 0.1, 10  # how the planes beside one that cannot be cut are shifted, of each lean
+SHIFT_MM, MOST_SHIFTS = 0.1, 10  # shifts of the planes around an infeasible one, for each lean
 LEANS_DEG = (0.0, 1.0, 3.0)
-MOST_PLACES = 400  # along a normal that are looked at for the nearest one to a plane
-FARTHER_LEANS_DEG = (*LEANS_DEG, 10.0, 30.0)  # on a model with steps all the way up only these miss them
+MOST_PLACES = 400  # offsets along a normal that are checked for the nearest feasible plane
+FARTHER_LEANS_DEG = (*LEANS_DEG, 10.0, 30.0)  # on a model with steps all the way up only these avoid the steps
 OUT_OF_REACH = "what it stands on is out of reach"
-LIMB_SHIFT_MM = 0.5  # between the offsets that are tried for limbs, each with a check of its own
+LIMB_SHIFT_MM = 0.5  # between the offsets tried for limbs, each of which is checked separately
 MOST_SHOWN = 8  # colours in a message
 
 
 def check_plan(plan: PlanFile, mesh: Mesh, name: str) -> None:
-    """Raise PlanError where a plan was made of another model, or means faces that the model has not: of a colour, or around a
-    point."""
+    """Raise PlanError if a plan belongs to another model, or names faces that the model lacks, by colour or around a point."""
     if plan.sha256 and plan.sha256 != mesh_sha256(mesh):
         raise PlanError(
-            f"plan {plan.name} was made of another model: {plan.model or 'its model'} is not {name} as it is read now "
+            f"plan {plan.name} was made for another model: {plan.model or 'its model'} is not {name} as it is read now "
             "(the file has changed, or process.scale, process.rotate_deg or search.pedestal_mm; without the line sha256 the "
             "planes are tried all the same)"
         )
@@ -67,7 +66,7 @@ def _check_colour(zone: Painted, mesh: Mesh, name: str, label: str) -> None:
 
 
 def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
-    """The node after the cuts of all planned parts, the last one in print order first. Raises PlanError."""
+    """The node after the cuts of all planned parts, from the last one in print order. Raises PlanError."""
     node, least_mm = problem.root, FINEST * problem.settings.offset_step_mm
     for number in range(len(plan.parts) + 1, 1, -1):
         planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
@@ -83,7 +82,7 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
 
 @dataclass(frozen=True, eq=False)
 class Rejection:
-    """Why a person's plane cannot cut a node; reason: what was found against it, FEASIBLE: there is nothing to cut."""
+    """Why a user's plane cannot cut a node. reason: the failed check, FEASIBLE if there is nothing to cut."""
 
     node: Node
     text: str
@@ -91,7 +90,7 @@ class Rejection:
 
 
 def try_planes(problem: Problem, node: Node, planes: Sequence[Plane]) -> Node | Rejection:
-    """The node after a person's cuts in turn, or why the first of them that cannot be made cannot."""
+    """The node after a user's cuts in turn, or the rejection of the first impossible one."""
     for plane in planes:
         child = _cut(problem, node, plane)
         if isinstance(child, Rejection):
@@ -101,7 +100,7 @@ def try_planes(problem: Problem, node: Node, planes: Sequence[Plane]) -> Node | 
 
 
 def _cut(problem: Problem, node: Node, plane: Plane) -> Node | Rejection:
-    """The node after a person's cut, or why it cannot be made."""
+    """The node after a user's cut, or its rejection."""
     named = name_limbs(node, plane)
     if isinstance(named, Rejection):
         return named
@@ -117,8 +116,9 @@ def _cut(problem: Problem, node: Node, plane: Plane) -> Node | Rejection:
 
 
 def name_limbs(node: Node, plane: Plane) -> Plane | Rejection:
-    """A plane whose limbs are named by vertices. A point stands for the nearest piece above the plane; unless all points are
-    vertices, each piece is named by its farthest vertex. Where the limbs are all that lies above, the plane has none."""
+    """A plane whose limbs are given by vertices. A point selects the nearest piece above the plane; unless all points are
+    vertices, each piece is represented by its farthest vertex. If the limbs are everything above the plane, limbs_mm is None.
+    """
     if plane.limbs_mm is None:
         return plane
     limbs, standing = divide(above(node.solid, plane), plane.limbs_mm)
@@ -140,15 +140,16 @@ def name_limbs(node: Node, plane: Plane) -> Plane | Rejection:
 
 
 def cut_near(problem: Problem, node: Node, plane: Plane) -> Node | None:
-    """The node after a cut by the nearest plane to one that can be cut: the plane itself, one beside it, or one that leans by a
-    few degrees; None where there is none."""
+    """The node after a cut by the nearest feasible plane: the plane itself, a shifted one, or one that leans by a few degrees;
+    None if there is none.
+    """
     children = (try_planes(problem, node, [near]) for near in chain([plane], _beside(problem, node, plane)))
     return next((child for child in children if isinstance(child, Node)), None)
 
 
 def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The planes around one that the sweep finds nothing against: shifted ones, the nearest first, then leaning ones."""
-    if plane.limbs_mm is not None:  # one by one, and leaning about the section of the limbs
+    """Feasible planes around an infeasible one, by the sweep: shifted ones, nearest first, then leaning ones."""
+    if plane.limbs_mm is not None:  # one by one, leaning about the limbs' section
         passed = passing_places(limb_mesh(node.remainder, plane), plane)
         middle = passed.mean(axis=0) if len(passed) else plane.offset_mm * plane.normal
         for lean_deg in LEANS_DEG:
@@ -174,8 +175,9 @@ def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
 
 
 def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The planes that the sweep finds nothing against, over the whole height of what remains: first those of the same normal, the
-    nearest first, then those that lean by a few degrees."""
+    """Feasible planes by the sweep, over the whole height of the remainder: first those with the same normal, nearest first, then
+    those that lean by a few degrees.
+    """
     vertices = node.remainder.mesh.vertices
     if plane.limbs_mm is not None:  # along its normal only
         heights = vertices @ plane.normal
@@ -185,7 +187,7 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
             yield from _if_free(problem, node, replace(plane, offset_mm=float(offset_mm)))
         return
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # a plane that leans, leans about it
+    middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # pivot of the planes that lean
     for lean_deg in FARTHER_LEANS_DEG:
         for normal in _leaning(plane.normal, lean_deg):
             heights = vertices @ normal
@@ -199,14 +201,14 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
 
 
 def _if_free(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """A plane, its limbs named, where nothing is found against it."""
+    """Yields the plane with its limbs named, if it is feasible."""
     named = name_limbs(node, plane)
     if isinstance(named, Plane) and rejection(problem, node, named) is None:
         yield named
 
 
 def _leaning(normal: Floats, lean_deg: float) -> Floats:
-    """(k, 3) normals that lean four ways from one; itself for 0."""
+    """(k, 3) normals that lean to four sides; the normal itself for 0."""
     if lean_deg == 0.0:
         return normal[None]
     aside, across = frame_across(normal)
@@ -214,20 +216,21 @@ def _leaning(normal: Floats, lean_deg: float) -> Floats:
 
 
 def rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """Why a person's plane cannot cut a node, None: it can. Nothing is cut."""
+    """Why a user's plane cannot cut a node, without cutting; None if it can."""
     return _unfit(problem, node, plane) or _in_the_way(problem, node, plane)
 
 
 def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """A rejection where the head would meet what stands beside the limbs of a plane."""
+    """A rejection if the head would meet parts standing beside the limbs of a plane; None if it would not."""
     if plane.limbs_mm is None or problem.is_clear(node, plane):
         return None
     return Rejection(node, REASONS[Reason.STANDING], Reason.STANDING)
 
 
 def _unfit(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """Why a plane cannot cut a node, what stands beside limbs left aside: it cuts nothing, the sweep finds something against it,
-    or no pose serves the part."""
+    """Why a plane cannot cut a node, parts beside limbs aside: it cuts nothing, the sweep rejects it, or no pose works for the
+    part.
+    """
     missed = _miss(problem, node, plane)
     if missed is not None:
         return Rejection(node, missed)
@@ -249,12 +252,12 @@ def _unfit(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
 
 
 def _limits(problem: Problem, directions: Floats) -> Bounds:
-    """The bounds of (k, 3) directions without those that are no physical law."""
+    """The bounds of (k, 3) directions, without preferences that are no physical limits."""
     return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
 
 
 def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason: Reason, sliver_mm: float) -> str:
-    """What the sweep finds against a plane, with its numbers."""
+    """A rejection by the sweep as a message with numbers."""
     text = REASONS[reason]
     match reason:
         case Reason.PLATFORM:
@@ -266,7 +269,7 @@ def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason
             needed, body, _ = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
             text = f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
         case Reason.INTERFACE:
-            text = "a piece of it would hang in the air: it stands on nothing that is printed before"
+            text = "a piece of it would float: nothing printed before lies below it"
         case Reason.FRAGILE:
             sliver = f"its plane would leave a sliver {sliver_mm:.2g} mm thin"
             text = f"{sliver}: {limits.fragile_mm:g} is the least (search.fragile_mm)"
@@ -279,7 +282,7 @@ def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason
 
 
 def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
-    """Why a plane cuts nothing: it misses the model, or later parts took what it would cut."""
+    """Why a plane cuts nothing: it misses the model, or later parts already contain what it would cut."""
     heights = plane.heights_mm(node.remainder.mesh.vertices)
     if heights.min() < -COPLANAR_MM and heights.max() > COPLANAR_MM:
         return None
@@ -294,8 +297,9 @@ def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
 
 
 def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) -> Plane:
-    """The plane of a part whose normal or offset is left open: the feasible one that makes the most safe, among equals the one
-    with the largest part. Raises PlanError where there is none."""
+    """The plane of a part whose normal or offset is missing: the feasible one that saves most, among equals the one with the
+    largest part. Raises PlanError if there is none.
+    """
     if planned.normal is None and planned.offset_mm is None:
         raise PlanError(f"{label} has neither normal nor offset_mm: leave it out, the search adds parts by itself")
     directions = problem.limits.directions if planned.normal is None else np.array([planned.normal])

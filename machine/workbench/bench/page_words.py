@@ -57,7 +57,7 @@ RULES = (
     (r"--machine must be one of those, as", "take a machine of those under Settings, as"),
     (r"--machine gives", "Homed as in names"),
     (r"; resume can be tried again|(?<=: when it has come to rest), resume can be tried again", ", try it again"),
-    (r": decompose --planes \S+ has it found", ": leave the part out of the plan and have it found by Find the others"),
+    (r": decompose --planes \S+ finds it", ": leave the part out of the plan and have it found by Find the others"),
     (r" \((?:criterion [IV]+|\[\[keep\]\])\)", ""),
     (r"--as-is keeps it", "Undo keeps it"),
     (r"`profiles show` lists them", "Settings lists them"),

@@ -130,9 +130,9 @@ def test_a_plane_by_hand_may_gain_nothing_and_make_a_small_part() -> None:
 
 def test_a_plan_of_another_model_is_refused() -> None:
     plan = plan_of(decompose(shapes.tee(), "tee.stl", _profile()))
-    with pytest.raises(PlanError, match=r"was made of another model: tee.stl is not new.stl as it is read now"):
+    with pytest.raises(PlanError, match=r"was made for another model: tee.stl is not new.stl as it is read now"):
         cut_by_plan(shapes.tee(arm=41.0), "new.stl", _profile(), SearchRequest(plan=plan))
-    with pytest.raises(PlanError, match="was made of another model"):
+    with pytest.raises(PlanError, match="was made for another model"):
         decompose(shapes.tee(arm=41.0), "new.stl", _profile(), SearchRequest(plan=plan))
     assert (
         len(cut_by_plan(shapes.tee(arm=40.5), "new.stl", _profile(), SearchRequest(plan=replace(plan, sha256=""))).parts)
@@ -201,7 +201,7 @@ def test_an_offset_next_to_nothing_is_refused() -> None:
 
 
 def test_a_plan_with_a_plane_left_open_is_sent_to_the_search() -> None:
-    assert "part 2 has no offset_mm: decompose --planes mine.toml has it found" in _refusal(shapes.tee(), (LEANING, None))
+    assert "part 2 has no offset_mm: decompose --planes mine.toml finds it" in _refusal(shapes.tee(), (LEANING, None))
     assert "part 2 has no normal" in _refusal(shapes.tee(), (None, 20.0))
 
 
@@ -241,7 +241,8 @@ def test_planes_by_hand_stay_and_the_others_are_found() -> None:
     assert both.reduction > 0.9
     assert [row.parts for row in both.front] == list(range(2, len(both.front) + 2))
     again = decompose(arms, "shape", profile, SearchRequest(plan=replace(by_hand, front=plan_of(both).front)))
-    kept = "the [[front]] of mine.toml is not kept: planes by hand have the others found anew, for every number of parts"
+    again = "with planes by hand, the search finds the other planes again for every number of parts"
+    kept = f"the [[front]] of mine.toml is not kept: {again}"
     assert again.notes == (*both.notes, kept)
     with pytest.raises(PlanError, match=r"--parts 1: the planes by hand of mine.toml alone make 2 parts"):
         decompose(arms, "shape", profile, SearchRequest(plan=by_hand, parts=1))
@@ -325,7 +326,7 @@ def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
 def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:
     zones = Zones(no_seam=(Zone((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),))
     found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), SearchRequest(plan=_by_hand(zones=zones)))
-    assert "[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)" in found.notes
+    assert "[[no_seam]] has no effect on cuts, since seams cost nothing (search.objective, search.seam_mm)" in found.notes
 
 
 def test_the_published_search_starts_from_planes_by_hand_too() -> None:
