@@ -1,6 +1,6 @@
-"""Problems of profiles, each one sentence: of one table by itself, and what only several tables know together.
+"""Problems of profiles, each one sentence: within one table, and between tables.
 
-What is found wrong in a table is replaced by a sound value, so that the checks that come later see it too.
+A wrong value is replaced by a valid one, so that later checks also run.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,17 +17,17 @@ from profiles.search import Search
 from profiles.wording import sentences
 
 NOZZLE_TEMPERATURES = ("nozzle_c", "first_layer_nozzle_c", "homing_nozzle_c", "standby_c")
-LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diameters
-MOST_INTERFACE_WIDTH = 2.0  # thin beads on plastic: beyond the flat around the orifice nothing presses them down
+LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # widths of printable lines in nozzle diameters
+MOST_INTERFACE_WIDTH = 2.0  # thin beads on plastic: beyond the flat of the nozzle nothing presses them down
 
 
 def table_problems(
     model: type[BaseModel], prefix: str, table: Any, sound: Mapping[str, Any]
 ) -> tuple[list[str], Any, frozenset[str]]:
-    """All problems of a table whose keys are dotted after the prefix; the table built key by key, None where it is no table; and
-    the dotted keys whose wrong values were replaced.
+    """All problems of a table whose keys are dotted after the prefix; the table validated key by key, None if it is not a table;
+    and the dotted keys whose wrong values were replaced.
 
-    sound: the values of a profile that is fine.
+    sound: the values of a valid profile.
     """
     given = deepcopy(table)
     wrong, mended, value = _rounds(model, prefix, given, sound, KEY_BY_KEY)
@@ -38,7 +38,7 @@ def table_problems(
 
 
 def not_of_mended(problems: Iterable[str], mended: frozenset[str]) -> list[str]:
-    """The problems without those that name a replaced value. mended: the keys whose values were replaced."""
+    """The problems that do not name a replaced value. mended: the keys whose values were replaced."""
     return [sentence for sentence in problems if not _tells_of(sentence, mended)]
 
 
@@ -50,7 +50,7 @@ def _tells_of(sentence: str, mended: frozenset[str]) -> bool:
 def _rounds(
     model: type[BaseModel], prefix: str, given: Any, sound: Mapping[str, Any], context: str | None
 ) -> tuple[list[str], frozenset[str], Any]:
-    """The problems, the keys mended in the table given, and what it is when it is sound; None where it cannot be mended."""
+    """The problems, the keys replaced in the given table, and its valid model; None if it cannot be repaired."""
     problems: dict[str, None] = {}
     mended: set[tuple[str, ...]] = set()
     value = None
@@ -69,7 +69,7 @@ def _rounds(
 
 
 def _key_path(problem: Any) -> tuple[str, ...]:
-    """Where to mend a problem: lists are replaced as a whole."""
+    """The key to replace for a problem: lists are replaced as a whole."""
     path: list[str] = []
     for step in problem["loc"]:
         if isinstance(step, int):
@@ -79,7 +79,7 @@ def _key_path(problem: Any) -> tuple[str, ...]:
 
 
 def _mend(given: dict[str, Any], key_path: tuple[str, ...], sound: Mapping[str, Any]) -> None:
-    """Put the sound value where the wrong one stands, or take it out where there is none."""
+    """Replace a wrong value by the valid one, or remove it if there is none."""
     inner, value = given, sound
     for step in key_path[:-1]:
         if not isinstance(inner.get(step), dict):
@@ -102,7 +102,7 @@ def too_hot(material: Material, machine: Machine) -> Iterable[str]:
 
 
 def lifted_twice(process: Process, search: Search) -> Iterable[str]:
-    """A raft under a model that a pedestal lifts already."""
+    """A raft under a model that a pedestal already lifts."""
     if process.raft_layers and search.pedestal_mm > 0.0:
         yield (
             f"process.raft_layers is {process.raft_layers}: 0 is allowed with a pedestal (search.pedestal_mm is "

@@ -1,4 +1,4 @@
-"""The search: how the parts of a model are looked for; a table of a process profile."""
+"""The search: settings for finding the parts of a model; a table of a process profile."""
 
 from functools import cache
 from importlib import resources
@@ -10,7 +10,7 @@ from profiles.toml_text import read_toml
 
 @cache
 def _mode(name: str) -> dict[str, Any]:
-    """The settings that hold in a mode of the search, with those of the mode that it inherits."""
+    """The settings of a mode of the search, with those of the mode it inherits."""
     file = resources.files("profiles") / "searches" / f"{name}.toml"
     document = read_toml(file.read_text(encoding="utf-8"))
     below = _mode(document["inherits"]) if "inherits" in document else {}
@@ -154,7 +154,7 @@ class Search(Frozen):
 
     @property
     def effective(self) -> "Search":
-        """The settings as they hold: the published search has the paper's terms, and what means nothing beside others is nothing.
+        """The settings in effect: the published search uses the paper's terms, and settings without effect are 0 or off.
 
         >>> Search(objective="risky").effective.cut_mm2
         0.0

@@ -1,4 +1,4 @@
-"""Support: what a part stands on, be it support, the plate, or the parts before it."""
+"""Support: what a part rests on: support, the build plate, or earlier parts."""
 
 from typing import Any, Literal
 
@@ -6,8 +6,8 @@ from pydantic import model_validator
 
 from profiles.frozen import Effect, Frozen, advanced, rare, simple
 
-ANY_MATERIAL_MM = 5.0  # what bridges in whatever is printed
-FARTHEST_MM = 1000.0  # no plate reaches so far from its turn axis
+ANY_MATERIAL_MM = 5.0  # a length that any material can bridge
+FARTHEST_MM = 1000.0  # larger than the distance of any plate from its turn axis
 MIDDLE = (0.0, 0.0)
 
 
@@ -115,7 +115,7 @@ class Support(Frozen):
 
     @property
     def bridge_mm(self) -> float:
-        """The longest bridge without support; a profile that was loaded has put the material's where nothing was asked for."""
+        """The longest bridge without support; a loaded profile has the material's value if the process sets none."""
         return ANY_MATERIAL_MM if self.bridge_longest_mm is None else self.bridge_longest_mm
 
 
@@ -260,7 +260,7 @@ class Interface(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _as_in_earlier_versions(cls, values: Any) -> Any:
-        """What interlock_mm alone has meant before there was interlock."""
+        """Read interlock_mm alone, as in versions before interlock existed."""
         if isinstance(values, dict) and isinstance(values.get("interlock_mm"), int | float) and "interlock" not in values:
             return values | {"interlock": "grooves" if values["interlock_mm"] > 0 else "none"}
         return values

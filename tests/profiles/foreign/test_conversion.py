@@ -89,11 +89,11 @@ def test_a_filament_setting_becomes_ours(values: dict[str, str], key: str, value
     [
         ({"perimeter_speed": "0"}, "as fast as the plastic melts"),
         ({"default_acceleration": "0"}, "the firmware's own"),
-        ({"fill_pattern": "hilbertcurve"}, "there is no such one"),
+        ({"fill_pattern": "hilbertcurve"}, "has no equivalent here"),
         ({"external_perimeter_speed": "50%"}, "perimeter_speed, which the file does not tell"),
         ({"layer_height": "9"}, "a number from"),
-        ({"layer_height": "thin"}, "is no number"),
-        ({"perimeters": "1e999"}, "is no number"),
+        ({"layer_height": "thin"}, "is not a number"),
+        ({"perimeters": "1e999"}, "is not a number"),
         (
             {"support_material_spacing": "-0.4", "support_material_extrusion_width": "0.4", "layer_height": "1e-9"},
             "needs a width",
