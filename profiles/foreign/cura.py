@@ -17,7 +17,7 @@ from zipfile import ZipFile
 from profiles.errors import ProfileError, first_line, reason
 from profiles.files import DAMAGED_ZIP
 from profiles.foreign.config import CURAS, Config, Entry, finite, without_still_fan
-from profiles.foreign.cura_formulas import USUAL, inputs, worked_out
+from profiles.foreign.cura_formulas import USUAL, evaluated, inputs
 
 PROGRAM = "Cura"
 SLICER_FILE = re.compile(r"Cura/(.*)\.inst\.cfg$")  # members of a slicer file that have settings
@@ -76,7 +76,7 @@ def read_profile(file: Path) -> Config:
 
 def of_values(values: Mapping[str, str], name: str = "") -> Config:
     """Settings given by Cura's names, with formulas computed where possible."""
-    entries, hows, known = dict[str, Entry](), dict[str, str](), worked_out(values)
+    entries, hows, known = dict[str, Entry](), dict[str, str](), evaluated(values)
     unknown, read = list[str](), set[str]()
     for theirs, text in known.items():
         switch, word, off = HOLDS.get(theirs, ("", "", None))
@@ -92,7 +92,7 @@ def of_values(values: Mapping[str, str], name: str = "") -> Config:
                 continue
             entries[key] = theirs, off
         elif (theirs in values or theirs in CURAS) and theirs not in BESIDE_OTHERS:
-            entries[key] = theirs, _said(key, text)
+            entries[key] = theirs, _to_prusaslicer(key, text)
             if theirs not in values:
                 how = f"Cura's own formula: {USUAL[theirs]}"
             elif values[theirs] != text:
@@ -208,7 +208,7 @@ def _position(ini: configparser.ConfigParser) -> str:
     return ini.get("metadata", "position", fallback="")
 
 
-def _said(key: str, text: str) -> str:
+def _to_prusaslicer(key: str, text: str) -> str:
     """A value as PrusaSlicer would write it."""
     if key in PERCENT and not text.endswith("%"):
         return f"{text}%"

@@ -63,7 +63,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 DEEPEST = 12  # nested formulas; a cycle would never end
 
 
-def worked_out(values: Mapping[str, str]) -> dict[str, str]:
+def evaluated(values: Mapping[str, str]) -> dict[str, str]:
     """The values with formulas computed where all their names are known; other values are unchanged."""
     worked = dict(values)
     for key in (*values, *USUAL):
@@ -93,14 +93,14 @@ def _value(key: str, values: Mapping[str, str], deep: int) -> Any:
     if text == "=" or deep > DEEPEST:
         raise LookupError(key)
     if text.startswith("="):
-        return _worked(ast.parse(text[1:].strip(), mode="eval").body, values, deep + 1)
+        return _evaluate(ast.parse(text[1:].strip(), mode="eval").body, values, deep + 1)
     try:
         return ast.literal_eval(text)
     except (ValueError, SyntaxError):
         return text
 
 
-def _worked(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
+def _evaluate(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
     """The value of an expression. Raises LookupError if a setting has no value, or for an unsupported expression."""
     match node:
         case ast.Constant(value=value):
@@ -108,17 +108,17 @@ def _worked(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
         case ast.Name(id=name):
             return _value(name, values, deep)
         case ast.IfExp(test=test, body=body, orelse=other):
-            return _worked(body if _worked(test, values, deep) else other, values, deep)
+            return _evaluate(body if _evaluate(test, values, deep) else other, values, deep)
         case ast.UnaryOp(op=operation, operand=operand) if type(operation) in OPERATORS:
-            return OPERATORS[type(operation)](_worked(operand, values, deep))
+            return OPERATORS[type(operation)](_evaluate(operand, values, deep))
         case ast.BinOp(left=left, op=operation, right=right) if type(operation) in OPERATORS:
             return OPERATORS[type(operation)](_number(left, values, deep), _number(right, values, deep))
         case ast.Compare(left=left, ops=[operation], comparators=[right]) if type(operation) in OPERATORS:
-            return OPERATORS[type(operation)](_worked(left, values, deep), _worked(right, values, deep))
+            return OPERATORS[type(operation)](_evaluate(left, values, deep), _evaluate(right, values, deep))
         case ast.BoolOp(op=ast.And(), values=terms):
-            return all(_worked(term, values, deep) for term in terms)
+            return all(_evaluate(term, values, deep) for term in terms)
         case ast.BoolOp(op=ast.Or(), values=terms):
-            return any(_worked(term, values, deep) for term in terms)
+            return any(_evaluate(term, values, deep) for term in terms)
         case ast.Call(func=called, args=[ast.Constant(value=str(name))]) if ast.unparse(called) == "resolveOrValue":
             return _value(name, values, deep)
         case ast.Call(func=called, args=terms, keywords=[]) if (function := FUNCTIONS.get(ast.unparse(called))) is not None:
@@ -127,7 +127,7 @@ def _worked(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
 
 
 def _number(node: ast.AST, values: Mapping[str, str], deep: int) -> float:
-    value = _worked(node, values, deep)
+    value = _evaluate(node, values, deep)
     if not isinstance(value, int | float):
         raise LookupError(ast.unparse(node))
     return value

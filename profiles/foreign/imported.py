@@ -62,10 +62,10 @@ def imported(config: Config, kind: str, name: str = "", nameless: str = "importe
     """
     base = PROCESS_BASE if kind == "process" else base_of(config)[0]
     own_name = name or (config.process if kind == "process" else config.material) or nameless
-    return _sound(Imported(kind, own_name, base, tuple(_rows(config, kind, base))))
+    return _without_conflicts(Imported(kind, own_name, base, tuple(_rows(config, kind, base))))
 
 
-def _sound(profile: Imported) -> Imported:
+def _without_conflicts(profile: Imported) -> Imported:
     """The profile without widths that conflict with its layers. Raises ProfileError if it is invalid even then."""
     try:
         load_one(profile.base, profile.settings, profile.kind)
@@ -74,12 +74,12 @@ def _sound(profile: Imported) -> Imported:
         wide = [row for row in profile.rows if row.taken and row.key in SPARE and row.key.split(".")[1] in said]
         if not wide:
             raise ProfileError(f"{profile.kind} {profile.name!r}: {said}") from None
-        rows = (row._replace(value="", how=_about(row, said)) if row in wide else row for row in profile.rows)
-        return _sound(profile._replace(rows=tuple(rows)))
+        rows = (row._replace(value="", how=_sentence_on(row, said)) if row in wide else row for row in profile.rows)
+        return _without_conflicts(profile._replace(rows=tuple(rows)))
     return profile
 
 
-def _about(row: Row, said: str) -> str:
+def _sentence_on(row: Row, said: str) -> str:
     """The sentence of an error message that names a row's key."""
     return next(line for line in said.replace("; ", "\n").splitlines() if row.key.split(".")[1] in line)
 
@@ -91,7 +91,7 @@ def unused(config: Config) -> list[str]:
     return sorted({name for name, _ in config.entries.values()} - read | set(config.unknown))
 
 
-def stay(profile: Imported) -> list[str]:
+def unchanged_keys(profile: Imported) -> list[str]:
     """Our keys that the import leaves unchanged."""
     from profiles.wording import keys
 

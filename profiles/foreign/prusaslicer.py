@@ -106,17 +106,17 @@ def _chosen(presets: Presets, kind: str, asked: str) -> str:
     names = [name for name in presets[kind] if not name.startswith("*")]
     if asked:
         if asked not in presets[kind]:
-            raise ProfileError(f"{KINDS[kind]} preset {asked!r}: the file has no such one; {_told(names, asked)}")
+            raise ProfileError(f"{KINDS[kind]} preset {asked!r}: the file has no such one; {_preset_names(names, asked)}")
         return asked
     active = presets["presets"].get("", {}).get(kind, "").split(";")[0].strip()
     if active in presets[kind]:
         return active
     if len(names) > 1 and kind != "printer":
-        raise ProfileError(f"--{KINDS[kind]}-preset is missing: the file has {len(names)}; {_told(names, '')}")
+        raise ProfileError(f"--{KINDS[kind]}-preset is missing: the file has {len(names)}; {_preset_names(names, '')}")
     return names[0] if len(names) == 1 else ""
 
 
-def _told(names: list[str], asked: str) -> str:
+def _preset_names(names: list[str], asked: str) -> str:
     """A few of the names, those that share a word with the requested one first."""
     words = [word for word in re.split(r"\W+", asked.lower()) if word]
     near = sorted(names, key=lambda name: -sum(word in name.lower() for word in words))
@@ -142,12 +142,12 @@ def _parents(text: str) -> Iterator[str]:
 def _config(values: Mapping[str, str], process: str, material: str) -> Config:
     if not OF_SUPERSLICER & values.keys():
         return Config("PrusaSlicer", {key: (key, value) for key, value in values.items()}, (), process, material)
-    said = {key: _said(key, value, values.get("nozzle_diameter", "")) for key, value in values.items()}
+    said = {key: _to_prusaslicer(key, value, values.get("nozzle_diameter", "")) for key, value in values.items()}
     own = {key: (values[key], how) for key, (text, how) in said.items() if text != values[key]}
     return Config("SuperSlicer", {key: (key, text) for key, (text, _) in said.items()}, (), process, material, own)
 
 
-def _said(key: str, text: str, nozzle: str) -> tuple[str, str]:
+def _to_prusaslicer(key: str, text: str, nozzle: str) -> tuple[str, str]:
     """A value of SuperSlicer as PrusaSlicer would write it, and how it was computed."""
     if key.endswith(WIDTHS):
         return width_of_nozzle(text, nozzle)

@@ -7,7 +7,7 @@ import pytest
 from profiles.errors import ProfileError
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
-from profiles.foreign.imported import KINDS, Row, imported, stay, unused
+from profiles.foreign.imported import KINDS, Row, imported, unchanged_keys, unused
 from profiles.foreign.rules import PROCESS_RULES
 from profiles.profile import load_one
 
@@ -156,8 +156,8 @@ def test_nothing_of_theirs_and_nothing_of_ours_is_passed_over_in_silence() -> No
     theirs = config(layer_height="0.2", wipe_tower="1")
     profile = imported(theirs, "process")
     assert unused(theirs) == ["wipe_tower"]
-    assert "process.layer_height_mm" not in stay(profile)
-    assert "process.walls" in stay(profile)
+    assert "process.layer_height_mm" not in unchanged_keys(profile)
+    assert "process.walls" in unchanged_keys(profile)
 
 
 def test_a_width_that_does_not_go_with_its_layers_is_left_with_the_reason() -> None:
