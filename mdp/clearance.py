@@ -109,7 +109,7 @@ def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str,
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class StandingColumns:
     """The parts that stand beside a limb, and the head that must pass them. points_mm (k, 3): x, y and top of each printed column
     in the part frame, highest first; slack_mm: how far a column may extend beyond its point.
     """
@@ -119,7 +119,7 @@ class Standing:
     head: Head
 
     @classmethod
-    def of(cls, points_mm: Floats, slack_mm: float, machine: Machine) -> "Standing":
+    def of(cls, points_mm: Floats, slack_mm: float, machine: Machine) -> "StandingColumns":
         """Columns for (k, 3) points in the part frame."""
         highest_first = np.argsort(-points_mm[:, 2], kind="stable")
         return cls(np.ascontiguousarray(points_mm[highest_first]), slack_mm, head_of(machine))
@@ -150,7 +150,7 @@ def _per_cell(places: Floats, heights: Floats, cell_mm: float, extreme: np.ufunc
 
 
 @no_nrt
-def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head) -> float:
+def _height_under_hot_end(square: float, top: float, beyond: float, head: Head) -> float:
     """Least safe height of the tip beside a column that ends at `top`. square: squared distance to the column's point; beyond:
     how much nearer the column may be.
     """
@@ -178,7 +178,7 @@ def _least_tip(places: Floats, points: Floats, slack: float, head: Head) -> Floa
                 break
             across, along = points[j, 0] - places[i, 0], points[j, 1] - places[i, 1]
             square = across * across + along * along
-            least[i] = max(least[i], _asked_by_hot_end(square, top, beyond, head))
+            least[i] = max(least[i], _height_under_hot_end(square, top, beyond, head))
             for k in range(len(head.boxes)):
                 if _is_under(head.boxes[k], across, along, beyond):
                     least[i] = max(least[i], top - max(head.boxes[k, 2] - head.clearance_mm, 0.0))
@@ -205,7 +205,7 @@ def _under_boxes(head: Head, around_mm: Floats, points: Floats, slack_mm: float)
     return under
 
 
-def _close(head: Head, around_mm: Floats, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
+def _may_collide(head: Head, around_mm: Floats, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
     """(i,) tip positions at which the head may hit any of (j, 3) standing points, and (j,) the points that it hits.
 
     The tips lie on the limb's surface only. Extending every box to the nozzle makes the outline the worst case inside the limb,
@@ -213,7 +213,7 @@ def _close(head: Head, around_mm: Floats, tips: Floats, points: Floats, slack_mm
     """
     wide = head.boxes.copy()
     wide[:, :2], wide[:, 3:5] = np.minimum(head.boxes[:, :2], 0.0), np.maximum(head.boxes[:, 3:5], 0.0)
-    return _find_close(tips, points, slack_mm, head._replace(boxes=wide), _under_boxes(head, around_mm, points, slack_mm))
+    return _find_collisions(tips, points, slack_mm, head._replace(boxes=wide), _under_boxes(head, around_mm, points, slack_mm))
 
 
 # (m, 3, 3) corners of the faces of a limb, and of everything that stands, in the workpiece frame
@@ -228,7 +228,7 @@ def passes_clear(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: floa
     """
     tips, stands, around_mm = _above_base(machine, pose, surfaces, base_mm)
     head = head_of(machine)
-    if _close(head, around_mm, _few(tips), _few(stands), 0.0)[0].any():
+    if _may_collide(head, around_mm, _sample_points(tips), _sample_points(stands), 0.0)[0].any():
         return False
     for cell_mm in cells_mm:
         if max(count_divided(corners, cell_mm) for corners in (tips, stands)) > MOST_TRIANGLES:
@@ -243,7 +243,7 @@ def passes_clear(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: floa
         if len(low) * int(near.sum()) > MOST_PAIRS:
             return False
         close_stands = np.zeros(len(high), np.bool_)
-        close_tips, close_stands[near] = _close(head, around_mm, low, high[near], slack_mm)
+        close_tips, close_stands[near] = _may_collide(head, around_mm, low, high[near], slack_mm)
         tips, stands = tips[close_tips[of_tip]], stands[close_stands[of_stand]]
     return len(tips) == 0
 
@@ -257,15 +257,15 @@ def _above_base(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float
     return tips, stands, np.stack([places.min(axis=0), places.max(axis=0)])
 
 
-def places_met(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float) -> Floats:
+def collision_points(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float) -> Floats:
     """(k, 3) points of standing parts that the head certainly hits while a limb is printed, highest first; compare
     passes_clear.
     """
     tips, stands, around_mm = _above_base(machine, pose, surfaces, base_mm)
     if max(count_divided(corners, CELLS_MM[0]) for corners in (tips, stands)) <= MOST_TRIANGLES:
         tips, stands = (subdivide(corners, CELLS_MM[0]) for corners in (tips, stands))
-    points = _few(stands)
-    _, met = _close(head_of(machine), around_mm, _few(tips), points, 0.0)
+    points = _sample_points(stands)
+    _, met = _may_collide(head_of(machine), around_mm, _sample_points(tips), points, 0.0)
     places: Floats = (np.unique(points[met], axis=0) + np.array([0.0, 0.0, base_mm])) @ rotation(machine, pose)
     return places[np.argsort(-places[:, 2], kind="stable")]
 
@@ -276,7 +276,7 @@ def _above(corners: Floats) -> Floats:
     return above
 
 
-def _few(corners: Floats) -> Floats:
+def _sample_points(corners: Floats) -> Floats:
     """(k, 3) an even sample of about MOST_TRIED corners above the base plane."""
     points = corners.reshape(-1, 3)
     points = points[points[:, 2] >= 0.0]
@@ -284,8 +284,8 @@ def _few(corners: Floats) -> Floats:
 
 
 @kernel
-def _find_close(tips: Floats, points: Floats, slack: float, head: Head, reached: Mask) -> tuple[Mask, Mask]:
-    """Kernel of _close. reached (j, b): the points that each box can reach."""
+def _find_collisions(tips: Floats, points: Floats, slack: float, head: Head, reached: Mask) -> tuple[Mask, Mask]:
+    """Kernel of _may_collide. reached (j, b): the points that each box can reach."""
     close_tips, close_points, beyond = flags(len(tips)), flags(len(points)), slack + head.clearance_mm
     for i in range(len(tips)):
         for j in range(len(points)):
@@ -293,7 +293,7 @@ def _find_close(tips: Floats, points: Floats, slack: float, head: Head, reached:
             if top <= tips[i, 2]:
                 continue
             across, along = points[j, 0] - tips[i, 0], points[j, 1] - tips[i, 1]
-            meets = _asked_by_hot_end(across * across + along * along, top, beyond, head) > tips[i, 2]
+            meets = _height_under_hot_end(across * across + along * along, top, beyond, head) > tips[i, 2]
             for k in range(len(head.boxes)):
                 if reached[j, k] and top - max(head.boxes[k, 2] - head.clearance_mm, 0.0) > tips[i, 2]:
                     meets = meets or _is_under(head.boxes[k], across, along, beyond)
@@ -307,7 +307,7 @@ def _under_hot_end(squares: Floats, tops: Floats, beyond: float, head: Head) -> 
     """(n,) whether columns at (n,) squared distances from the nearest tip position reach the hot end with the tip at height 0."""
     met = flags(len(tops))
     for i in range(len(tops)):
-        met[i] = _asked_by_hot_end(squares[i], tops[i], beyond, head) > 0.0
+        met[i] = _height_under_hot_end(squares[i], tops[i], beyond, head) > 0.0
     return met
 
 

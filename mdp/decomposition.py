@@ -54,7 +54,7 @@ class Part:
         return self.base.normal
 
     @property
-    def on_platform(self) -> bool:
+    def on_plate(self) -> bool:
         """Whether the part stands on the build plate or on a raft there, as the first part of each model does."""
         return self.base.offset_mm == self.lifted_mm and bool((self.base.normal == UP).all())
 

@@ -64,7 +64,7 @@ def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
     pieces, fragment_mm = _pieces(parts), float(np.sqrt(profile.search.least_interface_mm2))
     joints = []
     for part in parts:
-        if part.on_platform:
+        if part.on_plate:
             continue
         own = [k for k, piece in enumerate(pieces) if piece.part is part]
         high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= fragment_mm] or own

@@ -27,7 +27,7 @@ from mdp.plane import UP as UP
 from mdp.plane import Plane
 
 ROUNDING = 1e-4  # rounding in float32 files throws faces at exactly the angle, common in printed models, to either side
-PLATFORM_TOLERANCE_MM = 0.3  # a first layer's chamfer still stands on the build plate
+PLATE_TOLERANCE_MM = 0.3  # a first layer's chamfer still stands on the build plate
 LEVEL_COSINE = 0.9998  # within 1.1 degrees: 10 mm of such a face are one layer of 0.2 mm, and print as one
 BASE_TOLERANCE_MM = 1e-6  # faces of a part created by a cut lie in its base plane up to rounding
 
@@ -46,8 +46,8 @@ def facing_down(mesh: Mesh, direction: Floats, self_supporting_angle_deg: float)
 
 def standing(mesh: Mesh) -> Mask:
     """(m,) whether each face stands on the build plate: all of it within 0.3 mm of the plate."""
-    on_platform: Mask = np.all(mesh.vertices[mesh.faces, 2] <= PLATFORM_TOLERANCE_MM, axis=1)
-    return on_platform
+    on_plate: Mask = np.all(mesh.vertices[mesh.faces, 2] <= PLATE_TOLERANCE_MM, axis=1)
+    return on_plate
 
 
 def risky_upright(mesh: Mesh, self_supporting_angle_deg: float, count_platform_faces: bool = False) -> Mask:

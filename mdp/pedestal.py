@@ -5,7 +5,7 @@ import numpy as np
 
 from mdp.cut import mesh_of, run_faces, solid_of
 from mdp.mesh import NO_COLOUR, Ints, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from profiles.errors import MeshError
 
 MARGIN_MM = 2.0  # margin of the pedestal around the model's feet
@@ -36,7 +36,7 @@ def pedestal_under(mesh: Mesh, height_mm: float) -> Mesh:
 
 
 def _prism(solid: m3.Manifold, height_mm: float) -> m3.Manifold:
-    sunk_mm = min(PLATFORM_TOLERANCE_MM, 0.5 * float(solid.bounding_box()[5]))
+    sunk_mm = min(PLATE_TOLERANCE_MM, 0.5 * float(solid.bounding_box()[5]))
     return m3.Manifold.extrude(_outline(solid, sunk_mm), height_mm + sunk_mm)
 
 

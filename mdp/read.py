@@ -13,7 +13,7 @@ from mdp.formats.slicer_file import Build
 from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import check_file
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.pose import turned_by
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
@@ -77,7 +77,7 @@ def read_model(
             surfaces = [replace(surface, vertices=surface.vertices * scale, gap=surface.gap * scale) for surface in surfaces]
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
-        mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
+        mesh, turn, shift_mm = _place_on_plate(solid, rotate_deg)
         zones, mark_notes = Marks(build, path, mesh, (scale, turn, shift_mm)).zones()
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
@@ -136,7 +136,7 @@ def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
     volumes = np.bincount(label, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
     lowest = np.full(len(volumes), np.inf)
     np.minimum.at(lowest, label, corners[:, :, 2].min(axis=1))
-    heights = lowest[(volumes > 0) & (lowest > PLATFORM_TOLERANCE_MM)]
+    heights = lowest[(volumes > 0) & (lowest > PLATE_TOLERANCE_MM)]
     if not len(heights):
         return ()
     pieces = "1 piece floats" if len(heights) == 1 else f"{len(heights)} pieces float at least"
@@ -182,7 +182,7 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
     )
 
 
-def _place_on_platform(solid: Surface, rotate_deg: tuple[float, float, float]) -> tuple[Mesh, Floats, Floats]:
+def _place_on_plate(solid: Surface, rotate_deg: tuple[float, float, float]) -> tuple[Mesh, Floats, Floats]:
     """The mesh of a solid on the build plate, and the rotation and shift that move it there."""
     vertices, turn = solid.vertices, np.eye(3)
     if any(rotate_deg):

@@ -58,7 +58,7 @@ class Heights:
 
 
 def layer_heights(
-    mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0, limb_planes_mm: Sequence[float] = ()
+    mesh: Mesh, profile: Profile, on_plate: bool, pedestal_mm: float = 0.0, limb_planes_mm: Sequence[float] = ()
 ) -> Heights:
     """The layers of a part's mesh in the part frame, adaptive if process.adaptive_cusp_mm is set.
 
@@ -67,7 +67,7 @@ def layer_heights(
     to the top or to the plane below. Raises SliceError like equal_heights().
     """
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
-    first_mm = process.first_layer_height_mm if on_platform else interface_height_mm(process)
+    first_mm = process.first_layer_height_mm if on_plate else interface_height_mm(process)
     from_mm, heights = 0.0, Heights(*np.zeros((3, 0)))
     roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top_mm and roof_mm >= process.least_layer_height_mm:
@@ -90,8 +90,8 @@ def part_heights(part: Part, later: Sequence[Part], profile: Profile) -> Heights
     """
     limbs = [limb.base for limb in later if limb.base.limbs_mm is not None]
     planes_mm = {base.offset_mm - part.base.offset_mm for base in limbs if float(base.normal @ part.base.normal) > 1.0 - LEVEL}
-    pedestal_mm = profile.search.pedestal_mm if part.on_platform else 0.0
-    return layer_heights(part.in_part_frame(), profile, part.on_platform, pedestal_mm, sorted(planes_mm))
+    pedestal_mm = profile.search.pedestal_mm if part.on_plate else 0.0
+    return layer_heights(part.in_part_frame(), profile, part.on_plate, pedestal_mm, sorted(planes_mm))
 
 
 def shell_layers(process: Process) -> tuple[int, int]:

@@ -75,9 +75,9 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
     enforces = process.support != "none" and len(sections.enforced) > 0
     overhangs = [Overhang()] * len(outlines)
     risky = facing_down(mesh, UP, process.self_supporting_angle_deg)
-    needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_platform))
+    needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_plate))
     faces = faces_by_layer(mesh, cuts_mm, risky)
-    for i in range(int(sections.on_platform), len(outlines)):
+    for i in range(int(sections.on_plate), len(outlines)):
         below = outlines[i - 1] if i else offset(sections.plastic_below or Polygons(), RIM_MM)
         beyond, triangles = outlines[i] - below, faces.get(i, [])
         # A floating start lies entirely beyond the layer below, however steep it is, like a bell's rim that becomes thick enough

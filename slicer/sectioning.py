@@ -15,7 +15,7 @@ import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Indices, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
+from mdp.overhang import PLATE_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Marked, Zone, touched
@@ -59,7 +59,7 @@ from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal, at which level faces lie
 BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base plane
-HAIR_MM = 0.04  # of a piece only this much thicker than the thinnest, lines may not cover the whole length
+THICKNESS_MARGIN_MM = 0.04  # of a piece only this much thicker than the thinnest, lines may not cover the whole length
 RIM_MM = 0.04  # overlap by which the projections of faces in neighbouring layers unite
 
 
@@ -113,14 +113,14 @@ class Sections:
     too_thin: frozenset[int] = frozenset()
 
     @property
-    def on_platform(self) -> bool:
+    def on_plate(self) -> bool:
         """Whether the part stands on the build plate, or on a raft there."""
-        return self.part.on_platform
+        return self.part.on_plate
 
     @property
     def on_raft(self) -> bool:
         """Whether the part stands on a raft."""
-        return self.on_platform and self.process.raft_layers > 0
+        return self.on_plate and self.process.raft_layers > 0
 
     @property
     def process(self) -> Process:
@@ -160,14 +160,14 @@ def section_part(
     if profile.process.spiral_vase:  # its bottom and the layers above it have one wall and no inside
         hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
         profile = profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
-    process, mesh, on_platform = profile.process, part.in_part_frame(), part.on_platform
+    process, mesh, on_plate = profile.process, part.in_part_frame(), part.on_plate
     heights = part_heights(part, later, profile)
-    pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
+    pedestal_mm = profile.search.pedestal_mm if on_plate else 0.0
     cuts_mm, pedestal = heights.cut_mm, int(np.searchsorted(heights.tip_mm, pedestal_mm + 1e-6))
     whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
-    outlines = [without_hairs(section, process, profile.machine.head.nozzle_mm) for section in whole]
+    outlines = [drop_thin_pieces(section, process, profile.machine.head.nozzle_mm) for section in whole]
     too_thin = frozenset(i for i, outline in enumerate(outlines) if outline.is_empty() and not whole[i].is_empty())
-    if on_platform and not pedestal:
+    if on_plate and not pedestal:
         outlines = lay_on_plate(outlines, mesh, cuts_mm, process)
     places = modified_places(part, mesh, process, cuts_mm)
     beside, above, beneath, standing = _model_around(part, earlier, later, heights, process, places)
@@ -178,7 +178,7 @@ def section_part(
     if pedestal:
         ungrooved = _without_pedestal(ungrooved, mesh, cuts_mm, pedestal_mm, pedestal)
         own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
-    elif on_platform and not process.raft_layers and process.elephant_foot_mm > 0.0:
+    elif on_plate and not process.raft_layers and process.elephant_foot_mm > 0.0:
         width_mm = first_layer_process(process).line_width_mm
         first = compensate_elephant_foot(own[0], process.elephant_foot_mm, width_mm)
         ungrooved, own = [first, *ungrooved[1:]], [first, *own[1:]]
@@ -201,7 +201,7 @@ def section_part(
         standing=standing,
         joints=joints(part, later, outlines[0], below),
         pins=pins.get(part.index, np.zeros((0, 3))),
-        grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),
+        grooves=grooves(part, process) if process.interlock == "grooves" and not on_plate else Polygons(),
         no_seam=no_seam_segments(part, mesh, cuts_mm),
         no_support=marked_areas(part.no_support, part, mesh, cuts_mm),
         enforced=marked_areas(part.support, part, mesh, cuts_mm),
@@ -211,9 +211,9 @@ def section_part(
     )
 
 
-def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Polygons:
+def drop_thin_pieces(section: Polygons, process: Process, nozzle_mm: float) -> Polygons:
     """Drop slivers: remove the pieces of a section that are nowhere wide enough for a line; the pieces above them begin there."""
-    least_mm = FEATURE * least_width_mm(nozzle_mm, process.layer_height_mm) + HAIR_MM
+    least_mm = FEATURE * least_width_mm(nozzle_mm, process.layer_height_mm) + THICKNESS_MARGIN_MM
     pieces, solid = [] if section.is_empty() else islands(section), list[Polygons]()
     for piece in pieces:
         if 2.0 * piece.area() >= least_mm * perimeter_mm(piece) or not offset(piece, -0.5 * least_mm).is_empty():
@@ -222,17 +222,17 @@ def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Poly
 
 
 def lay_on_plate(outlines: list[Polygons], mesh: Mesh, cuts_mm: Floats, process: Process) -> list[Polygons]:
-    """The sections of a part on the build plate, with the section at PLATFORM_TOLERANCE_MM added to the lowest ones: below it,
+    """The sections of a part on the build plate, with the section at PLATE_TOLERANCE_MM added to the lowest ones: below it,
     surfaces stand on the plate by the search's definition (mdp.overhang.standing). Otherwise the rest of a base that is not quite
     level would float in the second layer. Areas no wider than a ledge support themselves and stay unchanged: fillets and chamfers
     keep their shape.
     """
-    base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
+    base = clean(cross_sections(mesh, np.array([PLATE_TOLERANCE_MM]))[0], process.slit_closing_mm)
     width_mm, ledge_mm = process.line_width_mm, NARROW * process.line_width_mm
     wide = opening(base - offset(outlines[0], ledge_mm), 0.5 * width_mm)
     if wide.is_empty():
         return outlines
-    lowest, laid = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM)), offset(wide, ledge_mm + 0.5 * width_mm) ^ base
+    lowest, laid = int(np.searchsorted(cuts_mm, PLATE_TOLERANCE_MM)), offset(wide, ledge_mm + 0.5 * width_mm) ^ base
     return [*(outline + laid for outline in outlines[:lowest]), *outlines[lowest:]]
 
 
@@ -249,7 +249,7 @@ def _model_around(
     before, after = (near_parts(part, others, far_mm) for others in (earlier, later))
     others, count = sections_of(after, part, np.concatenate([heights.cut_mm, over])), len(heights.cut_mm)
     deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
-    known = bool(earlier) and not part.on_platform
+    known = bool(earlier) and not part.on_plate
     under = sections_of([*before, *after], part, deep)[::-1] if known else []
     standing: Sequence[Polygons] = ()
     if part.base.limbs_mm is not None and earlier and process.support != "none":
@@ -320,7 +320,7 @@ def _without_pedestal(
     outlines: Sequence[Polygons], mesh: Mesh, cuts_mm: Floats, pedestal_mm: float, layers: int
 ) -> list[Polygons]:
     """Outlines of the model alone: empty in the pedestal, and its own foot where it is sunk into the pedestal's top."""
-    sunk_mm = pedestal_mm + PLATFORM_TOLERANCE_MM
+    sunk_mm = pedestal_mm + PLATE_TOLERANCE_MM
     foot = clean(cross_sections(mesh, np.array([sunk_mm + ABOVE_MM]))[0])
     if foot.is_empty():
         foot = outlines[-1]

@@ -119,10 +119,10 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     insides = [walls.inside for walls, _, _ in walled]
     later = [whole - mine if whole is not mine else Polygons() for whole, mine in zip(model, own, strict=True)] + list(above)
     # Unknown earlier parts are assumed to fill the first section; under the build plate is nothing.
-    below = sections.beneath or [Polygons() if sections.on_platform else own[0]] * bottom
+    below = sections.beneath or [Polygons() if sections.on_plate else own[0]] * bottom
     known = later if any(not area.is_empty() for area in later) else ()
     cover = Cover(model, [model_inside for _, _, model_inside in walled], below, above[:top], known)
-    filled = regions(insides, cover, not sections.on_platform, process, runs, places)
+    filled = regions(insides, cover, not sections.on_plate, process, runs, places)
     ironed = ironed_areas(filled, [*sections.beside, *above[:1]], process, places)
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     sparse = [region.sparse for region in filled]
@@ -179,7 +179,7 @@ def layer_processes(sections: Sections) -> list[Process]:
     process, lying = sections.process, sections.own if sections.pedestal_layers else sections.outlines
     processes = [process] * len(lying)
     if not sections.on_raft:
-        processes[0] = first_layer_process(process) if sections.on_platform else interface_process(process)
+        processes[0] = first_layer_process(process) if sections.on_plate else interface_process(process)
     if process.overhang_extra_walls:
         for k, (own, below) in enumerate(zip(processes, [sections.plastic_below, *lying[:-1]], strict=True)):
             width = own.line_width_mm
@@ -288,7 +288,7 @@ def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
             beads += bridge_beads(held, above, process.infill_bridge_flow, over_infill=True)
             region = replace(_without(region, area, width), sparse=region.sparse)
     skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))
-    skins = replace(skins, seen=layer == 0 and shells.sections.on_platform)
+    skins = replace(skins, seen=layer == 0 and shells.sections.on_plate)
     top = replace(skins, width_mm=process.top_skin_line_width_mm or width, pattern=process.top_skin_pattern, seen=True)
     bottom = replace(skins, pattern=process.bottom_skin_pattern)
     solid, under = region.solid, Polygons()
@@ -373,8 +373,8 @@ def interface_mm3(shells: Shells) -> dict[int, float]:
     """
     sections, regions = shells.sections, [shell.region for shell in shells.layers]
     part, process, heights = sections.part, sections.process, sections.heights
-    planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
-    upper_parts = [upper for upper in sections.later if not upper.on_platform]
+    planes = {} if sections.on_plate else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
+    upper_parts = [upper for upper in sections.later if not upper.on_plate]
     planes |= {upper.index: plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in upper_parts}
     more, near = dict.fromkeys(planes, 0.0), limb_planes(part, sections.later, heights, NEAR_MM)
     for layer, (section, region) in enumerate(zip(sections.own, regions, strict=True)):
@@ -387,7 +387,7 @@ def interface_mm3(shells: Shells) -> dict[int, float]:
             counting = [near[index].band(layer, -np.inf, np.inf) if index in near else None for index in planes]
             for index, area in zip(planes, nearest_areas(closed, distances, counting), strict=True):
                 more[index] += (1.0 - process.infill_density) * float(height_mm) * area
-    if not sections.on_platform:
+    if not sections.on_plate:
         filled = sections.own[0].area() - (1.0 - process.infill_density) * regions[0].sparse.area()
         more[part.index] += filled * (process.interface_flow - 1.0) * float(heights.height_mm[0])
     return more

@@ -28,7 +28,7 @@ from slicer.fill.ends import CARRYING, Plastic, cut_anchors, hold_ends, plastic_
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from slicer.heights import shell_layers
-from slicer.interface.interface import pin_width_mm, skin_beside
+from slicer.interface.interface import pin_width_mm, visible_wall_beside
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import KINDS, ON_PLATE_MM, SKINS, Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.raft import raft_layers
@@ -40,7 +40,7 @@ from slicer.strokes.seam_plan import plan_seams, rear_of, seam_limits
 from slicer.strokes.speed import first_layer_speeds, kinds_apart, layer_of, rising_fan, timed
 from slicer.strokes.strokes import Strokes, split, split_overhangs
 from slicer.strokes.vase import vase_layers
-from slicer.support.handed_down import plan_supports
+from slicer.support.from_earlier_part import plan_supports
 from slicer.support.support import Supports, explain, own_supports
 from slicer.walls.walls import fuzzy_walls
 
@@ -81,7 +81,7 @@ def slice_parts(
     """
     if not parts:
         return ()
-    models = sum(part.on_platform for part in parts)
+    models = sum(part.on_plate for part in parts)
     if profile.process.spiral_vase and models > 1:
         raise SliceError(f"process.spiral_vase climbs round one model, {models} are on the plate")
     if profile.process.spiral_vase and len(parts) > 1:
@@ -181,7 +181,7 @@ def slice_supported(
         below = [plastic_of([*beads, *shells.layers[i].ending]), *below][:CARRYING]
         if i and process.fuzzy_skin != "none":
             beads = fuzzy_walls(beads, process, _joints_near(sections, i), (sections.part.index, i))
-        skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
+        skin = visible_wall_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
         layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers or raft else None, skin)
         if len(layer):
             tip = layer.points[-1]
@@ -217,7 +217,7 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
     profile, process, material, heights = sections.profile, sections.process, sections.profile.material, sections.heights
     strokes, speeds, flow = order_layer(beads, shells, index, tip, skin)
     fan, add_c = 1.0, 0.0
-    if sections.on_platform:
+    if sections.on_plate:
         fan = rising_fan(material, index + process.raft_layers)
         add_c = material.first_layer_nozzle_c - material.nozzle_c if index == 0 and not sections.on_raft else 0.0
     elif index < process.interface_layers:
@@ -236,7 +236,7 @@ def order_layer(
     """
     sections, own, height_mm = shells.sections, shells.layers[index].process, float(shells.sections.heights.height_mm[index])
     profile, process, outline = sections.profile, sections.process, sections.outlines[index]
-    if index == 0 and not sections.on_platform:
+    if index == 0 and not sections.on_plate:
         beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
     first_flow, kind_mm_s = (1.0, None) if index else _first_layer(sections)
     strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin, kind_mm_s)
@@ -264,7 +264,7 @@ def _first_layer(sections: Sections) -> tuple[float, Floats]:
     process = sections.process
     if sections.on_raft:
         return 1.0, np.full(len(KINDS), process.first_layer_speed_over_raft_mm_s)
-    if sections.on_platform:
+    if sections.on_plate:
         return process.first_layer_flow, first_layer_speeds(process)
     return process.interface_flow, np.full(len(KINDS), process.interface_speed_mm_s)
 
@@ -318,7 +318,7 @@ def _check_printed(sections: Sections, layers: Sequence[Layer]) -> None:
             "a larger process.scale or a finer nozzle prints it"
         )
     first = next(layer for layer in layers if not layer.is_of(Kind.SKIRT).all())
-    if sections.on_platform and process.walls and first.z_mm - first.height_mm > ON_PLATE_MM:
+    if sections.on_plate and process.walls and first.z_mm - first.height_mm > ON_PLATE_MM:
         support = "" if process.support == "auto" else ", or process.support = auto"
         raise SliceError(
             f"part {part.index} would begin in air, {first.z_mm - first.height_mm:.2f} mm above the plate: what lies below is "

@@ -72,7 +72,7 @@ def timed(work: Callable[[], Result]) -> tuple[Result, float]:
 
 
 def figures(decomposition: Decomposition, whole: FrontRow) -> str:
-    """Scars and minutes of what was chosen, and its time and filament over those of one piece."""
+    """Blemishes and minutes of what was chosen, and its time and filament over those of one piece."""
     chosen = decomposition.chosen
     if chosen is None or None in (chosen.time_s, whole.time_s):
         return "-"

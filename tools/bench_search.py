@@ -18,7 +18,7 @@ from mdp.cut import mesh_of, solid_of
 from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.overhang import risky_upright, threshold
-from mdp.ranking.candidates import Bounds, bounds_of, directions, platform_disc
+from mdp.ranking.candidates import Bounds, bounds_of, directions, plate_disc
 from mdp.read import read_mesh
 from mdp.search.search import decompose
 from mdp.sweep.sweep import Remainder, gains, sweep
@@ -104,7 +104,7 @@ def growth(mesh: Mesh, profile: Profile, largest: int) -> None:
 
 def sampled_bounds(mesh: Mesh, profile: Profile) -> Bounds:
     """The bounds of the sampled directions, as a search has them."""
-    return bounds_of(directions(profile.search), mesh, profile, platform_disc(mesh, profile.search))
+    return bounds_of(directions(profile.search), mesh, profile, plate_disc(mesh, profile.search))
 
 
 def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], int]:

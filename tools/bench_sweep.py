@@ -16,9 +16,9 @@ from mdp.overhang import risky_upright, threshold
 from mdp.read import read_mesh
 from mdp.search.problem import Problem
 from mdp.sweep.components import count_pieces, find_contact_areas, find_critical, plant_tree
-from mdp.sweep.crossing import OffsetGrid, find_heights, find_lowest, integrate_scars, integrate_volume
+from mdp.sweep.crossing import OffsetGrid, find_heights, find_lowest, integrate_blemishes, integrate_volume
 from mdp.sweep.slivers import find_slivers
-from mdp.sweep.sweep import Remainder, gains, scars_of, sweep
+from mdp.sweep.sweep import Remainder, blemishes_of, gains, sweep
 from profiles.profile import Profile, load
 from tools.bench_search import on_cores, sampled_bounds
 
@@ -56,11 +56,11 @@ def pieces_of_work(
     """Every kernel for all directions, on one thread."""
     layout, columns = remainder.layout, remainder.most_columns(step)
     heights, counts = _all_heights(layout.faces.points, directions, step)
-    cosines, scars = np.ascontiguousarray(directions @ layout.vertex_normals), scars_of(remainder, directions, angle)
+    cosines, blemishes = np.ascontiguousarray(directions @ layout.vertex_normals), blemishes_of(remainder, directions, angle)
     grids = (directions, heights, counts, step, columns)
     return {
         "heights": lambda: _all_heights(layout.faces.points, directions, step),
-        "risky areas (gains)": lambda: _risks(scars, grids),
+        "risky areas (gains)": lambda: _risks(blemishes, grids),
         "section and volume": lambda: _volumes(layout, grids),
         "lowest point": lambda: _lowest(layout, grids, watched),
         "slivers": lambda: _slivers(layout, grids, cosines),
@@ -85,10 +85,10 @@ def _all_heights(points, directions, step):  # type: ignore[no-untyped-def]
 
 
 @numba.njit
-def _risks(scars, grids):  # type: ignore[no-untyped-def]
+def _risks(blemishes, grids):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, _ = grids
     for k in range(len(directions)):
-        integrate_scars(scars, k, OffsetGrid(directions[k], heights[k], counts[k], step))
+        integrate_blemishes(blemishes, k, OffsetGrid(directions[k], heights[k], counts[k], step))
 
 
 @numba.njit

@@ -19,7 +19,7 @@ from profiles.errors import UserError
 from profiles.profile import Profile, load
 from slicer.overhangs import find_overhangs
 from slicer.sectioning import section_part
-from slicer.support.handed_down import plan_supports
+from slicer.support.from_earlier_part import plan_supports
 from slicer.support.support import Supports, explain, own_supports
 
 HEAD = (

@@ -143,7 +143,7 @@ def needing_upright(mesh: Mesh, profile: Profile) -> Mask:
     risky = risky_upright(mesh, profile.process.self_supporting_angle_deg, search.count_platform_faces)
     if search.objective == "risky":
         return risky
-    return risky & needs_support(mesh, profile.process, on_platform=True)
+    return risky & needs_support(mesh, profile.process, on_plate=True)
 
 
 def excess_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane, cut: Mask) -> float:

@@ -17,7 +17,7 @@ from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh, dot
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
 from mdp.topology.cross_section import loop_edges, loops_at
 from mdp.topology.edges import opposites
@@ -120,7 +120,7 @@ class BuildPlate:
         turned, centre = np.column_stack([dot(self.mesh.vertices, row) for row in rotation]), rotation @ self.centre
         low, high = float(turned[:, 2].min()), float(turned[:, 2].max())
         half_mm = 0.5 * (high - low)
-        touching_mm, blunt_mm = min(0.5 * PLATFORM_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm)
+        touching_mm, blunt_mm = min(0.5 * PLATE_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm)
         cuts_mm = low + np.array(sorted([touching_mm, blunt_mm]))
         areas = [CrossSection(loops, FillRule.Positive) for loops in loops_at(turned, self.mesh.faces, self.across, cuts_mm)]
         touching, base = areas[int(touching_mm > blunt_mm)], max(areas, key=CrossSection.area)
@@ -138,7 +138,7 @@ class BuildPlate:
         by 1e-5.
         """
         hull, rotations = convex_hull(self.mesh.vertices), np.ascontiguousarray(rotations)
-        corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm])
+        corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATE_TOLERANCE_MM, BLUNT * self.diameter_mm])
         bounds = np.zeros((len(rotations), 2))
         in_threads(_measure_hull, len(rotations), (corners, hull.faces, above_mm), rotations, bounds)
         return bounds[:, 0], bounds[:, 1]

@@ -27,7 +27,7 @@ from mdp.plane import Plane, normals_and_offsets
 from mdp.support_need.patches import Classes
 from mdp.sweep.crossing import ROUNDING_MM, weigh_chord
 from mdp.sweep.cylinders import crossed_by
-from mdp.sweep.facets import FaceTable, Scars, times_along
+from mdp.sweep.facets import Blemishes, FaceTable, times_along
 from mdp.sweep.limbs import cylinders_cut, limb_reach
 from mdp.sweep.sweep import Remainder
 
@@ -56,7 +56,7 @@ class Forecast:
     remainder: Remainder
     terms: CostTerms
     chosen: Indices
-    scars: Scars
+    blemishes: Blemishes
 
     @classmethod
     def of(cls, remainder: Remainder, terms: CostTerms, rim_weights: Floats | None = None) -> "Forecast":
@@ -73,8 +73,8 @@ class Forecast:
         stairs = np.zeros(count) if remainder.stair_weights is None else remainder.stair_weights
         faces = faces._replace(seam_weights=rim_weights, stair_weights=stairs).of_faces(chosen)
         no_classes, none_lost = np.zeros((0, 0), np.uint8), np.zeros(0, np.bool_)
-        scars = Scars(np.zeros((0, 3)), faces, least, no_classes, remainder.weight, terms.feather, none_lost)
-        return cls(remainder, terms, chosen, scars)
+        blemishes = Blemishes(np.zeros((0, 3)), faces, least, no_classes, remainder.weight, terms.feather, none_lost)
+        return cls(remainder, terms, chosen, blemishes)
 
     def classes(self, planes: Sequence[Plane]) -> Classes:
         """(k, n) support class of each of the model's faces along each plane's normal."""
@@ -97,8 +97,8 @@ class Forecast:
         cuts_mm2 = self.terms.cut_mm2 * len(planes) + self._crossed_mm2(planes)
         normals, offsets_mm = normals_and_offsets(planes)
         needs = self.classes(planes) if classes is None else classes
-        scars = self.scars._replace(directions=normals, classes=needs)
-        return _sum_left(scars, offsets_mm, self.reach(planes) if reach is None else reach) + cuts_mm2
+        blemishes = self.blemishes._replace(directions=normals, classes=needs)
+        return _sum_left(blemishes, offsets_mm, self.reach(planes) if reach is None else reach) + cuts_mm2
 
     def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
         """The parts that planes cut off a whole model, in the order of the cuts, and the area of the first part that needs
@@ -106,8 +106,8 @@ class Forecast:
         """
         middle, (directions, offsets_mm) = self.remainder.mesh.bounds_mm.mean(axis=0), normals_and_offsets(planes)
         apexes = middle - (directions @ middle - offsets_mm)[:, None] * directions
-        scars = self.scars._replace(directions=directions, classes=self.classes(planes))
-        sums = _sum_parts(scars, offsets_mm, self.reach(planes), apexes)
+        blemishes = self.blemishes._replace(directions=directions, classes=self.classes(planes))
+        sums = _sum_parts(blemishes, offsets_mm, self.reach(planes), apexes)
         rows, before = np.nonzero(np.abs(sums[:-1, COLUMNS:]) > LEAST_EDGE_MM)
         np.maximum.at(sums[:, COSINE], rows, np.abs((directions[rows] * directions[before]).sum(axis=1)))
         parts = (PartForecast(s[NEEDED], s[RIM], degrees(acos(min(s[COSINE], 1.0))), s[VOLUME]) for s in sums[:-1].tolist())
@@ -124,11 +124,11 @@ class Forecast:
 
 
 @kernel
-def _sum_left(scars: Scars, offsets_mm: Floats, reach: Mask) -> float:
+def _sum_left(blemishes: Blemishes, offsets_mm: Floats, reach: Mask) -> float:
     """Risky area, seams and stair-stepping of cuts in order, along the directions of the blemishes, mm2. reach (k, m): whether
     each cut may touch each face, (0, 0): all.
     """
-    faces, normals, directions, cuts = scars.faces, scars.faces.normals, scars.directions, len(offsets_mm)
+    faces, normals, directions, cuts = blemishes.faces, blemishes.faces.normals, blemishes.directions, len(offsets_mm)
     polygon, spare, heights, ends = table(3, cuts + 4), table(3, cuts + 4), floats(cuts + 4, 0.0), table(3, 2)
     total = 0.0
     for face in range(len(faces.areas_mm2)):
@@ -145,12 +145,12 @@ def _sum_left(scars: Scars, offsets_mm: Floats, reach: Mask) -> float:
                 if faces.seam_weights[face] > 0.0 and highest > ROUNDING_MM and lowest < -ROUNDING_MM:
                     chord_mm = _find_chord(polygon, heights, size, ends)
                     sine = max(np.sqrt(max(1.0 - cosine * cosine, 0.0)), LEAST_SINE)
-                    total += faces.seam_weights[face] * chord_mm * (weigh_chord(cosine, scars.feather) / sine)
+                    total += faces.seam_weights[face] * chord_mm * (weigh_chord(cosine, blemishes.feather) / sine)
                 size = _clip_below(polygon, spare, heights, size)
                 polygon, spare = spare, polygon
                 below = _flat_area_mm2(polygon, size, (normals[0, face], normals[1, face], normals[2, face]))
-            if cosine < scars.risky_below:
-                total += (area - below) * times_along(scars, cut, face) * faces.counts[face]
+            if cosine < blemishes.risky_below:
+                total += (area - below) * times_along(blemishes, cut, face) * faces.counts[face]
             total += (area - below) * faces.stair_weights[face] * step_share(cosine)
             area = below
             if lowest >= 0.0:
@@ -250,7 +250,7 @@ class Division(NamedTuple):
 
 
 @kernel
-def _sum_parts(scars: Scars, offsets_mm: Floats, reach: Mask, apexes: Floats) -> Floats:
+def _sum_parts(blemishes: Blemishes, offsets_mm: Floats, reach: Mask, apexes: Floats) -> Floats:
     """(k + 1, COLUMNS + k) sums over the parts in the order of the cuts, the remainder last; the last k columns hold the signed
     length of the line in which the plane of a row meets an earlier cut (column).
     """
@@ -259,20 +259,20 @@ def _sum_parts(scars: Scars, offsets_mm: Floats, reach: Mask, apexes: Floats) ->
     corners, fans, cuts = table(3, 3 * most), ints(most, 0), ints(most, 0)
     polygon, spare, heights, ends = table(3, count + 4), table(3, count + 4), floats(count + 4, 0.0), table(3, 2)
     division = Division(offsets_mm, reach, apexes, sums, corners, fans, cuts, polygon, spare, heights, ends)
-    for face in range(len(scars.faces.areas_mm2)):
+    for face in range(len(blemishes.faces.areas_mm2)):
         fans[0], cuts[0], waiting = -1, 0, 1
-        _put_face(scars.faces, face, corners)
+        _put_face(blemishes.faces, face, corners)
         while waiting > 0:
-            waiting = _divide(scars, division, face, waiting - 1)
+            waiting = _divide(blemishes, division, face, waiting - 1)
     return sums
 
 
 @no_nrt
-def _divide(scars: Scars, division: Division, face: int, waiting: int) -> int:
+def _divide(blemishes: Blemishes, division: Division, face: int, waiting: int) -> int:
     """Divide the last pending triangle among the parts; returns the number of triangles still pending."""
-    fan, cut, directions, count = division.fans[waiting], division.cuts[waiting], scars.directions, len(division.offsets_mm)
+    fan, cut, directions, count = division.fans[waiting], division.cuts[waiting], blemishes.directions, len(division.offsets_mm)
     polygon, spare, heights, ends, sums = division.polygon, division.spare, division.heights, division.ends, division.sums
-    x, y, z = scars.faces.normals[0, face], scars.faces.normals[1, face], scars.faces.normals[2, face]
+    x, y, z = blemishes.faces.normals[0, face], blemishes.faces.normals[1, face], blemishes.faces.normals[2, face]
     if fan >= 0:
         x, y, z = directions[fan, 0], directions[fan, 1], directions[fan, 2]
     for corner in range(3):
@@ -294,7 +294,7 @@ def _divide(scars: Scars, division: Division, face: int, waiting: int) -> int:
                     sums[cut, COLUMNS + fan] += _signed(ends, directions[fan], d)
                 elif highest > ROUNDING_MM and lowest < -ROUNDING_MM:
                     sums[cut, COSINE] = max(sums[cut, COSINE], abs(cosine))
-                    sums[cut, RIM] += length if scars.faces.seam_weights[face] > 0.0 else 0.0
+                    sums[cut, RIM] += length if blemishes.faces.seam_weights[face] > 0.0 else 0.0
                 _add_fan(division, waiting, cut)
                 waiting += 1
                 size = _clip_below(polygon, spare, heights, size)
@@ -303,12 +303,12 @@ def _divide(scars: Scars, division: Division, face: int, waiting: int) -> int:
             else:
                 size = 0
             sums[cut, VOLUME] += (area - left) * height / 3.0
-            if cosine < scars.risky_below:
-                needing = fan >= 0 or times_along(scars, cut, face) > 0.0
+            if cosine < blemishes.risky_below:
+                needing = fan >= 0 or times_along(blemishes, cut, face) > 0.0
                 sums[cut, NEEDED] += area - left if needing else 0.0
             area = left
         cut += 1
-    if size > 0 and (scars.faces.risky[face] if fan < 0 else z < scars.risky_below):
+    if size > 0 and (blemishes.faces.risky[face] if fan < 0 else z < blemishes.risky_below):
         sums[count, NEEDED] += area
     return waiting
 

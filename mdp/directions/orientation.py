@@ -23,7 +23,7 @@ from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh, dot
-from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, step_share, threshold
+from mdp.overhang import PLATE_TOLERANCE_MM, UP, step_share, threshold
 
 LEAN_DEG = 5.0  # a model rests if it can be leaned by this much before it tips over
 SAME_FACET_DEG = 0.5
@@ -118,7 +118,7 @@ def resting_facets(mesh: Mesh) -> list[tuple[Floats, Floats]]:
     return [(normal, corners) for normal, corners in facets if len(corners)]
 
 
-def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
+def set_on_plate(mesh: Mesh, rotation: Floats | None) -> Mesh:
     """The mesh turned by a rotation, set on z = 0 and centred about the turn axis; unchanged for None."""
     if rotation is None:
         return mesh
@@ -160,7 +160,7 @@ def _sum_faces(begin: int, end: int, surface: Surface, directions: Floats, sums_
         for v in range(len(heights)):
             heights[v] = vertices[v, 0] * x + vertices[v, 1] * y + vertices[v, 2] * z
             lowest = min(lowest, heights[v])
-        level = lowest + PLATFORM_TOLERANCE_MM
+        level = lowest + PLATE_TOLERANCE_MM
         for f in range(len(normals)):
             cosine = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z
             sums_mm2[k, STAIRS] += step_share(cosine) * areas_mm2[f]
@@ -248,7 +248,7 @@ def _lean_deg(mesh: Mesh, directions: Floats) -> Floats:
     for k, direction in enumerate(directions):
         heights = hull.vertices @ direction
         lowest = float(heights.min())
-        base = hull.vertices[heights <= lowest + PLATFORM_TOLERANCE_MM] - centre
+        base = hull.vertices[heights <= lowest + PLATE_TOLERANCE_MM] - centre
         lean_deg[k] = tipping_angle_deg(base @ _rotation(direction)[:2].T, float(centre @ direction) - lowest)
     return lean_deg
 

@@ -88,7 +88,7 @@ class Marks:
                     painted.setdefault(role.kind, []).append(self._moved(surface.vertices[surface.faces]))
         for kind, corners_mm in painted.items():
             kinds[PAINTED[kind]] += self._painted(kind, np.concatenate(corners_mm))
-        notes = [_sentence(subjects, *predicate) for predicate, subjects in self._subjects.items()]
+        notes = [_note_text(subjects, *predicate) for predicate, subjects in self._subjects.items()]
         return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), [*notes, *self._notes]
 
     def _tell(self, subject: str, verb: str, rest: str) -> None:
@@ -170,7 +170,7 @@ class Marks:
         return moved
 
 
-def _sentence(subjects: Sequence[str], verb: str, rest: str) -> str:
+def _note_text(subjects: Sequence[str], verb: str, rest: str) -> str:
     """A sentence about one subject, or about the first and the number of the others."""
     if len(subjects) == 1:
         return f"{subjects[0]} {verb} {rest}"

@@ -96,7 +96,7 @@ def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[t
         number = element.get("id", "")
         objects[number] = _role(element)
         triangles[number] = [
-            (_whole("firstid", volume.get("firstid")), _whole("lastid", volume.get("lastid")), _role(volume))
+            (_integer("firstid", volume.get("firstid")), _integer("lastid", volume.get("lastid")), _role(volume))
             for volume in element.findall("volume")
         ]
     return objects, triangles
@@ -118,9 +118,9 @@ def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], 
         values = _values(element)
         instances = [_values(instance) for instance in element.findall("model_instance")]
         standing = frozenset(
-            (instance.get("object_id", ""), _whole("instance_id", instance.get("instance_id", "0"))) for instance in instances
+            (instance.get("object_id", ""), _integer("instance_id", instance.get("instance_id", "0"))) for instance in instances
         )
-        plates.append((_whole("plater_id", values.get("plater_id", str(place))), values.get("plater_name", ""), standing))
+        plates.append((_integer("plater_id", values.get("plater_id", str(place))), values.get("plater_name", ""), standing))
     return objects, parts, plates
 
 
@@ -138,7 +138,7 @@ def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[
     return heights
 
 
-def _whole(name: str, text: str | None) -> int:
+def _integer(name: str, text: str | None) -> int:
     if text is None or not text.strip().isascii() or not text.strip().removeprefix("-").isdigit():
         raise ValueError(f"{name} is {text!r}: a whole number is expected")
     return int(text)

@@ -8,7 +8,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mdp.cut import simplify
-from mdp.directions.orientation import resting_orientations, standing_still
+from mdp.directions.orientation import resting_orientations, set_on_plate
 from mdp.formats.readers import READERS
 from mdp.formats.surface import check_surface
 from mdp.mesh import Floats, Mesh
@@ -73,7 +73,7 @@ def coarser(mesh: Mesh, most_faces: int) -> Mesh:
     while len(simpler.faces) > most_faces and share <= MOST_MOVED:
         simpler = simplify(mesh, share * diagonal_mm)
         share *= 2.0
-    return standing_still(simpler, np.eye(3))
+    return set_on_plate(simpler, np.eye(3))
 
 
 def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh | None:
@@ -84,7 +84,7 @@ def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh | None:
     if number == 0:
         return mesh
     sides = other_sides(mesh, angle_deg)
-    return standing_still(mesh, sides[number - 1]) if number <= len(sides) else None
+    return set_on_plate(mesh, sides[number - 1]) if number <= len(sides) else None
 
 
 def other_sides(mesh: Mesh, angle_deg: float) -> list[Floats]:

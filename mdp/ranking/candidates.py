@@ -15,7 +15,7 @@ from mdp.clearance import least_height_mm
 from mdp.cost.cost import CostTerms, CutCost
 from mdp.directions.unit_vectors import spread
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
+from mdp.overhang import PLATE_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
 from mdp.sweep.components import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.limbs import LimbSums
@@ -111,7 +111,7 @@ def bounds_of(
     )
 
 
-def platform_disc(mesh: Mesh, search: Search) -> tuple[Floats, float]:
+def plate_disc(mesh: Mesh, search: Search) -> tuple[Floats, float]:
     """Centre and radius of the disc of criterion III: the configured one, or else the model's footprint."""
     return footprint(mesh) if search.platform_radius_mm is None else (np.zeros(2), search.platform_radius_mm)
 
@@ -120,7 +120,7 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
     """Centre (2,) and radius of an approximately minimal disc around the model's contact with the build plate (Badoiu and
     Clarkson).
     """
-    points = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM][:, :2]
+    points = mesh.vertices[mesh.vertices[:, 2] <= PLATE_TOLERANCE_MM][:, :2]
     if len(points) == 0:
         return np.zeros(2), 0.0
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))

@@ -29,8 +29,8 @@ FIRST_LOOK, LOOK_AHEAD = 8, 128  # rows that are checked together: few while the
 SORTED_FIRST = 256
 UNKNOWN = -1
 FEASIBLE = int(Reason.FEASIBLE)  # a plain int, since it is compared a hundred thousand times per search
-LISTED = (2.0, 1.0, 4.0)  # trade-offs of the shortlist; more of them gave no better results
-EACH = 3  # candidates of a table on the shortlist for each trade-off
+SHORTLIST_TRADE_OFFS = (2.0, 1.0, 4.0)  # trade-offs of the shortlist; more of them gave no better results
+PER_TRADE_OFF = 3  # candidates of a table on the shortlist for each trade-off
 EQUAL = 1e-9  # shares of the risky area that differ less are equal up to rounding
 
 
@@ -222,8 +222,8 @@ def shortlist(tables: Sequence[CandidateTable], bound_mm2: float) -> Iterator[Ra
     """
     for table in tables:
         rows: dict[int, RankedCandidate] = {}
-        for trade_off in LISTED:
-            for candidate in islice(rank_by_trade_off([table], trade_off, bound_mm2), EACH):
+        for trade_off in SHORTLIST_TRADE_OFFS:
+            for candidate in islice(rank_by_trade_off([table], trade_off, bound_mm2), PER_TRADE_OFF):
                 rows.setdefault(candidate.row, candidate)
         yield from rows.values()
 

@@ -69,7 +69,7 @@ def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
     gap = max(surface.gap for surface in surfaces)
     names = {surface.name for surface, merged in zip(surfaces, tidy, strict=True) if not _is_closed(merged)} - {""}
     try:
-        closed = [_mend(piece, size, gap, notes) for piece in pieces]
+        closed = [_close_surface(piece, size, gap, notes) for piece in pieces]
     except MeshError as error:
         raise MeshError(f"its part {names.pop()!r} {error}" if len(names) == 1 and len(surfaces) > 1 else str(error)) from None
     solid = _unite_shells([split_touching_fans(piece) for piece in closed if len(piece.faces)], size, notes)
@@ -146,7 +146,7 @@ def _tidy(surface: Surface) -> Surface:
     return given if _is_closed(given) and len(given.faces) else merge_vertices(given)
 
 
-def _mend(surface: Surface, size: float, gap: float, notes: list[str]) -> Surface:
+def _close_surface(surface: Surface, size: float, gap: float, notes: list[str]) -> Surface:
     """The surface closed and wound consistently; appends to the notes. Raises MeshError if it stays open."""
     faces = len(surface.faces)
     surface = _drop_repeats(surface)

@@ -28,7 +28,15 @@ from mdp.plane import Plane
 from mdp.ranking.candidates import Bounds, gain_mm2, lost_mm2, residual_mm2
 from mdp.ranking.node import Node
 from mdp.ranking.ranker import LearnedRanker
-from mdp.ranking.ranking import LISTED, CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, shortlist
+from mdp.ranking.ranking import (
+    SHORTLIST_TRADE_OFFS,
+    CandidateTable,
+    RankedCandidate,
+    nearly_equal,
+    rank_by_trade_off,
+    rank_classic,
+    shortlist,
+)
 from mdp.ranking.record import Trace, offer
 from mdp.search.front import ParetoFront
 from mdp.search.problem import Problem
@@ -43,7 +51,7 @@ WORTH = 0.005  # share of the uncut model's cost that a limb must save
 MOST_LIMBS, MOST_CHECKED = 16, 32  # planes of limbs that are used, and planes that are checked to find them
 MOST_PLANES = 16  # planes of the beam's ranking, per trade-off, whose directions are used
 LIMB_TRADE_OFFS = (4.0, 1.0)  # a slot each
-PATIENCE = 2  # stages without a better node after which the search for limbs ends
+MAX_STALLED_STAGES = 2  # stages without a better node after which the search for limbs ends
 MOST_TRIED = 16  # limbs, and planes, tried by a slot at a node
 
 Pick = tuple[RankedCandidate, Node]  # a candidate taken by a slot of the beam, and the resulting node
@@ -143,7 +151,9 @@ class Beam:
         if trade_off is not None:
             return rank_by_trade_off(tables, trade_off, bound_mm2)
         if self.ranker is not None:  # the shortlist is followed by candidates for the case that nothing on it can be cut
-            return chain(self.ranker.rank(shortlist(tables, bound_mm2)), rank_by_trade_off(tables, LISTED[0], bound_mm2))
+            return chain(
+                self.ranker.rank(shortlist(tables, bound_mm2)), rank_by_trade_off(tables, SHORTLIST_TRADE_OFFS[0], bound_mm2)
+            )
         return rank_classic(tables, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
 
     def _child(self, candidate: RankedCandidate) -> Node | None:
@@ -188,7 +198,7 @@ def search_limbs(problem: Problem, first: FutureTable) -> list[Node]:
             nodes += [] if child is None else [child]
         best = min((best, *nodes), key=lambda node: node.cost_mm2)
         found.append(best)
-        if len(found) > PATIENCE and found[-1 - PATIENCE] is best:
+        if len(found) > MAX_STALLED_STAGES and found[-1 - MAX_STALLED_STAGES] is best:
             break
     return found
 

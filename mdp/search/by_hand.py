@@ -104,7 +104,7 @@ def _cut(problem: Problem, node: Node, plane: Plane) -> Node | Rejection:
     named = name_limbs(node, plane)
     if isinstance(named, Rejection):
         return named
-    why = _unfit(problem, node, named)
+    why = _find_violation(problem, node, named)
     if why is not None:
         return why
     child = problem.cut(node, named)
@@ -112,7 +112,7 @@ def _cut(problem: Problem, node: Node, plane: Plane) -> Node | Rejection:
         return child
     if named.limbs_mm is None:
         return Rejection(node, OUT_OF_REACH, Reason.REACH)
-    return _in_the_way(problem, node, named) or Rejection(node, REASONS[Reason.FLOATING], Reason.FLOATING)
+    return _find_collision(problem, node, named) or Rejection(node, REASONS[Reason.FLOATING], Reason.FLOATING)
 
 
 def name_limbs(node: Node, plane: Plane) -> Plane | Rejection:
@@ -156,7 +156,7 @@ def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
             for normal in _leaning(plane.normal, lean_deg):
                 for shift in sorted(range(-MOST_SHIFTS, MOST_SHIFTS + 1), key=abs):
                     offset_mm = float(normal @ middle) + SHIFT_MM * shift
-                    yield from _if_free(problem, node, replace(plane, normal=normal, offset_mm=offset_mm))
+                    yield from _if_feasible(problem, node, replace(plane, normal=normal, offset_mm=offset_mm))
         return
     vertices, passed = node.remainder.mesh.vertices, passing_places(node.remainder.mesh, plane)
     if len(passed) == 0:
@@ -184,7 +184,7 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
         low, high = float(heights.min()), float(heights.max())
         offsets = np.arange(low, high, max(LIMB_SHIFT_MM, (high - low) / MOST_PLACES))
         for offset_mm in offsets[np.argsort(np.abs(offsets - plane.offset_mm), kind="stable")]:
-            yield from _if_free(problem, node, replace(plane, offset_mm=float(offset_mm)))
+            yield from _if_feasible(problem, node, replace(plane, offset_mm=float(offset_mm)))
         return
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # pivot of the planes that lean
@@ -200,7 +200,7 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
                 yield Plane(normal, float(offset_mm))
 
 
-def _if_free(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
+def _if_feasible(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
     """Yields the plane with its limbs named, if it is feasible."""
     named = name_limbs(node, plane)
     if isinstance(named, Plane) and rejection(problem, node, named) is None:
@@ -217,27 +217,27 @@ def _leaning(normal: Floats, lean_deg: float) -> Floats:
 
 def rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
     """Why a user's plane cannot cut a node, without cutting; None if it can."""
-    return _unfit(problem, node, plane) or _in_the_way(problem, node, plane)
+    return _find_violation(problem, node, plane) or _find_collision(problem, node, plane)
 
 
-def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
+def _find_collision(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
     """A rejection if the head would meet parts standing beside the limbs of a plane; None if it would not."""
     if plane.limbs_mm is None or problem.is_clear(node, plane):
         return None
     return Rejection(node, REASONS[Reason.STANDING], Reason.STANDING)
 
 
-def _unfit(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
+def _find_violation(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
     """Why a plane cannot cut a node, parts beside limbs aside: it cuts nothing, the sweep rejects it, or no pose works for the
     part.
     """
-    missed = _miss(problem, node, plane)
+    missed = _missed_reason(problem, node, plane)
     if missed is not None:
         return Rejection(node, missed)
     limits = _limits(problem, plane.normal[None])
     reason, sliver_mm = problem.check(node, plane, limits)
     if reason != Reason.FEASIBLE:
-        return Rejection(node, _sentence(problem, node, plane, limits, reason, sliver_mm), reason)
+        return Rejection(node, _reason_text(problem, node, plane, limits, reason, sliver_mm), reason)
     if not problem.settings.clearance:
         return None
     points, machine = node.corners_cut(plane) + problem.place_mm, problem.machine
@@ -256,7 +256,7 @@ def _limits(problem: Problem, directions: Floats) -> Bounds:
     return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
 
 
-def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason: Reason, sliver_mm: float) -> str:
+def _reason_text(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason: Reason, sliver_mm: float) -> str:
     """A rejection by the sweep as a message with numbers."""
     text = REASONS[reason]
     match reason:
@@ -281,7 +281,7 @@ def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason
     return text
 
 
-def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
+def _missed_reason(problem: Problem, node: Node, plane: Plane) -> str | None:
     """Why a plane cuts nothing: it misses the model, or later parts already contain what it would cut."""
     heights = plane.heights_mm(node.remainder.mesh.vertices)
     if heights.min() < -COPLANAR_MM and heights.max() > COPLANAR_MM:
@@ -318,7 +318,7 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
         if reason[row] == Reason.FEASIBLE:
             offset = float(offset_mm[row]) if planned.offset_mm is None else planned.offset_mm
             plane = Plane(directions[direction[row]], offset)
-            if _unfit(problem, node, plane) is None and problem.cut(node, plane) is not None:
+            if _find_violation(problem, node, plane) is None and problem.cut(node, plane) is not None:
                 return plane
     counts = [(int((reason == why).sum()), text) for why, text in REASONS.items()]
     shares = "; ".join(f"{count} because {text}" for count, text in counts if count)

@@ -31,32 +31,32 @@ class ParetoFront:
 
     def __init__(self, start: Node) -> None:
         self._start = len(start.cuts)
-        self._alike: dict[int, list[Node]] = {self._start: [start]}
+        self._by_count: dict[int, list[Node]] = {self._start: [start]}
         self._equal = EQUAL if start.terms.seam_mm > 0.0 else 0.0
 
     def offer(self, node: Node) -> None:
         """Add a node and all nodes on its path from the start."""
         for step in node.path[self._start :]:
-            held = self._alike.setdefault(len(step.cuts), [])
+            held = self._by_count.setdefault(len(step.cuts), [])
             if step not in held:
                 most_mm2 = min(alternative.cost_mm2 for alternative in (step, *held)) * (1.0 + self._equal)
                 held[:] = [alternative for alternative in (*held, step) if alternative.cost_mm2 <= most_mm2]
 
     def replace(self, node: Node, alternative: Node) -> None:
         """Replace a node by an alternative of about equal cost."""
-        self._alike[len(node.cuts)] = [alternative]
+        self._by_count[len(node.cuts)] = [alternative]
 
     @property
     def nodes(self) -> list[Node]:
         """The best nodes by ascending number of cuts."""
-        return [self._best(count) for count in sorted(self._alike)]
+        return [self._best(count) for count in sorted(self._by_count)]
 
     def up_to(self, parts: int) -> Node:
         """The node with the most parts up to a number, or with the fewest if all have more."""
-        return self._best(max((count for count in self._alike if count < parts), default=self._start))
+        return self._best(max((count for count in self._by_count if count < parts), default=self._start))
 
     def _best(self, count: int) -> Node:
-        alike = self._alike[count]
+        alike = self._by_count[count]
         if self._equal <= 0.0 or len(alike) == 1:
             return alike[0]
         return min(alike, key=lambda node: sum(seam.length_mm for seam in node.seams))
@@ -98,7 +98,7 @@ def with_price(row: FrontRow, price: Price | None) -> FrontRow:
     return row if price is None else replace(row, time_s=price[0], filament_mm=price[1])
 
 
-def pays(rows: Sequence[FrontRow | Node]) -> list[bool]:
+def pareto_optimal(rows: Sequence[FrontRow | Node]) -> list[bool]:
     """Pareto-optimal rows or nodes, given by ascending number of parts: whether each costs less than all with fewer parts."""
     return [all(row.cost_mm2 < fewer.cost_mm2 for fewer in rows[:place]) for place, row in enumerate(rows)]
 
@@ -158,9 +158,9 @@ def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0
     any row has a time, rows without one cannot be printed, and unsound rows are not chosen. If none has, or time does not count,
     as without support, there is no charge: the choice is the row with the fewest parts within tolerance of the least cost.
     """
-    paying = [place for place, good in enumerate(pays(rows)) if good and (place == 0 or rows[place].sound)]
-    timed = [place for place in paying if rows[place].time_s is not None]
-    places, first = timed or paying, (timed or paying)[0]
+    pareto_optimal_rows = [place for place, good in enumerate(pareto_optimal(rows)) if good and (place == 0 or rows[place].sound)]
+    timed = [place for place in pareto_optimal_rows if rows[place].time_s is not None]
+    places, first = timed or pareto_optimal_rows, (timed or pareto_optimal_rows)[0]
     totals = {place: rows[place].cost_mm2 + (weights.of_row(rows[place]) or 0.0) for place in places}
     charge = charge_mm2([rows[place] for place in places], weights, least_saving)
     limit_mm2 = min(rows[place].cost_mm2 for place in places) + EQUAL * rows[first].cost_mm2
@@ -176,10 +176,10 @@ def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0
         reason = "the least cost with its time"
     else:
         reason = f"more parts would save less than {100.0 * least_saving:g} % each"
-    return Choice(taken, reason, _given_up(rows[scars], rows[taken]) if taken != scars else ())
+    return Choice(taken, reason, _savings_notes(rows[scars], rows[taken]) if taken != scars else ())
 
 
-def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
+def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
     """A note on what the row with the fewest blemishes would save and cost, compared with the chosen one."""
     saved_mm2, longer_s = taken.cost_mm2 - fewest_scars.cost_mm2, (fewest_scars.time_s or 0.0) - (taken.time_s or 0.0)
     more_mm = (fewest_scars.filament_mm or 0.0) - (taken.filament_mm or 0.0)

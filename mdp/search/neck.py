@@ -64,18 +64,18 @@ def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float) -> Plane 
     heights = plane.heights_mm(mesh.vertices)
     if heights.max() <= 0.0 or heights.min() >= 0.0:
         return None
-    surface = _near(mesh, seen, heights, reach_mm)
+    surface = _surface_near(mesh, seen, heights, reach_mm)
     if surface.rim_mm(plane) <= 0.0:
         return None
     centre = surface.centre_mm(plane)
-    shorter = sorted(_first_look(mesh, seen, plane.normal, centre, reach_mm), key=lambda pair: pair[0])
-    begins = _apart(surface, [begin for _, begin in shorter], APART * reach_mm)
-    necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS) for begin in begins]
+    shorter = sorted(_coarse_scan(mesh, seen, plane.normal, centre, reach_mm), key=lambda pair: pair[0])
+    begins = _distinct(surface, [begin for _, begin in shorter], APART * reach_mm)
+    necks = [_refine(surface, begin, 2.0 * reach_mm / OFFSETS) for begin in begins]
     allowed = [neck for neck in necks if _is_neck(surface, neck, plane, reach_mm)]
     return min(allowed, key=surface.rim_mm, default=None)
 
 
-def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surface:
+def _surface_near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surface:
     """The part of a mesh that any plane of the search can meet, without faces far above and below."""
     wide_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     far_mm = 2.0 * reach_mm + wide_mm * sin(radians(REACH_DEG))
@@ -86,7 +86,7 @@ def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surfac
     return _Surface(mesh.vertices, faces, mesh.normals[kept], mesh.areas_mm2[kept])
 
 
-def _first_look(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_mm: float) -> Iterator[tuple[float, Plane]]:
+def _coarse_scan(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_mm: float) -> Iterator[tuple[float, Plane]]:
     """Planes with a locally minimal rim along their normal, and its length, from a sweep along each direction."""
     step_mm, directions = 2.0 * reach_mm / OFFSETS, np.vstack([normal, *map(partial(_ring, normal), range(1, RINGS + 1))])
     remainder = Remainder(mesh, np.zeros(len(mesh.faces), dtype=np.bool_), np.where(seen > 0.0, 1.0, 0.0))
@@ -101,7 +101,7 @@ def _first_look(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_
             yield float(rims[k]), Plane(direction, float(offsets_mm[k]))
 
 
-def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plane]:
+def _distinct(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plane]:
     """The first planes whose rims have centres at least that far apart, since neighbouring directions find the same neck."""
     taken: list[tuple[Floats, Plane]] = []
     for plane in planes:
@@ -126,7 +126,7 @@ def _leaning(normal: Floats, tilt_rad: float, turns_rad: Floats) -> Floats:
     return leaning
 
 
-def _refined(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
+def _refine(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
     """Pattern search for a shorter rim: shift the plane, or tilt it about the centre of its rim, with shrinking steps.
 
     A plane that keeps moving is on its way to an end of the model: it is returned as it is, and is not a neck.
@@ -161,10 +161,10 @@ def _is_neck(surface: _Surface, neck: Plane, plane: Plane, reach_mm: float) -> b
     if tilt_deg > REACH_DEG - LEAST_DEG or away_mm > reach_mm:
         return False
     least, step_mm = surface.rim_mm(neck), 2.0 * reach_mm / OFFSETS
-    return all(_rises(surface, neck, side * step_mm, least) for side in (-1.0, 1.0))
+    return all(_rim_grows(surface, neck, side * step_mm, least) for side in (-1.0, 1.0))
 
 
-def _rises(surface: _Surface, neck: Plane, step_mm: float, least: float) -> bool:
+def _rim_grows(surface: _Surface, neck: Plane, step_mm: float, least: float) -> bool:
     """Whether the rim grows by RISE within the reach on one side before it becomes shorter than the neck's."""
     for k in range(1, ceil(OFFSETS / 2) + 1):
         rim = surface.rim_mm(Plane(neck.normal, neck.offset_mm + k * step_mm))

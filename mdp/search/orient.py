@@ -18,7 +18,7 @@ import numpy as np
 from mdp.cost.cost import weight_of_stairs
 from mdp.cost.footing import SMALL_BASE, BuildPlate, Footing
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.directions.orientation import Orientation, facet_orientations, standing_still, straight_orientations
+from mdp.directions.orientation import Orientation, facet_orientations, set_on_plate, straight_orientations
 from mdp.directions.revolution import find_revolution
 from mdp.kernels.processes import parallel_map
 from mdp.mesh import Mesh
@@ -32,8 +32,8 @@ from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 
 BOUND_SLACK = 1e-4  # degrees, and share of an area, by which rounding may lower a bound
-RANKED = 20  # orientations that are ranked
-FORECAST = 3  # orientations whose time is estimated, besides the model as it stands
+MAX_RANKED = 20  # orientations that are ranked
+MAX_FORECASTS = 3  # orientations whose time is estimated, besides the model as it stands
 # Blemished share of a model's surface that a narrow base, an unsteady stance, or a turn from the file's orientation is worth:
 # fitted so that the chosen row of each sheet of the book of choices is marked best most often (tools/RESULTS.md).
 NARROW, UNSTEADY, TURNED = 0.12, 0.06, 0.055
@@ -46,10 +46,10 @@ SUPPORT_S_MM2, LAYER_S = 1.4, 4.5  # printing time for each mm2 that needs suppo
 LEFT, STAIRS_LEFT = 0.6, 0.75
 LEAST_LEFT, LEAST_STAIRS_LEFT = 0.3, 0.45  # those shares for good results (34 more models)
 # Ratios to the cost of the model as it stands: a forecast below the first is clearly better, one above the second is discarded.
-NO_DOUBT, HOPELESS = 0.9, 1.3
-PROMISING = 1.03  # that ratio for narrow searches, which end with a higher cost
+CONFIDENT_RATIO, REJECTION_RATIO = 0.9, 1.3
+PROMISING_RATIO = 1.03  # that ratio for narrow searches, which end with a higher cost
 # Orientations that a narrow search cuts, and the factor by which it tries fewer directions.
-SEARCHED, COARSER = 2, 3
+NARROW_SEARCHES, COARSER = 2, 3
 PricingBy = Callable[[Profile], Pricing]
 
 
@@ -82,17 +82,20 @@ def orient_and_decompose(mesh: Mesh, profile: Profile, pricing: PricingBy, searc
     others = sorted((other for other in others if other.bare_mm2 < inf), key=lambda other: other.forecast_mm2)
 
     def searched(forecast: OrientationForecast) -> Oriented:
-        turned = forecast.mesh if copy is None else standing_still(mesh, forecast.orientation.rotation)
+        turned = forecast.mesh if copy is None else set_on_plate(mesh, forecast.orientation.rotation)
         return _oriented(forecast, search(turned), upright, profile)
 
-    sure = next((other for other in others if other.forecast_mm2 < NO_DOUBT * upright.forecast_mm2), None)
+    sure = next((other for other in others if other.forecast_mm2 < CONFIDENT_RATIO * upright.forecast_mm2), None)
     first = None if sure is None else searched(sure)
-    if first is not None and first.total_mm2 < upright.hopeful_mm2:
+    if first is not None and first.total_mm2 < upright.optimistic_mm2:
         return first
     standing = _oriented(upright, search(mesh), upright, profile)
     if first is None:
-        near = [other for other in others if other.forecast_mm2 < HOPELESS * standing.total_mm2]
-        likely = [_most_promising(near, quick, standing.total_mm2), _whole(others, quick, pricing, standing.total_mm2)]
+        near = [other for other in others if other.forecast_mm2 < REJECTION_RATIO * standing.total_mm2]
+        likely = [
+            _most_promising(near, quick, standing.total_mm2),
+            _best_in_one_piece(others, quick, pricing, standing.total_mm2),
+        ]
         tried = [searched(forecast) for forecast in dict.fromkeys(likely) if forecast is not None]
     else:
         tried = [first]
@@ -115,8 +118,8 @@ def _oriented(
 @dataclass(frozen=True, eq=False)
 class OrientationForecast:
     """Forecast cost of a model in an orientation. bare_mm2: of its time and filament without any support (hardly any
-    decomposition costs less); whole_mm2: in one piece; forecast_mm2: after a typical search; hopeful_mm2: after a search with a
-    good result. All include footing_mm2, the cost of its footing and of being turned.
+    decomposition costs less); whole_mm2: in one piece; forecast_mm2: after a typical search; optimistic_mm2: after a search with
+    a good result. All include footing_mm2, the cost of its footing and of being turned.
     """
 
     orientation: Orientation
@@ -124,7 +127,7 @@ class OrientationForecast:
     bare_mm2: float
     whole_mm2: float
     forecast_mm2: float
-    hopeful_mm2: float
+    optimistic_mm2: float
     footing: Footing
     footing_mm2: float
 
@@ -134,9 +137,9 @@ def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> l
     there is no other orientation to compare it with.
     """
     weights, stair_mm2, scar_mm2 = Weights.of(profile), weight_of_stairs(profile), _scar_mm2(Weights.of(profile))
-    footed = _with_footing(mesh, profile, most=FORECAST)
+    footed = _with_footing(mesh, profile, most=MAX_FORECASTS)
     upright = footed[0][0]
-    meshes = [mesh, *(standing_still(mesh, orientation.rotation) for orientation, _ in footed[1:])]
+    meshes = [mesh, *(set_on_plate(mesh, orientation.rotation) for orientation, _ in footed[1:])]
     prices = parallel_map(lambda k: _price_bare(meshes[k], profile, pricing), len(meshes)) if len(meshes) > 1 else [None]
     forecasts, surface_mm2 = [], float(mesh.areas_mm2.sum())
     for (orientation, footing), turned, bare in zip(footed, meshes, prices, strict=True):
@@ -144,11 +147,11 @@ def forecast_orientations(mesh: Mesh, profile: Profile, pricing: PricingBy) -> l
         bare_mm2 = footing_mm2 + (inf if bare is None else weights.of_print(*bare))
         scars_mm2, stairs_mm2 = scar_mm2 * orientation.risky_mm2, stair_mm2 * orientation.stairs_mm2
         shares = ((1.0, 1.0), (LEFT, STAIRS_LEFT), (LEAST_LEFT, LEAST_STAIRS_LEFT))
-        whole_mm2, forecast_mm2, hopeful_mm2 = (
+        whole_mm2, forecast_mm2, optimistic_mm2 = (
             bare_mm2 + left * scars_mm2 + stairs_left * stairs_mm2 for left, stairs_left in shares
         )
         forecasts.append(
-            OrientationForecast(orientation, turned, bare_mm2, whole_mm2, forecast_mm2, hopeful_mm2, footing, footing_mm2)
+            OrientationForecast(orientation, turned, bare_mm2, whole_mm2, forecast_mm2, optimistic_mm2, footing, footing_mm2)
         )
     return forecasts
 
@@ -169,21 +172,21 @@ def _most_promising(
     """The cheapest orientation after a narrow search; None if none comes close to the cost of the model as it stands."""
     quick, chosen = with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER)), None
     more_mm2, least_mm2 = _scar_mm2(Weights.of(profile)) - 1.0, inf
-    able = [forecast for forecast in forecasts if forecast.bare_mm2 < PROMISING * standing_mm2]
-    for forecast in able[:SEARCHED]:
+    able = [forecast for forecast in forecasts if forecast.bare_mm2 < PROMISING_RATIO * standing_mm2]
+    for forecast in able[:NARROW_SEARCHES]:
         rows = decompose(forecast.mesh, "", quick).front
         cost_mm2 = forecast.bare_mm2 + min(row.cost_mm2 + more_mm2 * row.support_area_mm2 for row in rows)
-        if cost_mm2 < min(PROMISING * standing_mm2, least_mm2):
+        if cost_mm2 < min(PROMISING_RATIO * standing_mm2, least_mm2):
             chosen, least_mm2 = forecast, cost_mm2
     return chosen
 
 
-def _whole(
+def _best_in_one_piece(
     forecasts: Sequence[OrientationForecast], profile: Profile, pricing: PricingBy, standing_mm2: float
 ) -> OrientationForecast | None:
     """The cheapest orientation in one piece, if it costs less than the model as it stands; else None."""
     forecast = min(forecasts, key=lambda forecast: forecast.whole_mm2, default=None)
-    if forecast is None or forecast.whole_mm2 > HOPELESS * standing_mm2:
+    if forecast is None or forecast.whole_mm2 > REJECTION_RATIO * standing_mm2:
         return None
     # these terms matter only for cuts
     problem = Problem(forecast.mesh, with_search(profile, hidden_seam_share=1.0, clearance=False))
@@ -193,8 +196,8 @@ def _whole(
 
 
 def distinct_orientations(mesh: Mesh, profile: Profile, *, for_person: bool = False) -> list[Orientation]:
-    """Up to RANKED orientations in which the plate holds the model, by estimated cost including footing; all orientations if the
-    plate holds it in none, not even as it stands.
+    """Up to MAX_RANKED orientations in which the plate holds the model, by estimated cost including footing; all orientations if
+    the plate holds it in none, not even as it stands.
 
     The model as it stands is left out, and so are orientations near another one or symmetric to it. A body of revolution that
     makes up most of the model has its axis vertical or horizontal. for_person: also orientations that turn a model from a face
@@ -205,7 +208,7 @@ def distinct_orientations(mesh: Mesh, profile: Profile, *, for_person: bool = Fa
 
 
 def _with_footing(
-    mesh: Mesh, profile: Profile, for_person: bool = False, most: int = RANKED
+    mesh: Mesh, profile: Profile, for_person: bool = False, most: int = MAX_RANKED
 ) -> list[tuple[Orientation, Footing]]:
     """The model as it stands, then up to `most` of the orientations of distinct_orientations, each with its footing."""
     angle_deg = profile.process.self_supporting_angle_deg
@@ -217,7 +220,7 @@ def _with_footing(
     keep = held and not for_person
     on_face = keep and standing.on_face
     others = _along_axis(mesh, others, keep)
-    able = _that_may_hold(others, plate, on_face)
+    able = _possibly_stable(others, plate, on_face)
     ranked = _cheapest_first(able, plate, profile)
     firm = (one for one in ranked if one[1].held() and not (on_face and one[1].on_tip))
     first = next(firm, None)
@@ -229,7 +232,7 @@ def _with_footing(
     distinct: list[tuple[Orientation, Footing]] = []
     for orientation, footing in ranked:
         near = any(float(orientation.rotation[2] @ other.rotation[2]) > NEAR for other in known)
-        if not near and not any(_alike(orientation, other, worst_mm2) for other in known):
+        if not near and not any(_is_equivalent(orientation, other, worst_mm2) for other in known):
             known.append(orientation)
             distinct.append((orientation, footing))
         if len(distinct) == most:
@@ -237,7 +240,7 @@ def _with_footing(
     return [(upright, standing), *distinct]
 
 
-def _that_may_hold(orientations: list[Orientation], plate: BuildPlate, on_face: bool) -> list[Orientation]:
+def _possibly_stable(orientations: list[Orientation], plate: BuildPlate, on_face: bool) -> list[Orientation]:
     """The orientations that the bounds by the model's hull do not exclude: the plate may hold it, with on_face on more than a
     tip.
     """
@@ -260,7 +263,7 @@ def _cheapest_first(
     turn comes.
     """
     surface_mm2 = float(plate.mesh.areas_mm2.sum())
-    guesses_mm2 = [_guess_mm2(orientation, profile) for orientation in orientations]
+    guesses_mm2 = [_estimate_mm2(orientation, profile) for orientation in orientations]
     measured: list[tuple[float, int, Footing]] = []
     for k in sorted(range(len(orientations)), key=lambda k: guesses_mm2[k]):
         while measured and measured[0][0] < round(guesses_mm2[k], 6):
@@ -284,7 +287,7 @@ def _along_axis(mesh: Mesh, others: list[Orientation], keep: bool) -> list[Orien
     return [other for other in others if fits(other.rotation[2])]
 
 
-def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:
+def _is_equivalent(first: Orientation, second: Orientation, worst_mm2: float) -> bool:
     same_area = abs(first.risky_mm2 - second.risky_mm2) + abs(first.stairs_mm2 - second.stairs_mm2) <= EQUAL * worst_mm2
     return same_area and abs(first.height_mm - second.height_mm) <= EQUAL * second.height_mm
 
@@ -299,7 +302,7 @@ def total_mm2(row: FrontRow | None, weights: Weights) -> float:
     return inf if price_mm2 is None else row.cost_mm2 + price_mm2
 
 
-def _guess_mm2(orientation: Orientation, profile: Profile) -> float:
+def _estimate_mm2(orientation: Orientation, profile: Profile) -> float:
     """Rough cost of an orientation in one piece, without terms that are equal for all, mm2."""
     layers = ceil(orientation.height_mm / profile.process.layer_height_mm)
     seconds = SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * layers

@@ -57,7 +57,7 @@ def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Nod
     best = node
     of_mirrors = [partial(change, mirror=mirror) for change, mirror in product((_stand_upright, _pair), mirrors)]
     along = [partial(_align, problem)] if problem.terms.stair_weight > 0.0 else []
-    for change in (partial(_at_neck, problem), *along, *of_mirrors):
+    for change in (partial(_move_to_neck, problem), *along, *of_mirrors):
         for position in range(len(problem.start.cuts), len(best.planes)):
             for planes in change(best, position):
                 changed = None if problem.late() else problem.replay(best.path[position], planes)
@@ -67,7 +67,7 @@ def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Nod
     return best
 
 
-def _at_neck(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]:
+def _move_to_neck(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]:
     """The planes from a position, the first of them moved to a nearby neck."""
     here, *later = last.planes[position:]
     node, face = last.path[position], _cut_face(last.path[position + 1])
@@ -145,7 +145,7 @@ def refine_planes(problem: Problem, best: Node) -> Node:
             break
         before = best.path[position]
         surface = Forecast.of(before.remainder, before.terms)
-        ever_better = list(_climb(problem, surface, best, position))
+        ever_better = list(_local_search(problem, surface, best, position))
         for planes in ever_better[: -TRIES - 1 : -1]:
             if problem.late() or before.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
                 break
@@ -168,7 +168,7 @@ def _add_cuts(problem: Problem, node: Node) -> Node:
     return node
 
 
-def _climb(problem: Problem, surface: Forecast, last: Node, position: int) -> Iterator[list[Plane]]:
+def _local_search(problem: Problem, surface: Forecast, last: Node, position: int) -> Iterator[list[Plane]]:
     """Local search on the plane at a position: ever better planes from there, the best ones last. surface: forecast before that
     cut.
     """

@@ -13,7 +13,7 @@ from mdp.cut import Solid, below, cut, mesh_of, solid_of
 from mdp.directions.flats import Flats
 from mdp.directions.orientation import diameter_mm
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, standing, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, PLATE_TOLERANCE_MM, standing, threshold
 from mdp.plane import Plane
 from mdp.pose import Pose
 from mdp.ranking.candidates import (
@@ -25,7 +25,7 @@ from mdp.ranking.candidates import (
     count_rejected,
     directions,
     lost_mm2,
-    platform_disc,
+    plate_disc,
     residual_mm2,
     score_candidates,
     seam_mm2,
@@ -74,7 +74,7 @@ class Problem:
         self.root = self.start = Node(solid, self.terms, SeamPlaces.of(mesh, solid, settings, self.zones))
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
-        self.platform_disc = platform_disc(mesh, settings)
+        self.plate_disc = plate_disc(mesh, settings)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         # Gains are shares of the risky area without faces on the plate, which no cut can save; as published, with them.
         published, risky = settings.method == "published", self.root.remainder.risky
@@ -168,7 +168,7 @@ class Problem:
 
     def bounds_along(self, directions: Floats) -> Bounds:
         """The bounds of (k, 3) directions."""
-        return bounds_of(directions, self.mesh, self.profile, self.platform_disc, self.zones.keep)
+        return bounds_of(directions, self.mesh, self.profile, self.plate_disc, self.zones.keep)
 
     def limb_sums(self, node: Node, planes: Sequence[Plane]) -> LimbSums:
         """Sums over the limbs of planes at a node, without cutting."""
@@ -293,7 +293,7 @@ def _floats(rest: Solid, plane: Plane) -> bool:
     face of the solid lies in the plane, the union keeps touching pieces separate.
     """
     for piece in rest.decompose():
-        if piece.volume() > 0.0 and piece.bounding_box()[2] > PLATFORM_TOLERANCE_MM:
+        if piece.volume() > 0.0 and piece.bounding_box()[2] > PLATE_TOLERANCE_MM:
             lowest_mm = float(plane.heights_mm(mesh_of(piece).vertices).min())
             if abs(lowest_mm) > BASE_TOLERANCE_MM:
                 return True

@@ -34,7 +34,7 @@ from mdp.search.front import (
     Weights,
     choose,
     front_row,
-    pays,
+    pareto_optimal,
     price_rows,
     with_price,
 )
@@ -151,7 +151,7 @@ def _take(
     nodes, price, paying = front.nodes, request.price, dict[int, tuple[Part, ...]]()
     rows = [front_row(node) for node in nodes]
     if price is not None:
-        paying = {place: make_parts(problem, nodes[place]) for place, good in enumerate(pays(rows)) if good}
+        paying = {place: make_parts(problem, nodes[place]) for place, good in enumerate(pareto_optimal(rows)) if good}
         by_hand = len(problem.start.cuts)
         sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, problem.profile, by_hand)}
         rows = [replace(row, sound=place in sound or place not in paying) for place, row in enumerate(rows)]
@@ -236,7 +236,9 @@ def _polish_rows(problem: Problem, front: ParetoFront) -> None:
 def _paying(problem: Problem, front: ParetoFront) -> list[Node]:
     """The nodes of a front that the search has cut and that are Pareto-optimal."""
     nodes = front.nodes
-    return [node for node, good in zip(nodes, pays(nodes), strict=True) if good and len(node.cuts) > len(problem.start.cuts)]
+    return [
+        node for node, good in zip(nodes, pareto_optimal(nodes), strict=True) if good and len(node.cuts) > len(problem.start.cuts)
+    ]
 
 
 def _begin(problem: Problem, request: SearchRequest) -> None:
@@ -328,7 +330,7 @@ def _priced(
 ) -> list[FrontRow]:
     """The rows of a plan's front with time and filament; rows that cannot be cut again or are unsound stay as they are."""
     parts: dict[int, Sequence[Part]] = {}
-    for place, (row, good) in enumerate(zip(rows, pays(rows), strict=True)):
+    for place, (row, good) in enumerate(zip(rows, pareto_optimal(rows), strict=True)):
         with suppress(PlanError):
             if row.chosen:
                 parts[place] = chosen

@@ -13,11 +13,11 @@ from math import inf
 
 import numpy as np
 
-from mdp.clearance import lowest_body, places_met
+from mdp.clearance import collision_points, lowest_body
 from mdp.cost.forecast import Forecast, PartForecast
 from mdp.cut import Solid, above, below, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, UP
+from mdp.overhang import PLATE_TOLERANCE_MM, UP
 from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
 from mdp.pose import poses, rotation, shift
@@ -218,11 +218,11 @@ def _places_against(problem: Problem, rejected: Rejection, plane: Plane) -> Sequ
     node = rejected.node
     match rejected.reason:
         case Reason.PLATFORM:
-            centre, radius = problem.platform_disc
+            centre, radius = problem.plate_disc
             across = plane.normal[:2] / max(float(np.hypot(*plane.normal[:2])), 1e-12)
             return [np.array([*(centre + radius * across), 0.0])]
         case Reason.FLOATING:
-            return _lowest(below(node.solid, plane), UP, PLATFORM_TOLERANCE_MM)
+            return _lowest(below(node.solid, plane), UP, PLATE_TOLERANCE_MM)
         case Reason.INTERFACE:
             return _lowest(above(node.solid, plane), plane.normal, plane.offset_mm + COPLANAR_MM)
         case Reason.FRAGILE:
@@ -237,7 +237,7 @@ def _places_against(problem: Problem, rejected: Rejection, plane: Plane) -> Sequ
         case Reason.STANDING:  # parts that require a higher tip than the limbs beside them
             corners, limb = node.remainder.mesh.vertices[node.remainder.mesh.faces], limb_faces(node.remainder, plane)
             for pose in poses(problem.machine, plane.normal)[:1]:
-                return list(places_met(problem.machine, pose, (corners[limb], corners[~limb]), plane.offset_mm))
+                return list(collision_points(problem.machine, pose, (corners[limb], corners[~limb]), plane.offset_mm))
         case Reason.REACH:
             return _outside(problem, node.corners_cut(plane), plane)
     return []

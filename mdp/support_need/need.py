@@ -9,7 +9,7 @@ from mdp.directions.orientation import azimuth_rad
 from mdp.directions.unit_vectors import AXES, framed, spread
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, PLATE_TOLERANCE_MM, UP, Mask, threshold
 from mdp.pose import about
 from mdp.support_need.over_air import find_over_air
 from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Limits, classify
@@ -42,9 +42,9 @@ def limits_of(process: Process, base_mm: float) -> Limits:
     )
 
 
-def needs_support(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
+def needs_support(mesh: Mesh, process: Process, on_plate: bool) -> Mask:
     """(m,) False for faces of a part, in its part frame, that overhang but support themselves."""
-    limits = limits_of(process, PLATFORM_TOLERANCE_MM if on_platform else BASE_TOLERANCE_MM)
+    limits = limits_of(process, PLATE_TOLERANCE_MM if on_plate else BASE_TOLERANCE_MM)
     return _needing_upright(link(mesh), limits)
 
 
@@ -85,7 +85,7 @@ class SupportNeed:
     @cached_property
     def upright(self) -> Mask:
         """(m,) False for faces that overhang when printed straight up, but support themselves. Support stands on the plate."""
-        limits = limits_of(self.process, PLATFORM_TOLERANCE_MM)
+        limits = limits_of(self.process, PLATE_TOLERANCE_MM)
         return _needing_upright(self.surface, limits, self.axes) | self.enforced
 
     def along(self, directions: Floats) -> Classes:

@@ -24,7 +24,7 @@ TINY = 1e-9  # twice the area of a face seen edge-on, in cells
 
 # Rows of the figures of all flat regions (6, m): lowest and highest point, number of samples and of samples over air; for regions
 # with few samples, the area, and the area over air by points of the faces.
-LOW, HIGH, SAMPLED, AIRY, AREA, AIRY_AREA = range(6)
+LOW, HIGH, SAMPLED, UNOCCLUDED, AREA, UNOCCLUDED_AREA = range(6)
 
 
 @kernel
@@ -50,16 +50,16 @@ def find_over_air(
                 _lay(seen, faces[f], counts[LOW, places[f]], counts[HIGH, places[f]], lowest)
         for f in range(count):
             if facing[f] < 0.0:
-                sampled, airy = _sample(seen, faces[f], lowest, 1e-3 * cell)
+                sampled, unoccluded = _sample(seen, faces[f], lowest, 1e-3 * cell)
                 counts[SAMPLED, places[f]] += sampled
-                counts[AIRY, places[f]] += airy
+                counts[UNOCCLUDED, places[f]] += unoccluded
         for f in range(count):
             if facing[f] < 0.0 and counts[SAMPLED, places[f]] < FEW_SAMPLES:
                 counts[AREA, places[f]] += surface.areas_mm2[f]
-                counts[AIRY_AREA, places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
+                counts[UNOCCLUDED_AREA, places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
         for f in range(count):
             p = places[f]
-            part, of = (AIRY_AREA, AREA) if counts[SAMPLED, p] < FEW_SAMPLES else (AIRY, SAMPLED)
+            part, of = (UNOCCLUDED_AREA, AREA) if counts[SAMPLED, p] < FEW_SAMPLES else (UNOCCLUDED, SAMPLED)
             out[row, f] = int(counts[part, p] > MOST * counts[of, p])
 
 
@@ -76,7 +76,7 @@ def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Floats) -> No
 
 
 @no_nrt
-def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
+def _is_unoccluded(lowest: Floats, x: float, y: float, z: float) -> bool:
     """Whether no upward-facing surface in the cell of a point lies below it."""
     return bool(lowest[int(y) * (CELLS + 2) + int(x)] > z)
 
@@ -84,7 +84,7 @@ def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
 @no_nrt
 def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> tuple[int, int]:
     """The number of raster samples on a face, and of those over air."""
-    a, b, c, sampled, airy = face[0], face[1], face[2], 0, 0
+    a, b, c, sampled, unoccluded = face[0], face[1], face[2], 0, 0
     ux, uy, uz = seen[b, 0] - seen[a, 0], seen[b, 1] - seen[a, 1], seen[b, 2] - seen[a, 2]
     vx, vy, vz = seen[c, 0] - seen[a, 0], seen[c, 1] - seen[a, 1], seen[c, 2] - seen[a, 2]
     twice = ux * vy - uy * vx
@@ -104,22 +104,22 @@ def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> tuple[
                 x = (i + ASIDE) * RASTER
                 z = seen[a, 2] + slope_x * (x - seen[a, 0]) + slope_y * (y - seen[a, 1])
                 sampled += 1
-                airy += int(_is_airy(lowest, x, y, z - slack_mm))
-    return sampled, airy
+                unoccluded += int(_is_unoccluded(lowest, x, y, z - slack_mm))
+    return sampled, unoccluded
 
 
 @no_nrt
 def _share_over_air(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> float:
     """Share of a small face over air, from its centre and points near its corners."""
-    airy = 0
+    unoccluded = 0
     for k in range(4):
         x, y, z = 0.0, 0.0, 0.0
         for corner in range(3):
             share = (1.0 if k == 3 else (2.0 if k == corner else 0.5)) / 3.0
             v = face[corner]
             x, y, z = x + share * seen[v, 0], y + share * seen[v, 1], z + share * seen[v, 2]
-        airy += int(_is_airy(lowest, x, y, z - slack_mm))
-    return 0.25 * airy
+        unoccluded += int(_is_unoccluded(lowest, x, y, z - slack_mm))
+    return 0.25 * unoccluded
 
 
 @helper

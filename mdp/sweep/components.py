@@ -21,7 +21,7 @@ from mdp.kernels.arrays import floats, int_table, ints, table
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.sweep.crossing import OffsetGrid, column_over
 from mdp.sweep.facets import UNKNOWN, Layout
 from mdp.sweep.rays import ANY_FACE, first_hit
@@ -177,7 +177,7 @@ def _stands_on(tree: MergeTree, v: int) -> bool:
     layout = tree.layout
     for at in range(layout.starts[v], layout.starts[v + 1]):
         w = layout.neighbours[at]
-        if layout.triangles.vertices[w, 2] <= PLATFORM_TOLERANCE_MM and before(tree.grid.heights, w, v, False):
+        if layout.triangles.vertices[w, 2] <= PLATE_TOLERANCE_MM and before(tree.grid.heights, w, v, False):
             return True
     return False
 

@@ -20,7 +20,7 @@ from mdp.kernels.kernel import helper, kernel, no_nrt
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import step_share
 from mdp.plane import Plane
-from mdp.sweep.facets import Indices, Layout, Scars, class_along
+from mdp.sweep.facets import Blemishes, Indices, Layout, class_along
 
 THIRD = 1.0 / 3.0
 COT_30 = 3.0**0.5
@@ -221,12 +221,12 @@ def _add_volumes(weights: Floats, ramps: Floats, shares: Floats, sums: Floats) -
 
 
 @no_nrt
-def _kind_of(scars: Scars, row: int, f: int, cosine: float) -> int:
+def _kind_of(blemishes: Blemishes, row: int, f: int, cosine: float) -> int:
     """Kind of a face by its support need: 0: none, 1: only when printed upright, 2: only along the direction, 3: both; 4 and 5:
     as 2 and 3, but unsupportable along the direction; 6 and 7: as 3 and 5, but no cut can save it.
     """
-    kind = int(scars.faces.risky[f]) + 2 * class_along(scars, row, f) * int(cosine < scars.risky_below)
-    if len(scars.unavoidable) > 0 and scars.unavoidable[f]:
+    kind = int(blemishes.faces.risky[f]) + 2 * class_along(blemishes, row, f) * int(cosine < blemishes.risky_below)
+    if len(blemishes.unavoidable) > 0 and blemishes.unavoidable[f]:
         kind = 6 if kind == 3 else 7 if kind == 5 else kind
     return kind
 
@@ -242,11 +242,11 @@ def _share(ahead: int, ramps: Floats, shares: Floats) -> None:
 
 
 @helper
-def integrate_scars(scars: Scars, row: int, grid: OffsetGrid) -> Floats:
+def integrate_blemishes(blemishes: Blemishes, row: int, grid: OffsetGrid) -> Floats:
     """(n + AHEAD + 1, KINDS + 3) sums of the faces above each offset (rows from n are unused): area by kind, see _kind_of,
     stair-stepping printed straight up and along the direction, and the weighted rim at the offset times the step.
     """
-    faces, n = scars.faces, grid.columns
+    faces, n = blemishes.faces, grid.columns
     corners, normals = faces.corners, faces.normals
     wholes, sums, block = table(n + 1, KINDS + 3), table(n + AHEAD + 1, KINDS + 3), table(6 + 2 * AHEAD, BLOCK)
     for begin in range(0, corners.shape[1], BLOCK):
@@ -256,7 +256,7 @@ def integrate_scars(scars: Scars, row: int, grid: OffsetGrid) -> Floats:
         arrays.dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], grid.direction, cosines)
         for ahead in range(AHEAD):
             _share(ahead, ramps, shares[2 * ahead : 2 * ahead + 2])
-        _add_scars(scars, (row, begin), block, wholes, sums)
+        _add_blemishes(blemishes, (row, begin), block, wholes, sums)
     for column in range(n - 1, -1, -1):
         for which in range(KINDS + 3):
             sums[column, which] += wholes[column + 1, which]
@@ -265,17 +265,17 @@ def integrate_scars(scars: Scars, row: int, grid: OffsetGrid) -> Floats:
 
 
 @no_nrt
-def _add_scars(scars: Scars, place: tuple[int, int], block: Floats, wholes: Floats, sums: Floats) -> None:
+def _add_blemishes(blemishes: Blemishes, place: tuple[int, int], block: Floats, wholes: Floats, sums: Floats) -> None:
     """Add a block of faces to the sums of the columns. place: row of the direction, first face of the block."""
-    faces, (row, begin) = scars.faces, place
+    faces, (row, begin) = blemishes.faces, place
     seams, stairs = len(faces.seam_weights) > 0, len(faces.seam_weights) > 0 and len(faces.stair_weights) > 0
     for f in range(begin, min(begin + BLOCK, faces.corners.shape[1])):
         k = f - begin
         ramp, cosine = (block[0, k], block[1, k], block[2, k], block[3, k], block[4, k]), block[5, k]
-        kind, first, end = _kind_of(scars, row, f, cosine), column_over(ramp[0]), column_over(ramp[2])
+        kind, first, end = _kind_of(blemishes, row, f, cosine), column_over(ramp[0]), column_over(ramp[2])
         counted, upright, leaning, chord = faces.areas_mm2[f] * faces.counts[f], 0.0, 0.0, 0.0
         if seams:
-            chord = 2.0 * faces.areas_mm2[f] * faces.seam_weights[f] * weigh_chord(cosine, scars.feather)
+            chord = 2.0 * faces.areas_mm2[f] * faces.seam_weights[f] * weigh_chord(cosine, blemishes.feather)
         if stairs:
             stair = faces.areas_mm2[f] * faces.stair_weights[f]
             upright, leaning = stair * step_share(faces.normals[2, f]), stair * step_share(cosine)

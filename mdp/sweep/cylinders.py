@@ -126,7 +126,7 @@ def find_cylinders(mesh: Mesh) -> tuple[Cylinder, ...]:
     """The cylinders of a closed mesh, ordered by first face."""
     neighbours = opposites(mesh.faces).reshape(-1, 3) // 3
     strips, folds = _folds(mesh, neighbours)
-    label = connected_components(len(folds.radius_mm), *_alike(folds))
+    label = connected_components(len(folds.radius_mm), *_matching_folds(folds))
     order = np.argsort(label, kind="stable")
     rows = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     fitted = (_fit(mesh, strips, folds, row) for row in rows if len(row) >= FEWEST)
@@ -201,7 +201,7 @@ def _widths_mm(mesh: Mesh, strips: Indices, face: Indices, along: Floats) -> Flo
     return widths
 
 
-def _alike(folds: _Folds) -> tuple[Indices, Indices]:
+def _matching_folds(folds: _Folds) -> tuple[Indices, Indices]:
     """Pairs of edges that belong to one cylinder: of one strip, parallel, with equal radius."""
     strip, fold = folds.strips.ravel(), np.repeat(np.arange(len(folds.strips)), 2)
     order = np.argsort(strip, kind="stable")

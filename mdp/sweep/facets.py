@@ -14,7 +14,7 @@ from mdp.kernels.arrays import flags, ints, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints, Mesh, crosses_of
-from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
+from mdp.overhang import PLATE_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
 from mdp.sweep.rays import TriangleTree, triangle_tree
 
@@ -57,7 +57,7 @@ class FaceTable(NamedTuple):
         return FaceTable(self.points, *columns)
 
 
-class Scars(NamedTuple):
+class Blemishes(NamedTuple):
     """Blemishes of a solid along each of (k, 3) directions: its faces, the cosine of normal and direction below which a face is
     risky, the support classes of the model's faces (k, n), the weight of area over air, the extra weight of a rim on a feather
     edge, and the faces that no cut can save (m,), (0,) if not requested.
@@ -73,17 +73,17 @@ class Scars(NamedTuple):
 
 
 @no_nrt
-def class_along(scars: Scars, row: int, f: int) -> int:
+def class_along(blemishes: Blemishes, row: int, f: int) -> int:
     """Support class of a face that is risky along a direction."""
-    source = scars.faces.sources[f]
-    return int(scars.classes[row, source]) if source >= 0 else NEEDS_SUPPORT
+    source = blemishes.faces.sources[f]
+    return int(blemishes.classes[row, source]) if source >= 0 else NEEDS_SUPPORT
 
 
 @no_nrt
-def times_along(scars: Scars, row: int, f: int) -> float:
+def times_along(blemishes: Blemishes, row: int, f: int) -> float:
     """Weight of the area of a face that is risky along a direction."""
-    needed = class_along(scars, row, f)
-    return scars.weight if needed == UNSUPPORTABLE else 1.0 if needed == NEEDS_SUPPORT else 0.0
+    needed = class_along(blemishes, row, f)
+    return blemishes.weight if needed == UNSUPPORTABLE else 1.0 if needed == NEEDS_SUPPORT else 0.0
 
 
 class Layout(NamedTuple):
@@ -151,7 +151,7 @@ class Facets:
             vertex_normals=np.ascontiguousarray(normals.T),
             flatness=flatness,
             sharp=np.flatnonzero(flatness[mesh.faces] <= cosine).astype(np.int32),
-            standing=np.flatnonzero(z <= PLATFORM_TOLERANCE_MM).astype(np.int32),
+            standing=np.flatnonzero(z <= PLATE_TOLERANCE_MM).astype(np.int32),
             anchors=np.full(len(mesh.vertices), UNKNOWN, np.int32),
         )
 

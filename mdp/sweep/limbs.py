@@ -18,7 +18,7 @@ from mdp.plane import Plane, normals_and_offsets
 from mdp.sweep.components import LEAST_CONTACT_AREA_MM2, before
 from mdp.sweep.crossing import find_heights
 from mdp.sweep.cylinders import Cylinder, crossed_by
-from mdp.sweep.facets import Layout, Scars
+from mdp.sweep.facets import Blemishes, Layout
 from mdp.sweep.pieces import (
     AREAS,
     MOMENT,
@@ -37,7 +37,7 @@ from mdp.sweep.pieces import (
     value,
     volume,
 )
-from mdp.sweep.sweep import Remainder, scars_of
+from mdp.sweep.sweep import Remainder, blemishes_of
 from mdp.topology.components import root
 
 MOST_JOINED = 6  # limbs that one plane cuts off together
@@ -88,7 +88,7 @@ def find_limbs(remainder: Remainder, grid: LimbGrid, risky_below: float) -> Limb
     count = len(grid.directions)
     column, keys = np.zeros((count, MOST_ROWS), np.int32), np.full((count, MOST_ROWS), np.inf)
     tops = np.full((count, MOST_ROWS, MOST_JOINED), NONE, np.int32)
-    surface = scars_of(remainder, grid.directions, risky_below), remainder.layout
+    surface = blemishes_of(remainder, grid.directions, risky_below), remainder.layout
     in_threads(_find_limbs, count, surface, grid, (column, keys, tops))
     direction, place = np.nonzero(np.isfinite(keys))
     order = np.lexsort((place, direction, keys[direction, place]))
@@ -122,7 +122,7 @@ def sum_limbs(remainder: Remainder, planes: Sequence[Plane], risky_below: float,
     fragment_mm may have any contact area.
     """
     sums = np.zeros((len(planes), ALONE + 1))
-    surface = scars_of(remainder, normals_and_offsets(planes)[0], risky_below), remainder.layout
+    surface = blemishes_of(remainder, normals_and_offsets(planes)[0], risky_below), remainder.layout
     in_threads(_sum_limbs, len(planes), surface, _pointed(planes, fragment_mm), sums)
     crossed = [crossed_by(cylinders_cut(remainder, remainder.cylinders, plane), plane) for plane in planes]
     columns: list[Any] = [*sums.T[:EXISTS], sums[:, EXISTS] > 0.0, sums[:, ALONE] > 0.0, np.array(crossed)]
@@ -145,8 +145,8 @@ def limb_vertices(remainder: Remainder, plane: Plane) -> Mask:
     if plane.limbs_mm is None:
         marked: Mask = plane.heights_mm(remainder.facets.mesh.vertices) > 0.0
     else:
-        scars = scars_of(remainder, plane.normal[None], 0.0)
-        marked = _mark_limbs(scars, remainder.layout, _pointed([plane], 0.0))
+        blemishes = blemishes_of(remainder, plane.normal[None], 0.0)
+        marked = _mark_limbs(blemishes, remainder.layout, _pointed([plane], 0.0))
     marked.setflags(write=False)
     return marked
 
@@ -288,10 +288,10 @@ def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: L
 
 
 @kernel
-def _find_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], grid: LimbGrid, out: LimbRows) -> None:
+def _find_limbs(begin_row: int, end_row: int, surface: tuple[Blemishes, Layout], grid: LimbGrid, out: LimbRows) -> None:
     """Fill the candidates of a range of directions."""
-    scars, layout = surface
-    pieces, tops, step_mm = make_pieces(scars, layout), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE)), grid.step_mm
+    blemishes, layout = surface
+    pieces, tops, step_mm = make_pieces(blemishes, layout), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE)), grid.step_mm
     for row in range(begin_row, end_row):
         first, n = find_heights(layout.faces.points, grid.directions[row], step_mm, pieces.heights)
         if n == 0 or not np.isfinite(grid.least_height_mm[row]):
@@ -306,7 +306,7 @@ def _find_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], gri
 
 
 @kernel
-def _sum_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], planes: PointedPlanes, out: Floats) -> None:
+def _sum_limbs(begin_row: int, end_row: int, surface: tuple[Blemishes, Layout], planes: PointedPlanes, out: Floats) -> None:
     """Fill the rows of a range of planes with the SUMS over their limbs and the further columns of LimbSums."""
     pieces = make_pieces(surface[0], surface[1])
     for row in range(begin_row, end_row):
@@ -326,9 +326,9 @@ def _sum_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], plan
 
 
 @kernel
-def _mark_limbs(scars: Scars, layout: Layout, planes: PointedPlanes) -> Mask:
+def _mark_limbs(blemishes: Blemishes, layout: Layout, planes: PointedPlanes) -> Mask:
     """(n,) vertices of the limbs of one plane."""
-    pieces = make_pieces(scars, layout)
+    pieces = make_pieces(blemishes, layout)
     marked, chosen = flags(len(pieces.heights)), _find_chosen(pieces, 0, planes, np.inf)
     for v in range(len(marked)):
         if pieces.parent[v] >= 0:
@@ -343,7 +343,7 @@ def _find_chosen(pieces: Pieces, row: int, planes: PointedPlanes, farthest_mm2: 
     """The pieces selected by the points of a plane, descended to its offset; empty if a point has no piece within the given
     squared distance.
     """
-    d, points, heights = pieces.scars.directions[row], pieces.layout.faces.points, pieces.heights
+    d, points, heights = pieces.blemishes.directions[row], pieces.layout.faces.points, pieces.heights
     offsets_mm, limb_points, _ = planes
     dot(points[0], points[1], points[2], d, heights)
     for v in range(len(heights)):

@@ -17,7 +17,7 @@ from mdp.mesh import Floats, Indices, Ints
 from mdp.overhang import step_share
 from mdp.sweep.components import anchor_of, before
 from mdp.sweep.crossing import Ramp, chord_at, column_over, moment_above, ramp_of, share_above, weigh_chord
-from mdp.sweep.facets import Layout, Scars, times_along
+from mdp.sweep.facets import Blemishes, Layout, times_along
 from mdp.topology.components import root
 
 NONE = -1
@@ -37,7 +37,7 @@ class Pieces(NamedTuple):
     plane; counts (2,): of live and active.
     """
 
-    scars: Scars
+    blemishes: Blemishes
     layout: Layout
     heights: Floats
     cosines: Floats
@@ -53,19 +53,19 @@ class Pieces(NamedTuple):
 
 
 @helper
-def make_pieces(scars: Scars, layout: Layout) -> Pieces:
+def make_pieces(blemishes: Blemishes, layout: Layout) -> Pieces:
     """Empty arrays for the pieces of a solid."""
     size, faces = layout.faces.points.shape[1], layout.faces.corners.shape[1]
     heights, cosines, parent, top, low = floats(size, 0.0), floats(size, 0.0), ints(size, NONE), ints(size, 0), table(size, 2)
     weights, whole, crossing = table(faces, len(SUMS)), table(size, len(SUMS)), table(size, len(SUMS))
     live, active, counts = ints(size, 0), ints(faces, 0), ints(2, 0)
-    return Pieces(scars, layout, heights, cosines, parent, weights, whole, crossing, top, low, live, active, counts)
+    return Pieces(blemishes, layout, heights, cosines, parent, weights, whole, crossing, top, low, live, active, counts)
 
 
 @helper
 def begin(pieces: Pieces, row: int, columns: int) -> Order:
     """Sort vertices and faces along a direction of the scars, with the plane above all of them. pieces.heights must be set."""
-    normals, corners, d = pieces.layout.vertex_normals, pieces.layout.faces.corners, pieces.scars.directions[row]
+    normals, corners, d = pieces.layout.vertex_normals, pieces.layout.faces.corners, pieces.blemishes.directions[row]
     over, face_over = ints(len(pieces.heights), 0), ints(corners.shape[1], 0)
     for v in range(len(over)):
         over[v] = min(column_over(pieces.heights[v]), columns)
@@ -74,7 +74,7 @@ def begin(pieces: Pieces, row: int, columns: int) -> Order:
     for f in range(len(face_over)):
         face_over[f] = max(over[corners[0, f]], over[corners[1, f]], over[corners[2, f]])
     pieces.counts[0] = pieces.counts[1] = 0
-    _weigh_faces(pieces.scars, row, d, pieces.weights)
+    _weigh_faces(pieces.blemishes, row, d, pieces.weights)
     return counting_sort(over, columns + 1), counting_sort(face_over, columns + 1)
 
 
@@ -152,18 +152,18 @@ def _enter(pieces: Pieces, vertices: Indices) -> None:
 
 
 @helper
-def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
+def _weigh_faces(blemishes: Blemishes, row: int, d: Floats, weights: Floats) -> None:
     """Contribution of each face, when it lies wholly above, to the SUMS of its piece; without MOMENT; RIM is a weight."""
-    faces = scars.faces
+    faces = blemishes.faces
     normals, areas = faces.normals, faces.areas_mm2
     for f in range(len(areas)):
         cosine, counted = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2], areas[f] * faces.counts[f]
         weights[f, UP] = counted if faces.risky[f] else 0.0
-        weights[f, RESIDUAL] = counted * times_along(scars, row, f) if cosine < scars.risky_below else 0.0
+        weights[f, RESIDUAL] = counted * times_along(blemishes, row, f) if cosine < blemishes.risky_below else 0.0
         weights[f, SECTION] = areas[f] * cosine
         weights[f, STAIRS_UP], weights[f, STAIRS], weights[f, RIM] = 0.0, 0.0, 0.0
         if len(faces.seam_weights) > 0:
-            weights[f, RIM] = 2.0 * areas[f] * faces.seam_weights[f] * weigh_chord(cosine, scars.feather)
+            weights[f, RIM] = 2.0 * areas[f] * faces.seam_weights[f] * weigh_chord(cosine, blemishes.feather)
         if len(faces.stair_weights) > 0:
             weights[f, STAIRS_UP] = areas[f] * faces.stair_weights[f] * step_share(normals[2, f])
             weights[f, STAIRS] = areas[f] * faces.stair_weights[f] * step_share(cosine)

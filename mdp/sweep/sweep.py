@@ -41,9 +41,18 @@ from mdp.plane import Plane
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import Classes
 from mdp.sweep.components import count_pieces, find_contact_areas, find_critical, plant_tree
-from mdp.sweep.crossing import RIM, STAIRS, STAIRS_UP, OffsetGrid, find_heights, find_lowest, integrate_scars, integrate_volume
+from mdp.sweep.crossing import (
+    RIM,
+    STAIRS,
+    STAIRS_UP,
+    OffsetGrid,
+    find_heights,
+    find_lowest,
+    integrate_blemishes,
+    integrate_volume,
+)
 from mdp.sweep.cylinders import Cylinder, crossings
-from mdp.sweep.facets import FaceTable, Facets, Layout, Scars
+from mdp.sweep.facets import Blemishes, FaceTable, Facets, Layout
 from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
 
 
@@ -191,18 +200,18 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     shape = (len(directions), remainder.most_columns(step_mm))
     columns = np.zeros((2, shape[0]), np.int32)
     swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(7)))
-    scars = scars_of(remainder, directions, risky_below, unavoidable)
-    in_threads(_gains, shape[0], scars, step_mm, swept)
+    blemishes = blemishes_of(remainder, directions, risky_below, unavoidable)
+    in_threads(_gains, shape[0], blemishes, step_mm, swept)
     if remainder.cylinders:
         swept.crossed[:] = crossings(remainder.cylinders, directions, swept.offsets_mm(step_mm))
     return swept
 
 
-def scars_of(remainder: Remainder, directions: Floats, risky_below: float, unavoidable: Mask | None = None) -> Scars:
+def blemishes_of(remainder: Remainder, directions: Floats, risky_below: float, unavoidable: Mask | None = None) -> Blemishes:
     """The blemishes of a solid along some directions. risky_below, unavoidable: see gains."""
     lost, faces = np.zeros(0, np.bool_) if unavoidable is None else unavoidable, remainder.facets.faces
     directions, classes = np.ascontiguousarray(directions), remainder.classes(directions)
-    return Scars(directions, faces, risky_below, classes, remainder.weight, remainder.feather, lost)
+    return Blemishes(directions, faces, risky_below, classes, remainder.weight, remainder.feather, lost)
 
 
 def sweep(
@@ -229,19 +238,19 @@ def sweep(
 
 
 @kernel
-def _gains(begin_row: int, end_row: int, scars: Scars, step_mm: float, out: Gains) -> None:
-    heights = floats(scars.faces.points.shape[1], 0.0)
+def _gains(begin_row: int, end_row: int, blemishes: Blemishes, step_mm: float, out: Gains) -> None:
+    heights = floats(blemishes.faces.points.shape[1], 0.0)
     for row in range(begin_row, end_row):
-        first, n = find_heights(scars.faces.points, scars.directions[row], step_mm, heights)
+        first, n = find_heights(blemishes.faces.points, blemishes.directions[row], step_mm, heights)
         out.first[row], out.columns[row] = first, n
         if n > 0:
-            above = integrate_scars(scars, row, OffsetGrid(scars.directions[row], heights, n, step_mm))
+            above = integrate_blemishes(blemishes, row, OffsetGrid(blemishes.directions[row], heights, n, step_mm))
             for k in range(n):
                 sums = above[k]  # by kind of face, see crossing
                 airy_both = sums[5] + sums[7]
                 both = sums[3] + sums[6]
                 out.up_mm2[row, k] = sums[1] + both + airy_both
-                out.residual_mm2[row, k] = sums[2] + both + scars.weight * (sums[4] + airy_both)
+                out.residual_mm2[row, k] = sums[2] + both + blemishes.weight * (sums[4] + airy_both)
                 out.unavoidable_mm2[row, k] = sums[6] + sums[7]
                 out.stairs_up_mm2[row, k], out.stairs_mm2[row, k] = sums[STAIRS_UP], sums[STAIRS]
                 out.rim_mm[row, k] = sums[RIM] / step_mm

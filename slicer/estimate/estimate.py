@@ -38,7 +38,7 @@ from slicer.strokes.order import SUPPORTS
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import NO_LIMITS, rear_of
 from slicer.strokes.speed import SPEED_KEYS
-from slicer.support.handed_down import plan_supports, up_to
+from slicer.support.from_earlier_part import plan_supports, up_to
 from slicer.support.support import Supports, own_supports, wanted_places
 
 SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced; the error for 44 prints is then 2 % (rms)
@@ -95,7 +95,7 @@ def _of_part(supports: Supports, overhangs: Sequence[Overhang], samples: int) ->
     factor = float(counts @ real[1:, 2]) / known if known > 0.0 else 1.0
     support = float(real[0, 2] + factor * support_mm3[1:].sum())
     total: Floats = np.array([time_s, (own + support) / filament_mm2, support])
-    if sections.on_platform:
+    if sections.on_plate:
         total = total + _line_before(profile, filament_mm2) + _raft(supports, filament_mm2)
     else:
         heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
@@ -139,7 +139,7 @@ def _sliced_layers(shells: Shells, layers: Indices) -> Floats:
         beads, _ = place_seams([*own, *auxiliary], sections.process, around)
         strokes, speeds, flow = order_layer([*beads, *shells.layers[layer].ending], shells, layer, tip, Polygons())
         if len(strokes):
-            height_mm, first = float(sections.heights.height_mm[layer]), layer == 0 and sections.on_platform
+            height_mm, first = float(sections.heights.height_mm[layer]), layer == 0 and sections.on_plate
             mm3 = strokes.lengths_mm * bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
             time_s = strokes_s(strokes, speeds, tip, sections.profile, first)
             row[:] = time_s, mm3.sum(), mm3[strokes.is_of(*SUPPORTS)].sum()
@@ -242,7 +242,7 @@ def support_lengths_mm(supports: Supports) -> Floats:
     area, around, close, filled = np.array(extents).T
     spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
     walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
-    if sections.on_platform:
+    if sections.on_plate:
         density[0] = process.support_foot_density
     inside = np.maximum(area - walls_mm * spacing, 0.0)
     dense = np.minimum(close, inside)
@@ -258,7 +258,7 @@ def rough_lengths_mm(sections: Sections) -> Floats:
     mesh, process = sections.mesh, sections.process
     (top, bottom), width = shell_layers(process), process.line_width_mm
     area, around, over, under = _measure(mesh.vertices, mesh.faces, sections.heights.cut_mm)
-    if not sections.on_platform:
+    if not sections.on_plate:
         under[0] = 0.0
     seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
     bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]

@@ -197,7 +197,7 @@ class BasePlane:
 
 def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:
     """Plastic just below the base plane; None on the build plate. Without earlier parts it is assumed to fill the section."""
-    if part.on_platform:
+    if part.on_plate:
         return None
     return sections_of(earlier, part, np.array([-BELOW_MM]))[0] if earlier else section
 
@@ -216,7 +216,7 @@ def joints(part: Part, later: Sequence[Part], section: Polygons, below: Polygons
     return np.concatenate(segments) if segments else np.zeros((0, 6))
 
 
-def skin_beside(edges: Floats, section: Polygons, z_mm: float, process: Process) -> Polygons:
+def visible_wall_beside(edges: Floats, section: Polygons, z_mm: float, process: Process) -> Polygons:
     """Visible wall beside joints: the outer walls of a section near the edges of interfaces, (n, 6) segments in space, where
     marks of a travel or wipe would show.
     """
@@ -243,7 +243,7 @@ def plan_pins(parts: Sequence[Part], profile: Profile) -> Pins:
 
     profile: of the whole print; the settings of the part that fills a pin apply.
     """
-    wanted = [part.index for part in parts if not part.on_platform and profile.of_part(part.index).process.interlock == "pins"]
+    wanted = [part.index for part in parts if not part.on_plate and profile.of_part(part.index).process.interlock == "pins"]
     planned: dict[int, Floats] = {}
     for part in parts if wanted else ():
         planned[part.index] = _pins_of(part, parts, planned, profile) if part.index in wanted else np.zeros((0, 3))

@@ -54,7 +54,7 @@ def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Be
     """The support, pedestal, skirt and brim of a layer. process: of the layer."""
     sections = supports.sections
     outline, height_mm = sections.outlines[layer], float(sections.heights.height_mm[layer])
-    on_plate = layer == 0 and sections.on_platform
+    on_plate = layer == 0 and sections.on_plate
     if on_plate and sections.on_raft:
         return []  # beside the first layer lies the raft (slicer.raft)
     support_process = with_line_width(process, process.support_line_width_mm)
@@ -185,7 +185,7 @@ def beads_around(sections: Sections, footprint: Polygons, base: Polygons, proces
     footprint: the layer's whole area; base: the area on which the print stands. A base that would tip over gets a brim of
     process.small_base_brim_mm around it only, since around support it would hold nothing.
     """
-    own = (sections.part, *takewhile(lambda part: not part.on_platform, sections.later))  # until the next model begins
+    own = (sections.part, *takewhile(lambda part: not part.on_plate, sections.later))  # until the next model begins
     top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in own)
     spacing, beads = spacing_mm(process.line_width_mm, height_mm), list[Bead]()
     holds_base = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and tips_over(base, top_mm)

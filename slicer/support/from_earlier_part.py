@@ -4,8 +4,8 @@ parts.
 Every point over the build plate lies above the base plane of some part and below those of all later ones (that of a limb counts
 only beside the limb): there is exactly one part with which support can be printed there. So support that a part misses is planned
 in three passes: upward, where support of each part may stand if that of the parts before it may; downward, from the last part to
-the first, the support itself, whose feet on a base plane become patches for the parts before (HandedDown); and upward again, to
-keep only the support that stands on printed support.
+the first, the support itself, whose feet on a base plane become patches for the parts before (EarlierSupport); and upward again,
+to keep only the support that stands on printed support.
 """
 
 from collections.abc import Sequence
@@ -74,19 +74,19 @@ def upper_side(areas: Sequence[Polygons], plane: BasePlane, window: Polygons, de
 
 
 @dataclass(frozen=True, eq=False)
-class HandedDown:
+class EarlierSupport:
     """Support that is printed with a part for later parts.
 
     sections: up to the highest layer that such support needs; window: area of the base plane available to it within the axes'
-    reach; areas: the reachable areas inside its box; shut: blocked area of the first layer; far_mm: greatest distance of support
-    from the frame's origin. bodies, contacts: one area per layer, all grown support and its beginnings; patches: its feet that
-    need support below the base plane. All three are empty until support has grown.
+    reach; areas: the reachable areas inside its box; blocked: blocked area of the first layer; far_mm: greatest distance of
+    support from the frame's origin. bodies, contacts: one area per layer, all grown support and its beginnings; patches: its feet
+    that need support below the base plane. All three are empty until support has grown.
     """
 
     sections: Sections
     window: Polygons
     areas: ReachableAreas
-    shut: Polygons
+    blocked: Polygons
     far_mm: float
     bodies: Sequence[Polygons] = ()
     contacts: Sequence[Polygons] = ()
@@ -102,13 +102,15 @@ def plan_supports(own: Sequence[Supports]) -> list[Supports]:
     planned = list(own)
     if all(supports.unsupported_mm2 == 0.0 for supports in own[1:]):
         return planned
-    handed: dict[int, HandedDown] = {}  # by position of the part in print order
+    earlier_support: dict[int, EarlierSupport] = {}  # by position of the part in print order
     for k, (box, top_mm) in _extents(own).items():
-        handed[k] = _room(up_to(own[k].sections, top_mm), box, top_mm, list(handed.values()))
-    for k in sorted(handed, reverse=True):
-        handed[k] = _hand_down(handed[k], own[k].missed, [handed[m] for m in sorted(handed) if m > k])
-    for k in sorted(handed):
-        planned[k] = _stand(handed[k], own[k], planned[:k])
+        earlier_support[k] = _room(up_to(own[k].sections, top_mm), box, top_mm, list(earlier_support.values()))
+    for k in sorted(earlier_support, reverse=True):
+        earlier_support[k] = _plan_from_above(
+            earlier_support[k], own[k].missed, [earlier_support[m] for m in sorted(earlier_support) if m > k]
+        )
+    for k in sorted(earlier_support):
+        planned[k] = _stand(earlier_support[k], own[k], planned[:k])
     return planned
 
 
@@ -169,7 +171,7 @@ def up_to(sections: Sections, top_mm: float) -> Sections:
     )
 
 
-def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[HandedDown]) -> HandedDown:
+def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[EarlierSupport]) -> EarlierSupport:
     """Possible areas for support of a part, given those of earlier parts."""
     machine, (moved_x, moved_y, _) = sections.profile.machine, shift(sections.profile.machine, sections.part.pose)
     (left, right), (front, back) = machine.x.limits_mm, machine.y.limits_mm
@@ -178,7 +180,7 @@ def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[Ha
     x0, y0, x1, y1 = box.bounds()
     far_mm = max(support_reach_mm(sections), 2.0 * hypot(max(abs(x0), abs(x1)), max(abs(y0), abs(y1))) + AROUND_MM)
     blocked = blocked_areas(sections, count, 0.0, far_mm)
-    if not sections.on_platform:
+    if not sections.on_plate:
         blocked = unite_layers(blocked, near_table(sections, sections.heights[:count], far_mm))
     outside = offset(box, AROUND_MM) - window
     blocked = [union([layer, outside]) for layer in blocked] if outside.area() > 4.0 * AROUND_MM**2 else blocked
@@ -189,10 +191,10 @@ def _room(sections: Sections, box: Polygons, top_mm: float, earlier: Sequence[Ha
         plate=sections.plate ^ window,
     )
     reached = [upper_side(room.areas.reachable, room.plane_of(sections), window, SHALLOW_MM) for room in earlier]
-    return HandedDown(sections, window, reachable_areas(near, blocked, union(reached)), blocked[0], far_mm)
+    return EarlierSupport(sections, window, reachable_areas(near, blocked, union(reached)), blocked[0], far_mm)
 
 
-def _hand_down(room: HandedDown, missed: Sequence[Polygons], later: Sequence[HandedDown]) -> HandedDown:
+def _plan_from_above(room: EarlierSupport, missed: Sequence[Polygons], later: Sequence[EarlierSupport]) -> EarlierSupport:
     """The support that a part's own support misses, and that later parts need."""
     sections, areas = room.sections, room.areas
     planes = [room.plane_of(upper.sections) for upper in later]
@@ -201,13 +203,13 @@ def _hand_down(room: HandedDown, missed: Sequence[Polygons], later: Sequence[Han
         for patch in upper.patches:
             for layer, area in patch.begins(plane, len(areas.reachable)).items():
                 begins.setdefault(layer, []).append(area)
-    wanted = [Polygons()] * len(missed) if sections.on_platform else missed
+    wanted = [Polygons()] * len(missed) if sections.on_plate else missed
     begin = {layer: union(places) for layer, places in begins.items()}
     bodies, contacts = grow(wanted, begin, areas, union([seen_from_above(wanted), *begin.values()]))
     for plane, upper in zip(planes, later, strict=True):
         bodies = keep_off(bodies, upper.patches, plane, sections.process.support_distance_mm)
     patches = [Patch(area, gap_mm) for _, area, gap_mm in _hanging_low(areas, wanted)]
-    if bodies and not sections.on_platform:
+    if bodies and not sections.on_plate:
         patches.append(Patch(bodies[0] - _own_placeable(room), 0.0))
     large = [patch for patch in patches if patch.places.area() >= LEAST_MM2]
     return replace(room, bodies=bodies, contacts=contacts, patches=large)
@@ -221,26 +223,26 @@ def _hanging_low(areas: ReachableAreas, wanted: Sequence[Polygons]) -> list[tupl
     return [(k, area, max(gap_mm - max(float(bottom_mm[k]), 0.0), 0.0)) for k, area in hanging]
 
 
-def _own_placeable(room: HandedDown) -> Polygons:
+def _own_placeable(room: EarlierSupport) -> Polygons:
     """Area in which support stands on plastic without a gap."""
     process, below = room.areas.process, room.sections.plastic_below
     return Polygons() if below is None or process.support_bottom_gap_mm > 0.0 else offset(below, process.line_width_mm)
 
 
-def _stand(room: HandedDown, own: Supports, earlier: Sequence[Supports]) -> Supports:
+def _stand(room: EarlierSupport, own: Supports, earlier: Sequence[Supports]) -> Supports:
     """A part's support united with the standing support for later parts. earlier: support of the parts printed before it."""
     sections, areas, process = room.sections, room.areas, room.areas.process
     whole = replace(areas, sections=sections)
-    if not sections.on_platform:
+    if not sections.on_plate:
         held = offset(_held(room, earlier, 0.0), 0.5 * areas.radius_mm)
         areas = replace(areas, placeable=(union([held, _own_placeable(room)]), *areas.placeable[1:]))
     count = len(sections.outlines)
     printed, dense = (_padded(places, count) for places in stand(room.bodies, room.contacts, areas))
     wanted, missed, unwanted = (_padded(places, count) for places in (own.wanted, own.missed, own.unwanted))
     both = unite_layers(printed, _padded(own.areas, count))
-    if sections.on_platform and not sections.on_raft:
-        both[0] = union([both[0], widen_foot(printed, whole, (room.window ^ sections.plate) - room.shut)])
-    if not sections.on_platform:
+    if sections.on_plate and not sections.on_raft:
+        both[0] = union([both[0], widen_foot(printed, whole, (room.window ^ sections.plate) - room.blocked)])
+    if not sections.on_plate:
         low = _hanging_low(areas, missed)
         missed = find_missed(missed, both, whole)
         for layer, _, gap_mm in low:
@@ -254,7 +256,7 @@ def _padded(places: Sequence[Polygons], count: int) -> list[Polygons]:
     return [*places, *[Polygons()] * (count - len(places))]
 
 
-def _held(room: HandedDown, earlier: Sequence[Supports], gap_mm: float) -> Polygons:
+def _held(room: EarlierSupport, earlier: Sequence[Supports], gap_mm: float) -> Polygons:
     """The area on a part's base plane that is held by support of earlier parts gap_mm below it."""
     held = []
     for supports in earlier:

@@ -13,7 +13,7 @@ from math import radians, tan
 
 import numpy as np
 
-from mdp.clearance import Standing, highest_in_cells, least_tip_height_mm, subdivide
+from mdp.clearance import StandingColumns, highest_in_cells, least_tip_height_mm, subdivide
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.overhang import Mask
@@ -48,15 +48,15 @@ class ReachableAreas:
     """Possible areas for support of a part, for each of the lowest layers that may need it.
 
     lean_mm: greatest lean of a layer of support beyond the layer below, mm. placeable: ground below the layer on which a branch
-    may end, which is solid area grown by BEYOND of the radius. reachable: area for centres of branches. shut: for a limb, area in
-    which the head cannot print support.
+    may end, which is solid area grown by BEYOND of the radius. reachable: area for centres of branches. blocked: for a limb, area
+    in which the head cannot print support.
     """
 
     sections: Sections
     lean_mm: Floats
     placeable: tuple[Polygons, ...]
     reachable: tuple[Polygons, ...]
-    shut: Sequence[Polygons] = ()
+    blocked: Sequence[Polygons] = ()
 
     @property
     def process(self) -> Process:
@@ -138,12 +138,12 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
         if handed is not None and m == 0:
             stands.append(handed)
         placeable.append(union(stands))
-        start = offset(sections.plate, -radius) if m == 0 and sections.on_platform else placeable[m]
+        start = offset(sections.plate, -radius) if m == 0 and sections.on_plate else placeable[m]
         if m and not reachable[-1].is_empty():
             start = dilate(reachable[-1], (1.0 - SPARE) * float(lean_mm[m])) + start
         reachable.append((start - obstacles).simplify(FINE_MM))
     is_limb = sections.part.base.limbs_mm is not None
-    return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable), shut=blocked if is_limb else ())
+    return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable), blocked=blocked if is_limb else ())
 
 
 def support_reach_mm(sections: Sections) -> float:
@@ -265,7 +265,7 @@ def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], 
     return reaches
 
 
-def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_mm: float) -> Standing:
+def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_mm: float) -> StandingColumns:
     """The columns of earlier parts above a limb's base plane. cell_mm: the grid on which they will be queried."""
     points = [np.zeros((0, 3))]
     for part in earlier:
@@ -276,7 +276,7 @@ def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_
     tops = np.concatenate(points)
     tops = highest_in_cells(tops[tops[:, 2] > LOW_MM], cell_mm)
     # Half the diagonal of either cell, and the distance from the centre of such a triangle to its corners.
-    return Standing.of(tops, 2.6 * cell_mm, machine)
+    return StandingColumns.of(tops, 2.6 * cell_mm, machine)
 
 
 def _rectangles(met: Mask, x0: float, middle_mm: float, cell_mm: float) -> list[Polygons]:

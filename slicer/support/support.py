@@ -85,7 +85,7 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
         missed = find_missed(wanted, printed, areas)
         if all(area.is_empty() for area in missed):
             break
-    if sections.on_platform and not sections.on_raft:
+    if sections.on_plate and not sections.on_raft:
         printed[0] = widen_foot(printed, areas, sections.plate - blocked[0])
     hollow, rest = hollow_places(printed, dense, process), nothing[len(printed) :]
     return Supports(sections, [*printed, *rest], [*dense, *rest], [*hollow, *rest], wanted, missed, unwanted)
@@ -247,7 +247,7 @@ def _blocked_area(root: Polygons, areas: ReachableAreas, m: int) -> Polygons:
     window = bounding_box(root, distance_mm + 1.0)
     beside = offset((outlines[m] ^ window).simplify(COARSE_MM), distance_mm + COARSE_MM)
     near = [*outlines[areas.next_below(m) : m], *outlines[m + 1 : areas.next_above(m)]]
-    return union([beside, *(outline ^ window for outline in near), *areas.shut[m : m + 1]])
+    return union([beside, *(outline ^ window for outline in near), *areas.blocked[m : m + 1]])
 
 
 def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
@@ -257,7 +257,7 @@ def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Po
     printed: list[Polygons] = []
     for m, body in enumerate(bodies):
         rest = body - dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else body
-        if (m or not areas.sections.on_platform) and not drop_slivers(rest).is_empty():
+        if (m or not areas.sections.on_plate) and not drop_slivers(rest).is_empty():
             placeable = areas.placeable[m] ^ bounding_box(rest, areas.radius_mm)
             # Discs extend beyond placeable areas, but none stands beside one alone.
             alone = [piece for piece in islands(rest) if drop_slivers(piece ^ placeable).is_empty()]
@@ -332,7 +332,7 @@ def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: 
             around = (held + outlines[k - 1]) ^ bounding_box(bare, 2.0 * distance_mm + 1.0)
             bare = bare - closing(around, 0.5 * distance_mm + RIM_MM)
         lowest = float(heights.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
-        if k and lowest <= SAME_MM and areas.sections.on_platform:
+        if k and lowest <= SAME_MM and areas.sections.on_plate:
             continue
         near = list(outlines[int(np.searchsorted(heights.tip_mm, lowest - SAME_MM)) : k - 1]) if k else []
         if k and below is not None and first_mm > heights.bottom_mm[k] - process.support_gap_mm + SAME_MM:
@@ -394,7 +394,7 @@ def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
     process, heights, least_mm2 = sections.support_process, sections.heights, MOST * hanging.area()
     drop = float(heights.bottom_mm[layer]) - process.support_gap_mm
     top = max(int(np.searchsorted(heights.tip_mm, drop + SAME_MM, side="right")) - 1, 0)
-    if sections.on_platform and (hanging - offset(sections.plate, -process.line_width_mm)).area() >= least_mm2:
+    if sections.on_plate and (hanging - offset(sections.plate, -process.line_width_mm)).area() >= least_mm2:
         return "it lies beyond the edge of the plate"
     under, far_mm = heights[top : top + 1], support_reach_mm(sections)
     for upper in sections.later:
@@ -422,10 +422,10 @@ def _part_at_table(hanging: Polygons, z_mm: float, sections: Sections) -> int | 
     middle = 0.5 * (np.array(hanging.bounds()[:2]) + hanging.bounds()[2:])
     base_mm, machine = sections.part.base.offset_mm, sections.profile.machine
     below, under = (np.append(middle, base_mm + z) @ sections.part.rotation for z in (z_mm, 0.0))
-    if not sections.on_platform and below[2] < least_tip_height_mm(machine, sections.part.pose):
+    if not sections.on_plate and below[2] < least_tip_height_mm(machine, sections.part.pose):
         return sections.part.index
     earlier = [part for part in reversed(sections.earlier) if part.base.limbs_mm is None]
     lower = next((part for part in earlier if part.base.heights_mm(under[None])[0] > 0.0), None)
-    if lower is None or lower.on_platform or under[2] >= least_tip_height_mm(machine, lower.pose):
+    if lower is None or lower.on_plate or under[2] >= least_tip_height_mm(machine, lower.pose):
         return None
     return lower.index

@@ -88,7 +88,7 @@ def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
         if not kept:
             break
         walls += kept
-    middle = lines_along(skeleton, rule, piece_of) + _dots(skeleton, rule, piece_of)
+    middle = lines_along(skeleton, rule, piece_of) + _point_segments(skeleton, rule, piece_of)
     borders = {piece: index_edges(pieces[piece]) for piece in {wall.piece for wall in middle if wall.level == 0}}
     middle = [wall if wall.level else _clipped(wall, borders[wall.piece], rule) for wall in middle]
     walls += [replace(wall, course=wall.course[corners(wall.course)]) for wall in middle if len(wall.course) > 1]
@@ -331,23 +331,23 @@ def _along(line: Floats, level: int, closed: bool, rule: Rule, piece: int) -> Wa
     else:
         course[[0, -1], :2] = line[[0, -1], :2]
         if level == 0 and length_mm(course) < DOT * course[:, 2].max():
-            return _dash(course[0, :2], course[-1, :2], float(course[:, 2].mean()), rule, piece)
+            return _short_segment(course[0, :2], course[-1, :2], float(course[:, 2].mean()), rule, piece)
     return Wall(course, level, closed, 2 * int(level == 0), piece)
 
 
-def _dots(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]:
+def _point_segments(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]:
     """Short segments for round regions with room for a single bead."""
     dashes, last = list[Wall](), np.full(2, np.inf)
     nodes = np.flatnonzero(skeleton.dots)
     for t in nodes[np.argsort(piece_of[nodes], kind="stable")].tolist():
         centre, radius = skeleton.centres[t], float(skeleton.radii[t])
         if float(np.hypot(*(centre - last))) > radius:
-            dashes.append(_dash(centre, centre, 2.0 * radius, rule, int(piece_of[t])))
+            dashes.append(_short_segment(centre, centre, 2.0 * radius, rule, int(piece_of[t])))
         last = centre
     return dashes
 
 
-def _dash(begin: Floats, end: Floats, width: float, rule: Rule, piece: int) -> Wall:
+def _short_segment(begin: Floats, end: Floats, width: float, rule: Rule, piece: int) -> Wall:
     """Replace a point bead by a short segment of the same volume, as much thinner as it is longer."""
     thinner = max((1.0 - DASH) * width, rule.least)
     step = end - begin

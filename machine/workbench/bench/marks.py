@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.values import Command, Point, Rotation, check_number
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import set_on_plate
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
 from mdp.search.plan_file import ZONE_KINDS
@@ -110,7 +110,7 @@ def _with(zones: Zones, kind: str, several: tuple[AnyZone, ...]) -> Zones:
 def workpiece_mesh(bench: Bench) -> Mesh:
     """The model as it stands on the platform or a pedestal, in the workpiece frame."""
     assert bench.model is not None
-    standing = standing_still(bench.model.mesh(), bench.turned)
+    standing = set_on_plate(bench.model.mesh(), bench.turned)
     lift_mm = bench.profile.search.pedestal_mm
     return standing.transform(np.eye(3), (0.0, 0.0, lift_mm)) if lift_mm > 0.0 else standing
 

@@ -23,7 +23,7 @@ from machine.view.scene import solids, surfaces
 from machine.workbench.bench.bench import Bench, locked_plan, plan_of_bench
 from machine.workbench.work.folders import work_of
 from mdp.decomposition import Decomposition, FrontRow, Part
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import set_on_plate
 from mdp.joint import is_sound, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
@@ -190,7 +190,7 @@ def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
     """The mesh as it is cut, turned as the plan says or else as the bench does."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
-    return standing_still(bench.model.mesh(), turned)
+    return set_on_plate(bench.model.mesh(), turned)
 
 
 def _name(bench: Bench) -> str:

@@ -11,7 +11,7 @@ import pytest
 from mdp.mesh import Floats
 from mdp.ranking.features import CHECKED, COLUMNS, features
 from mdp.ranking.ranker import LearnedRanker, ranker_named, shipped
-from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, shortlist
+from mdp.ranking.ranking import PER_TRADE_OFF, SHORTLIST_TRADE_OFFS, RankedCandidate, rank_classic, shortlist
 from mdp.search.beam import Beam, search_as_published
 from mdp.search.problem import Problem
 from mdp.search.search import SearchRequest, decompose
@@ -61,7 +61,7 @@ def test_a_shortlist_holds_feasible_candidates_once_few_of_a_kind_and_none_that_
     problem = _problem(shape="ball")
     table = problem.table(problem.root, described=True)
     listed = list(shortlist([table], np.inf))
-    assert len({each.row for each in listed}) == len(listed) <= len(LISTED) * EACH
+    assert len({each.row for each in listed}) == len(listed) <= len(SHORTLIST_TRADE_OFFS) * PER_TRADE_OFF
     assert all(table.feasible(each.row) for each in listed)
     residual = sorted(float(table.scored.residual_mm2[each.row]) for each in listed)
     assert len(list(shortlist([table], residual[0]))) == 0
