@@ -1,7 +1,7 @@
 """Errors that the user can fix; each class below UserError is raised by one package, and machine/cli/cli.py prints them.
 
-UserError                         message (one sentence: thing, value, what is allowed) and exit 1; raised itself where nobody
-                                  catches such an error separately
+UserError                         message (one sentence: thing, value, what is allowed) and exit 1; raised itself where such an
+                                  error is not caught separately
   ProfileError                    profiles: all problems of a file or of the --set options at once
   MeshError                       mdp: unreadable, empty, open, flat: what and where
   PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why

@@ -70,7 +70,7 @@ class CradleBox(Frozen):
 
 
 class Head(Frozen):
-    """What must not touch the table: a silhouette revolved about the nozzle, and boxes."""
+    """Bodies that must not touch the table: a silhouette revolved about the nozzle, and boxes."""
 
     nozzle_mm: float = simple("Nozzle diameter", "size", gt=0.05, le=3)(..., "diameter of the nozzle's bore, mm")
     silhouette_mm: list[tuple[float, float]] = advanced(

@@ -174,7 +174,7 @@ class Finish(Frozen):
 
 
 class Infill(Frozen):
-    """What fills the inside."""
+    """Pattern and density of the infill."""
 
     infill_density: float = simple("Infill density", "fill density sparse percent", ge=0, le=1)(
         0.2, "share of the inside that is filled"

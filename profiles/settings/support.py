@@ -52,7 +52,7 @@ class Support(Frozen):
         "ground, sturdier under heavy flat places",
     )
     support_on_part: bool = simple("Support may stand on the part", "supports on build plate only everywhere")(
-        True, "false: support stands on the platform or on the part's base only, so that it scars no surface"
+        True, "false: support stands on the build plate or on the part's base only, so that it leaves no marks"
     )
     support_branch_angle_deg: float = advanced("Support lean at most", "tree support branch angle supports", ge=0, le=60)(
         40.0,
@@ -101,13 +101,13 @@ class Support(Frozen):
     )
     support_foot_mm: float = rare("Wider foot on the plate", "supports first layer expansion", ge=0, le=20)(
         2.0,
-        "support is wider by up to this in its first layer on the platform, to stick better; no wider than twice its own height, "
-        "mm",
+        "support is wider by up to this in its first layer on the build plate, to stick better; no wider than twice its own "
+        "height, mm",
     )
     support_foot_density: float = rare("Density of the foot", "supports first layer density", gt=0, le=1)(
         0.85,
-        "share of the support's first layer on the platform that is filled; from 0.85 on its lines lie so near each other that "
-        "whatever stands on it has plastic under it",
+        "share of the support's first layer on the build plate that is filled; at 0.85 or more its lines are so close together "
+        "that everything on it has plastic beneath",
     )
     support_least_mm2: float = advanced(
         "Smallest place that is supported", "supports minimum area remove small overhangs", ge=0, le=1000, effect=Effect.FRONT
