@@ -52,7 +52,7 @@ def _outline(solid: m3.Manifold, height_mm: float) -> m3.CrossSection:
     feet = solid.slice(height_mm)
     loops = feet.to_polygons()
     if not loops:
-        raise MeshError("the model cannot be put on a pedestal: it has no section just above the platform")
+        raise MeshError("the model cannot be put on a pedestal: it has no section just above the build plate")
     if len(feet.decompose()) > 1:
         feet = feet.hull()
     corners = np.concatenate(loops)

@@ -1,4 +1,4 @@
-"""Cost: what a person pays for a decomposition, in mm2 of blemished surface.
+"""Cost: the price of a decomposition in mm2 of blemished surface.
 
 Support blemishes the surface that it touches. Every cut leaves a seam along its rim, as wide as search.seam_mm on a model of 100
 mm, narrower where it is hidden. Faces neither level nor parallel to their part's direction show stair-stepping. The paper's J is

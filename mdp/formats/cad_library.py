@@ -1,7 +1,7 @@
 """CAD library: OpenCASCADE (cascadio, the extra `step`) in a separate process, since some damaged files crash it.
 
 The process belongs to this process's session, so whatever ends the session ends it too: the library holds Python's lock while it
-works, so the process could not notice that nobody waits for it any more.
+works, so the process could not notice that its caller is gone.
 """
 
 import signal

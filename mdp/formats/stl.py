@@ -61,7 +61,7 @@ def _ascii(path: Path, text: bytes) -> Surface:
 
 
 def _first_bad_facet(text: bytes) -> str:
-    """What is wrong with the first bad facet; empty if there is none."""
+    """The error of the first bad facet; empty if there is none."""
     starts = [match.start() for match in FACET_START.finditer(text)]
     for number, (start, end) in enumerate(zip(starts, [*starts[1:], len(text)], strict=True), 1):
         if SOUND_FACET.match(text, start, end) and len(VERTEX.findall(text, start, end)) == 3:

@@ -34,7 +34,7 @@ class Surface:
 
 
 def text_lines(path: Path, continued: str = "") -> list[str]:
-    """The lines of a text file with any line endings; a line that ends with `continued` goes on in the next. Bytes map to
+    """The lines of a text file with any line endings; a line that ends with `continued` continues in the next. Bytes map to
     themselves: 0x85, a line end for str.splitlines, may be an ellipsis or half a letter in a comment.
     """
     text = path.read_text("latin-1")

@@ -61,7 +61,7 @@ def _choose() -> None:
     except RuntimeError:  # a kind of processor unknown to LLVM
         return
     named = {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"} & os.environ.keys()
-    in_use = "_toplevel_target_context" in vars(cpu_target)  # somebody else has kernels in this process
+    in_use = "_toplevel_target_context" in vars(cpu_target)  # other code has kernels in this process
     if not named and not in_use and all(known.get(name) for name in INSTRUCTIONS):
         # numba reads the variables again when one of them changes
         os.environ.update(NUMBA_CPU_NAME=COMMON, NUMBA_CPU_FEATURES="")
@@ -69,7 +69,7 @@ def _choose() -> None:
 
 
 _choose()
-# What machine code depends on, besides its sources.
+# Everything that machine code depends on besides its sources.
 TARGET = " ".join(
     [
         f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')} numba {numba.__version__} llvmlite {llvmlite.__version__}",

@@ -1,7 +1,7 @@
 """Kernel decorators: how a kernel and its helpers are compiled; numba's defaults cost seconds in the first run.
 
 A kernel is called from Python and cached on disk. Helpers are called by kernels only, so they need no entry point for Python and
-no cache on disk. numba compiles every allocation anew, and every function anew for each literal argument: so arrays come from
+no cache on disk. numba compiles every allocation again, and every function again for each literal argument: so arrays come from
 mdp.kernels.arrays, flags from variables. Its sorts, searches and row assignments compile library code, which takes a second or
 more for the first of each: so numbers are moved one by one and sorted by mdp.kernels.sorting. More than six arguments are grouped
 in a NamedTuple.

@@ -73,7 +73,7 @@ def parallel_map(
 
 @contextmanager
 def _numbers(count: int) -> Iterator[int]:
-    """A pipe with the numbers of the runs: whoever reads a number does that run."""
+    """A pipe with the numbers of the runs: the process that reads a number does that run."""
     numbers, end = os.pipe()
     os.write(end, b"".join(k.to_bytes(NUMBER, "big") for k in range(count)))
     os.close(end)

@@ -2,7 +2,7 @@
 
 Messages are pickles preceded by their length. While it works, a worker can report progress; then it answers with the call's
 return value or error message. It leads a session of its own: Ctrl-C at the terminal does not reach it, and one signal ends it
-with all that it has started. It ends by itself when no process can call it any more, or when it has been idle too long.
+with all that it has started. It ends by itself when no process can call it, or when it has been idle too long.
 
 multiprocessing, concurrent.futures and pebble have no such worker: theirs run the main module of this process again, stay in its
 session, report no progress, and continue their work when this process is killed.

@@ -47,8 +47,8 @@ class Reason(IntEnum):
 
 
 REASONS = {
-    Reason.PLATFORM: "the plane would cut the platform (criterion III)",
-    Reason.FLOATING: "what remains would not stand on the platform (criterion II)",
+    Reason.PLATFORM: "the plane would cut the build plate (criterion III)",
+    Reason.FLOATING: "the remainder would not stand on the build plate (criterion II)",
     Reason.REACH: "the axes do not reach the direction",
     Reason.CLEARANCE: "the head would meet the table",
     Reason.VOLUME: "the part would be too small (search.least_volume_share)",

@@ -107,7 +107,7 @@ class CandidateTable:
                 order = _sort_more(cost, int(enough.sum()), order)
             reason = self.reason[order[at : at + SORTED_FIRST]]
             possible = np.flatnonzero((reason == FEASIBLE) | (reason == UNKNOWN))
-            if len(possible) == 0:  # true of most rows, so many are skipped at a time
+            if len(possible) == 0:  # usual for most rows: a whole block is skipped at a time
                 at += len(reason)
                 continue
             at += int(possible[0])

@@ -252,7 +252,7 @@ def _find_violation(problem: Problem, node: Node, plane: Plane) -> Rejection | N
 
 
 def _limits(problem: Problem, directions: Floats) -> Bounds:
-    """The bounds of (k, 3) directions, without preferences that are no physical limits."""
+    """The bounds of (k, 3) directions, without preferences that are not physical limits."""
     return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
 
 

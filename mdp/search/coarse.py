@@ -51,7 +51,7 @@ def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones, on_phase: Callable[[
 def cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) -> Decomposition | None:
     """Cut a problem's mesh, from the start node of its search, by the planes chosen for its coarse copy, or by neighbouring
     planes where bumps missing in the copy make them infeasible; then refine the planes on the mesh itself. None if there are no
-    such planes. The row of the start node is measured anew as well.
+    such planes. The row of the start node is measured again as well.
     """
     began, rows, start = perf_counter(), list(copy.front), problem.start
     place = next(place for place, row in enumerate(rows) if row.chosen)

@@ -13,7 +13,7 @@ from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.topology.edges import LinkedFaces
 
-ANCHOR_MM = 1.0  # a ridge that goes down less than this is no anchor: it is an overhang itself
+ANCHOR_MM = 1.0  # a ridge that goes down less than this is not an anchor but an overhang
 ROUNDING_MM = 1e-6  # tolerance on the depth of a descent, and on the height of minima
 ANCHORED, LOOSE = 0, -1  # verdicts on a descent; a positive verdict is the number of the patch that it ends on
 SAFE = 0  # number of faces that belong to no patch

@@ -55,7 +55,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
 
 @helper
 def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
-    """Extent of the sides across lines at an angle: of all sides, and of those that are no anchors."""
+    """Extent of the sides across lines at an angle: of all sides, and of those that are not anchors."""
     ends, whole, loose = sides.ends, 0.0, 0.0
     for e in range(len(ends)):
         reach = abs((ends[e, 3] - ends[e, 1]) * cos - (ends[e, 2] - ends[e, 0]) * sin)

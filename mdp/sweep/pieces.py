@@ -64,7 +64,8 @@ def make_pieces(blemishes: Blemishes, layout: Layout) -> Pieces:
 
 @helper
 def begin(pieces: Pieces, row: int, columns: int) -> Order:
-    """Sort vertices and faces along a direction of the scars, with the plane above all of them. pieces.heights must be set."""
+    """Sort vertices and faces along a direction of the blemishes, with the plane above all of them. pieces.heights must be
+    set."""
     normals, corners, d = pieces.layout.vertex_normals, pieces.layout.faces.corners, pieces.blemishes.directions[row]
     over, face_over = ints(len(pieces.heights), 0), ints(corners.shape[1], 0)
     for v in range(len(over)):

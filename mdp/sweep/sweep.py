@@ -278,7 +278,7 @@ def _sweep(
             dot(normals[0], normals[1], normals[2], directions[row], cosines)
             find_slivers(layout, grid, cosines, out.fragile_mm[row])
             critical = scratch[: find_critical(layout, heights, cosines, scratch)]
-            # The direction of growth is no literal, otherwise these functions would be compiled once for each value.
+            # The direction of growth is not a literal, otherwise these functions would be compiled once for each value.
             count_pieces(plant_tree(layout, grid, cosines, critical, n < 0), pieces[row])
             wanted = ints(n, 0)
             for column in range(n):

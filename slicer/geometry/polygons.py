@@ -54,9 +54,9 @@ def offset_round(polygons: Polygons, distance_mm: float, segments: int = ARC_SEG
 def _moved(polygons: Polygons, distance_mm: float, corners: JoinType, mitre: float, segments: int) -> Polygons:
     """The offset, with a workaround for polygons that Clipper2 takes to be inside out.
 
-    It tells outside from inside by the contour that reaches farthest along y (ClipperOffset, GetLowestClosedPathInfo); if that is
-    a hole that touches its outer contour there, or a speck whose sign was lost by rounding, the result is empty. A square beyond
-    it avoids that.
+    It distinguishes outside and inside by the contour that reaches farthest along y (ClipperOffset, GetLowestClosedPathInfo); if
+    that is a hole that touches its outer contour there, or a speck whose sign was lost by rounding, the result is empty. A square
+    beyond it avoids that.
     """
     area_mm2, (x0, y0, x1, y1) = polygons.area(), polygons.bounds()
     has_room = area_mm2 >= pi * distance_mm**2 and min(x1 - x0, y1 - y0) >= -2.0 * distance_mm  # for a disc, on the way inward

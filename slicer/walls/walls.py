@@ -35,7 +35,7 @@ LEAST_TOP = 3.0  # line widths: narrower tops keep their walls, as in OrcaSlicer
 ROUNDS = 50  # greatest number of beads around a gap, counted like walls
 SPREAD = 0.25  # share by which the spacing of points of fuzzy walls varies
 FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays smooth
-SHORTEST = 0.25  # of the line width: shorter pieces are no beads
+SHORTEST = 0.25  # of the line width: shorter pieces are not beads
 FEW = 0.6  # of the line width squared: a smaller gap beside the lines stays open, since it is not worth the travel
 MOST_WIDER = 1.3  # greatest factor on a bead's width to compensate for the tips of its gap that it does not reach
 
@@ -45,7 +45,7 @@ class Walls:
     """Walls of a section. loops[k]: centrelines of wall k from outside; varying: walls of varying width.
 
     inside: the area inside the walls, bounded half a spacing inside the innermost centreline; narrow: its parts beside walls of
-    one width that are narrower than two lines, where fill lines would only go to and fro.
+    one width that are narrower than two lines, where fill lines would only go back and forth.
     """
 
     loops: tuple[tuple[Floats, ...], ...]

@@ -37,8 +37,8 @@ PAIRS = [
         "the dry run found 1 error, the first: X (tick Go on all the same to print it nevertheless)",
     ),
     (
-        "what remains would not stand on the platform (criterion II)",
-        "what remains would not stand on the platform",
+        "the remainder would not stand on the build plate (criterion II)",
+        "the remainder would not stand on the build plate",
     ),
     ("a sliver 3.8e-07 mm thin: 0.3 mm is the least", "a sliver less than 0.001 mm thin: 0.3 mm is the least"),
     ("machine.tilt.limits_deg is [5, 3]", "Tilt axis: Range is [5, 3]"),

@@ -155,7 +155,7 @@ def test_planes_in_an_impossible_order_are_refused() -> None:
 
 def test_a_plane_that_cuts_the_platform_is_refused() -> None:
     sentence = _refusal(shapes.box(), (LEANING, 2.0))
-    assert "part 2 cannot be cut off: the plane would cut the platform (criterion III)" in sentence
+    assert "part 2 cannot be cut off: the plane would cut the build plate (criterion III)" in sentence
     assert "offset_mm must be at least 8.5" in sentence  # 0.6 times 10 sqrt 2
 
 
@@ -163,7 +163,7 @@ def test_a_plane_that_lets_something_float_is_refused() -> None:
     post, beam = m3.Manifold.cube((8, 8, 40)), m3.Manifold.cube((60, 8, 8)).translate((-52, 0, 32))
     gallows = shapes.standing(post + beam + m3.Manifold.cube((8, 8, 32)).translate((-52, 0, 4)))
     sentence = _refusal(gallows, (LEANING, 22.0), profile=_profile(FREE))
-    assert "part 2 cannot be cut off: what remains would not stand on the platform (criterion II)" in sentence
+    assert "part 2 cannot be cut off: the remainder would not stand on the build plate (criterion II)" in sentence
 
 
 def test_a_direction_out_of_reach_is_refused() -> None:
