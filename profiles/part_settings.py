@@ -7,7 +7,7 @@ from pydantic import Field
 
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
-from profiles.problems import not_of_mended, table_problems, unfit_for_nozzle
+from profiles.problems import table_problems, unfit_for_nozzle, without_replaced
 from profiles.process import Process
 from profiles.settings.support import Plate, Support
 from profiles.toml_text import read_value
@@ -159,6 +159,6 @@ def problems_of_place(process: Process, own: dict[str, Any], nozzle_mm: float) -
 
 def _value_problems(process: Process, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
     table = process.model_dump()
-    problems, checked, mended = table_problems(Process, "process.", table | own, table)
+    problems, checked, replaced = table_problems(Process, "process.", table | own, table)
     yield from problems
-    yield from not_of_mended(unfit_for_nozzle(checked, nozzle_mm), mended)
+    yield from without_replaced(unfit_for_nozzle(checked, nozzle_mm), replaced)

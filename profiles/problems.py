@@ -30,21 +30,21 @@ def table_problems(
     sound: the values of a valid profile.
     """
     given = deepcopy(table)
-    wrong, mended, value = _rounds(model, prefix, given, sound, KEY_BY_KEY)
+    wrong, replaced, value = _rounds(model, prefix, given, sound, KEY_BY_KEY)
     if value is not None:
         together, _, _ = _rounds(model, prefix, given, sound, None)
-        wrong += not_of_mended(together, mended)
-    return wrong, value, mended
+        wrong += without_replaced(together, replaced)
+    return wrong, value, replaced
 
 
-def not_of_mended(problems: Iterable[str], mended: frozenset[str]) -> list[str]:
-    """The problems that do not name a replaced value. mended: the keys whose values were replaced."""
-    return [sentence for sentence in problems if not _tells_of(sentence, mended)]
+def without_replaced(problems: Iterable[str], replaced: frozenset[str]) -> list[str]:
+    """The problems that do not name a replaced value. replaced: the keys whose values were replaced."""
+    return [sentence for sentence in problems if not _names_any(sentence, replaced)]
 
 
-def _tells_of(sentence: str, mended: frozenset[str]) -> bool:
+def _names_any(sentence: str, replaced: frozenset[str]) -> bool:
     named = [f".{word}." for word in sentence.replace(":", " ").split()]
-    return any(f".{key}." in word or word == f".{key.rpartition('.')[2]}." for word in named for key in mended)
+    return any(f".{key}." in word or word == f".{key.rpartition('.')[2]}." for word in named for key in replaced)
 
 
 def _rounds(
@@ -52,7 +52,7 @@ def _rounds(
 ) -> tuple[list[str], frozenset[str], Any]:
     """The problems, the keys replaced in the given table, and its valid model; None if it cannot be repaired."""
     problems: dict[str, None] = {}
-    mended: set[tuple[str, ...]] = set()
+    replaced: set[tuple[str, ...]] = set()
     value = None
     while value is None:
         try:
@@ -60,12 +60,12 @@ def _rounds(
         except ValidationError as error:
             problems |= dict.fromkeys(sentences(error.errors(), model, prefix))
             key_paths = {_key_path(problem) for problem in error.errors()}
-            if not isinstance(given, dict) or () in key_paths or key_paths <= mended:
+            if not isinstance(given, dict) or () in key_paths or key_paths <= replaced:
                 break
             for key_path in key_paths:
-                _mend(given, key_path, sound)
-            mended |= key_paths
-    return list(problems), frozenset(prefix + ".".join(key_path) for key_path in mended), value
+                _replace_value(given, key_path, sound)
+            replaced |= key_paths
+    return list(problems), frozenset(prefix + ".".join(key_path) for key_path in replaced), value
 
 
 def _key_path(problem: Any) -> tuple[str, ...]:
@@ -78,7 +78,7 @@ def _key_path(problem: Any) -> tuple[str, ...]:
     return tuple(path)
 
 
-def _mend(given: dict[str, Any], key_path: tuple[str, ...], sound: Mapping[str, Any]) -> None:
+def _replace_value(given: dict[str, Any], key_path: tuple[str, ...], sound: Mapping[str, Any]) -> None:
     """Replace a wrong value by the valid one, or remove it if there is none."""
     inner, value = given, sound
     for step in key_path[:-1]:

@@ -26,7 +26,7 @@ from profiles.places import (
     strangers,
     tables,
 )
-from profiles.problems import lifted_twice, not_of_mended, table_problems, too_hot, unfit_for_nozzle
+from profiles.problems import lifted_twice, table_problems, too_hot, unfit_for_nozzle, without_replaced
 from profiles.process import Process
 from profiles.search import Search
 from profiles.toml_text import read_value
@@ -80,8 +80,8 @@ def load(
         _apply(whole, setting)
     profile = _validated(whole)
     if profile.process.bridge_longest_mm is None:
-        asked = profile.process.model_copy(update={"bridge_longest_mm": profile.material.bridge_longest_mm})
-        profile = profile.model_copy(update={"process": asked})
+        with_bridges = profile.process.model_copy(update={"bridge_longest_mm": profile.material.bridge_longest_mm})
+        profile = profile.model_copy(update={"process": with_bridges})
     return profile
 
 
@@ -201,8 +201,8 @@ def _validated(whole: dict[str, Any]) -> Profile:
 def _all_problems(whole: dict[str, Any]) -> list[str]:
     """The problems of each table, and those between valid values of different tables."""
     sound = {name: table for kind, name_of_kind in DEFAULTS.items() for name, table in tables(kind, name_of_kind).items()}
-    problems, checked, mended = table_problems(Profile, "", whole, sound)
-    return problems if checked is None or mended & LIMITS else problems + not_of_mended(_of_several(checked), mended)
+    problems, checked, replaced = table_problems(Profile, "", whole, sound)
+    return problems if checked is None or replaced & LIMITS else problems + without_replaced(_of_several(checked), replaced)
 
 
 def _of_several(profile: Profile) -> list[str]:

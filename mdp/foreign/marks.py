@@ -37,7 +37,7 @@ MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
 SAME = 1e-6  # cosine of a right angle, and share of a box's volume that a solid inside may lack
 PLURAL = {"is": "are", "changes": "change"}
-MOST_TOLD = 8  # settings named in a sentence
+MOST_NAMED = 8  # settings named in a sentence
 THINNEST_MM = 0.001  # of a height range: a smaller difference is rounding of its file
 BESIDE_MM = 1.0  # margin around an object, more than its outlines can reach beyond its mesh
 
@@ -118,7 +118,7 @@ class Marks:
 
         process, left = settings_of_volume(self._settings, settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
-        values = [f"{name} = {settings[name]}" for name in left[:MOST_TOLD]] + ["..."] * (len(left) > MOST_TOLD)
+        values = [f"{name} = {settings[name]}" for name in left[:MOST_NAMED]] + ["..."] * (len(left) > MOST_NAMED)
         rest = f"; not taken: {', '.join(values)}" if left else ""
         self._tell(what, *(("is", f"taken as [[modifier]]: {taken}{rest}") if taken else ("changes", f"nothing here{rest}")))
         return process

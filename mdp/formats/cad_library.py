@@ -41,8 +41,8 @@ def to_glb(path: Path, content: bytes, kind: str) -> bytes:
 
 def answer() -> None:
     """Entry point of the library's process: read a file and answer with (scene, error message)."""
-    asked, answers = take_pipes()
-    content, kind = next(read_frames(asked))
+    requests, answers = take_pipes()
+    content, kind = next(read_frames(requests))
     answers.write(frame(_loaded(content, kind)))
     answers.flush()
 

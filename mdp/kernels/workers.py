@@ -178,11 +178,11 @@ class Worker(Interpreter):
 
 def take_pipes() -> tuple[BinaryIO, BinaryIO]:
     """This process's pipes from and to its caller; output printed by tasks does not reach them."""
-    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "r+b") as nowhere:
         os.dup2(nowhere.fileno(), 0)
         os.dup2(nowhere.fileno(), 1)
-    return asked, answers
+    return requests, answers
 
 
 _answers: list[BinaryIO] = []  # pipe to the caller, if this process is a worker
@@ -201,14 +201,14 @@ def _send(message: bytes) -> None:
 def serve(one_core: bool, idle_s: float) -> None:
     """In a worker: answer calls until no process can call it any more or the idle time is over."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C does
-    asked, answers = take_pipes()
+    requests, answers = take_pipes()
     _answers.append(answers)
     with suppress(OSError), open(OOM_SCORE[0], "w") as score:
         score.write(OOM_SCORE[1])
     if one_core:
         threads.use_threads(1)
     calls: SimpleQueue[bytes] = SimpleQueue()
-    threads.harmless(Thread(target=listen, args=(asked, calls.put, _end_all), daemon=True)).start()
+    threads.harmless(Thread(target=listen, args=(requests, calls.put, _end_all), daemon=True)).start()
     while True:
         try:
             call = calls.get(timeout=idle_s)

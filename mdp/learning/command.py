@@ -86,7 +86,7 @@ def commit() -> str:
     """The commit of this program, or its version if it is not a clone."""
     here = Path(__file__).resolve().parent
     try:
-        asked = subprocess.run(
+        output = subprocess.run(
             ["git", "-C", str(here), "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True, timeout=10
         )
     except (OSError, subprocess.SubprocessError):
@@ -94,4 +94,4 @@ def commit() -> str:
             return f"version {version('tiltprint')}"
         except PackageNotFoundError:
             return "unknown"
-    return asked.stdout.strip()
+    return output.stdout.strip()

@@ -41,7 +41,7 @@ MOST_READINGS = 5  # each pairs the edges again; the last reading of an unstable
 SECTIONS = 23  # an overlap missed by all of them is lower than a 24th of the height
 EXCESS = 1e-3  # of the area of all sections; smaller folds are left alone, since repairing them would re-triangulate the model
 DEEPEST, TOGETHER = 5, 8  # depth of halvings, and number of pieces united at once
-LEAST_MOST, MOST_GROWTH = 1000, 2  # faces that a union may have, and limit per face of its pieces
+UNION_FACES, UNION_GROWTH = 1000, 2  # faces that a union may have, and limit per face of its pieces
 SHARED = 0.5  # of the volume: a body that counts half of itself twice cannot be resolved
 
 
@@ -110,8 +110,8 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
     same = abs(taken_mm3 - enclosed_mm3) <= MOST_CHANGED * taken_mm3 and len(cleaned.faces) > 0
     if not same or np.abs(_bounds(cleaned) - box).max() > SHRINK * (box[1] - box[0]).max():
         raise MeshError(
-            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm3, a valid solid only "
-            f"{taken_mm3:.5g} mm3 of it; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
+            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm3, but the closest valid solid has "
+            f"{taken_mm3:.5g} mm3; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
         )
     percent = round(100 * (taken_mm3 / enclosed_mm3 - 1), 4) + 0.0
     changed = f"{taken_mm3:.6g} mm3 remain of {enclosed_mm3:.6g} mm3 ({percent:+g} %)"
@@ -121,14 +121,14 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
 
 def _count_once(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surface:
     """The solid with overlapping volume counted once; unchanged if the overlap cannot be resolved."""
-    mended = resolve_overlap(whole)
-    left = mended is None or any(_overlaps_itself(piece) for piece in mended.decompose())
-    shared_mm3 = 0.0 if mended is None else whole.volume() - mended.volume()
-    if mended is None or left or not 0 < shared_mm3 < SHARED * whole.volume():
+    resolved = resolve_overlap(whole)
+    left = resolved is None or any(_overlaps_itself(piece) for piece in resolved.decompose())
+    shared_mm3 = 0.0 if resolved is None else whole.volume() - resolved.volume()
+    if resolved is None or left or not 0 < shared_mm3 < SHARED * whole.volume():
         notes.append("left a self-intersecting body as it is: some of its volume may count twice")
         return solid
     notes.append(f"resolved a self-intersecting body: {shared_mm3:.3g} mm3 counted twice")
-    return surface_of(mended)
+    return surface_of(resolved)
 
 
 def _bounds(surface: Surface) -> Floats:
@@ -275,7 +275,7 @@ def _united(solid: "m3.Manifold", depth: int) -> "m3.Manifold | None":
             if resolved is None:
                 return None
             whole.append(resolved)
-    most = LEAST_MOST + MOST_GROWTH * sum(piece.num_tri() for piece in whole)
+    most = UNION_FACES + UNION_GROWTH * sum(piece.num_tri() for piece in whole)
     while len(whole) > 1:  # few at a time, so a union that intersects everywhere is detected before it fills the memory
         whole = [m3.Manifold.batch_boolean(whole[k : k + TOGETHER], m3.OpType.Add) for k in range(0, len(whole), TOGETHER)]
         if sum(piece.num_tri() for piece in whole) > most:

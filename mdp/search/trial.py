@@ -100,7 +100,7 @@ class Trials:
         beyond it stay unchecked.
         """
         order = planes[::-1]
-        self._keep_alike(order)
+        self._keep_common_cuts(order)
         known = len(self._keys)
         rejected = self._cut_off(order[known : int(min(known + most_cuts, len(order) - 1))])
         done = len(self._keys)
@@ -160,10 +160,10 @@ class Trials:
     def _cut_later(self, planes: Sequence[Plane], number: int) -> bool:
         """Cut off the parts printed after a given part; returns whether that is possible."""
         later = planes[number - 1 :][::-1]
-        self._keep_alike(later)
+        self._keep_common_cuts(later)
         return self._cut_off(later[len(self._keys) :]) is None
 
-    def _keep_alike(self, order: Sequence[Plane]) -> None:
+    def _keep_common_cuts(self, order: Sequence[Plane]) -> None:
         """Drop the cuts from the first one that differs from these planes."""
         alike = 0
         while alike < min(len(order), len(self._keys)) and self._keys[alike] == _key(order[alike]):

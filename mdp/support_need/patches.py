@@ -302,10 +302,10 @@ def _look_down(under: Underside, f: int, corner: int, share: float) -> int:
 
 
 @helper
-def _is_held(under: Underside, asked: int) -> bool:
+def _is_held(under: Underside, start: int) -> bool:
     """Whether a patch has an anchor somewhere, or rests on a patch that has one."""
-    if under.held[asked] == UNKNOWN:
-        under.waiting[0], under.held[asked] = asked, UNHELD
+    if under.held[start] == UNKNOWN:
+        under.waiting[0], under.held[start] = start, UNHELD
         at, count, held = 0, 1, False
         while at < count and not held:
             patch = under.waiting[at]
@@ -324,5 +324,5 @@ def _is_held(under: Underside, asked: int) -> bool:
             at += 1
         for k in range(count if held else 0):  # the others stay unknown, since none of their visits was completed
             under.held[under.waiting[k]] = UNKNOWN
-        under.held[asked] = HELD if held else UNHELD
-    return bool(under.held[asked] == HELD)
+        under.held[start] = HELD if held else UNHELD
+    return bool(under.held[start] == HELD)

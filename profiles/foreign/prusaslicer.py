@@ -101,13 +101,13 @@ def _sections(lines: list[str]) -> Presets:
     return presets
 
 
-def _chosen(presets: Presets, kind: str, asked: str) -> str:
+def _chosen(presets: Presets, kind: str, wanted: str) -> str:
     """The preset of a kind that was requested, that is active in the bundle, or that is its only one."""
     names = [name for name in presets[kind] if not name.startswith("*")]
-    if asked:
-        if asked not in presets[kind]:
-            raise ProfileError(f"{KINDS[kind]} preset {asked!r}: the file has no such one; {_preset_names(names, asked)}")
-        return asked
+    if wanted:
+        if wanted not in presets[kind]:
+            raise ProfileError(f"{KINDS[kind]} preset {wanted!r}: the file has no such one; {_preset_names(names, wanted)}")
+        return wanted
     active = presets["presets"].get("", {}).get(kind, "").split(";")[0].strip()
     if active in presets[kind]:
         return active
@@ -116,9 +116,9 @@ def _chosen(presets: Presets, kind: str, asked: str) -> str:
     return names[0] if len(names) == 1 else ""
 
 
-def _preset_names(names: list[str], asked: str) -> str:
+def _preset_names(names: list[str], wanted: str) -> str:
     """A few of the names, those that share a word with the requested one first."""
-    words = [word for word in re.split(r"\W+", asked.lower()) if word]
+    words = [word for word in re.split(r"\W+", wanted.lower()) if word]
     near = sorted(names, key=lambda name: -sum(word in name.lower() for word in words))
     return f"among them {', '.join(repr(name) for name in near[:SHOWN])}" if names else "it has none of this kind"
 

@@ -115,13 +115,13 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
 
     areas: the sparse areas of all layers of a part. One figure for all layers, otherwise lines would not stack.
     """
-    asked = process.infill_density
+    wanted = process.infill_density
     filled = [i for i, area in enumerate(areas) if not area.is_empty()]
-    if not filled or asked <= 0:
-        return asked
+    if not filled or wanted <= 0:
+        return wanted
     chosen = sorted({filled[(2 * k + 1) * len(filled) // (2 * SAMPLES)] for k in range(SAMPLES)})
     spacing = spacing_mm(process.line_width_mm, height_mm)
-    drawn = asked
+    drawn = wanted
     for _ in range(2):
         step = 0.25 * GYROID_LENGTH * spacing / drawn / len(chosen)  # a gyroid's layers differ over a quarter of its period
         samples = [
@@ -131,8 +131,8 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
         drawn_mm = sum(bead.length_mm for beads in samples for bead in beads)
         got = drawn_mm * spacing / sum(areas[i].area() for i in chosen)
         if got <= 0.0:
-            return asked
-        drawn = min(max(drawn * asked / got, asked * (1.0 - MOST_SHIFT)), asked * (1.0 + MOST_SHIFT))
+            return wanted
+        drawn = min(max(drawn * wanted / got, wanted * (1.0 - MOST_SHIFT)), wanted * (1.0 + MOST_SHIFT))
     return drawn
 
 

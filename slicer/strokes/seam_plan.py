@@ -226,25 +226,25 @@ def is_clear(interfaces: SeamLimits, x: float, y: float) -> bool:
     return True
 
 
-def light_at(layer: int, asked: Floats, cuts_mm: Floats, levels: Indices, samples: Sequence[Floats]) -> Floats:
+def light_at(layer: int, outline_points: Floats, cuts_mm: Floats, levels: Indices, samples: Sequence[Floats]) -> Floats:
     """(n,) visibility of points in a layer, 0 to 1, interpolated between the sampled levels below and above.
 
-    asked: (n, 4) x, y and outward unit vector; cuts_mm: heights of all layers; levels, samples: from light_samples.
+    outline_points: (n, 4) x, y and outward unit vector; cuts_mm: heights of all layers; levels, samples: from light_samples.
     """
     upper = min(int(np.searchsorted(levels, layer)), len(levels) - 1)
     lower = upper if levels[upper] <= layer else max(upper - 1, 0)
     low_mm, high_mm = cuts_mm[levels[[lower, upper]]]
     share = 0.0 if high_mm <= low_mm else float(np.clip((cuts_mm[layer] - low_mm) / (high_mm - low_mm), 0.0, 1.0))
-    below: Floats = _look_up(asked, samples[lower])
-    return below if share <= 0.0 else (1.0 - share) * below + share * _look_up(asked, samples[upper])
+    below: Floats = _look_up(outline_points, samples[lower])
+    return below if share <= 0.0 else (1.0 - share) * below + share * _look_up(outline_points, samples[upper])
 
 
 @kernel
-def _look_up(asked: Floats, samples: Floats) -> Floats:
+def _look_up(outline_points: Floats, samples: Floats) -> Floats:
     """(n,) weighted mean of the visibility of samples; nearby samples with similar normals weigh most."""
-    out: Floats = floats(len(asked), 0.0)
+    out: Floats = floats(len(outline_points), 0.0)
     for k in range(len(out)):
-        x, y, nx, ny = asked[k, 0], asked[k, 1], asked[k, 2], asked[k, 3]
+        x, y, nx, ny = outline_points[k, 0], outline_points[k, 1], outline_points[k, 2], outline_points[k, 3]
         whole, total = 0.0, 0.0
         for s in range(len(samples)):
             dx, dy = samples[s, 0] - x, samples[s, 1] - y

@@ -59,10 +59,10 @@ def timed(
     that time, but not below least_speed_mm_s.
     """
     strokes, process = in_pieces(strokes, height_mm), profile.process
-    asked = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
+    nominal = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
     for number, own in enumerate(of_places, start=1):
-        asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
-    speeds = steady(np.minimum(asked, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
+        nominal = np.where(strokes.place == number, _of_strokes(strokes, own), nominal)
+    speeds = steady(np.minimum(nominal, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
     time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
     speeds = _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
     corners = mark_corners(strokes.points, strokes.starts, process.resolution_mm)

@@ -152,9 +152,9 @@ def grow(
         pending += beginning.get(m, [])
         area = union([branch.area for branch in branches]) if is_tree else area
         body = _body(area, radius)
-        asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
-        if asked:
-            contact = _contact(union(asked), body, areas.reachable[m], radius, hard)
+        beginnings = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
+        if beginnings:
+            contact = _contact(union(beginnings), body, areas.reachable[m], radius, hard)
             if is_tree:
                 branches = add_contact(branches, contact, areas.reachable[m])
             elif not contact.is_empty():

@@ -257,7 +257,9 @@ def test_folds_of_a_coarsely_rounded_model_are_left_out_and_the_difference_is_to
 def test_a_model_rounded_to_another_shape_is_refused_with_what_to_do() -> None:
     fine = readers.READERS[".ply"](locate("demo:lattice"), None).objects[0].volumes[0][0]
     step_mm = np.ptp(fine.vertices, axis=0).max() / 18
-    with pytest.raises(MeshError, match=r"enclose 7530.* kept of them 7655.*make it manifold in another program first"):
+    with pytest.raises(
+        MeshError, match=r"enclose 7530.* the closest valid solid has 7655.*make it manifold in another program first"
+    ):
         repair([Surface(np.round(fine.vertices / step_mm) * step_mm, fine.faces)])
 
 
