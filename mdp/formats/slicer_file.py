@@ -12,6 +12,7 @@ from math import isfinite, nan
 from xml.etree.ElementTree import Element
 
 from mdp.formats.surface import Surface
+from profiles.errors import counted
 
 PART, NEGATIVE, MODIFIER, SUPPORT, NO_SUPPORT = "part", "negative volume", "modifier", "support enforcer", "support blocker"
 FOR, AGAINST = 1, 2  # paint values; 0: unpainted
@@ -211,7 +212,7 @@ def painted_shares(digits: str) -> Mapping[int, float]:
             paint = LONG + _next(codes) if paint == LONG else paint
             shares[paint] = shares.get(paint, 0.0) + share
     if codes:
-        raise ValueError(f"{len(codes)} digits are left over")
+        raise ValueError(f"{counted(len(codes), 'digit')} left over")
     return shares
 
 
