@@ -395,7 +395,7 @@ def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
     drop = float(heights.bottom_mm[layer]) - process.support_gap_mm
     top = max(int(np.searchsorted(heights.tip_mm, drop + SAME_MM, side="right")) - 1, 0)
     if sections.on_plate and (hanging - offset(sections.plate, -process.line_width_mm)).area() >= least_mm2:
-        return "it lies beyond the edge of the plate"
+        return "the plate ends before"
     under, far_mm = heights[top : top + 1], support_reach_mm(sections)
     for upper in sections.later:
         gap_mm, machine = process.support_distance_mm, sections.profile.machine

@@ -33,7 +33,7 @@ NO_BRIDGES = ("process.bridge_longest_mm=1", "process.support_distance_mm=1")
 @pytest.mark.parametrize(
     ("parts", "settings", "reason"),
     [
-        ([whole(tee(height=14))], ("machine.table.radius_mm=8",), "it lies beyond the edge of the plate"),
+        ([whole(tee(height=14))], ("machine.table.radius_mm=8",), "the plate ends before"),
         (
             [pit(16, 0.7)],
             (*NO_BRIDGES, "process.support_bottom_gap_mm=0.6"),
