@@ -241,8 +241,8 @@ def test_planes_by_hand_stay_and_the_others_are_found() -> None:
     assert both.reduction > 0.9
     assert [row.parts for row in both.front] == list(range(2, len(both.front) + 2))
     again = decompose(arms, "shape", profile, SearchRequest(plan=replace(by_hand, front=plan_of(both).front)))
-    again = "with planes by hand, the search finds the other planes again for every number of parts"
-    kept = f"the [[front]] of mine.toml is not kept: {again}"
+    sentence = "with planes by hand, the search finds the other planes again for every number of parts"
+    kept = f"the [[front]] of mine.toml is not kept: {sentence}"
     assert again.notes == (*both.notes, kept)
     with pytest.raises(PlanError, match=r"--parts 1: the planes by hand of mine.toml alone make 2 parts"):
         decompose(arms, "shape", profile, SearchRequest(plan=by_hand, parts=1))
