@@ -1,15 +1,16 @@
-"""Clearance: how high the tip must be for the head to pass clear of the table at a pose, and of what stands beside a limb.
+"""Clearance: how high the tip must be for the head to pass clear of the table at a pose, and of the parts that stand beside a
+limb.
 
 A body point at b from the tip is n . b + z above the table, n the table's normal in the machine frame and z the tip's height
 above the table; with the table unbounded, z >= max over the bodies of -n . b keeps all of them clear. For one body reaching y
-across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. The part of the cradle that stands higher
-than the table is not under that plane: it is tried against the head wherever the tip goes.
+across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. A part of the cradle that rises above the
+table is not under that plane: it is tested against the head at every position of the tip.
 
 A part cut off by a whole plane has nothing printed above its base plane. A limb has: other pieces stand beside it. The head is
 modelled as everything above its underside: the silhouette turned about the nozzle, and boxes that are extended to the nozzle. A
 printed point at height t and distance r from the nozzle axis requires the tip to be at t - h(r) or higher, where h(r) is the
-height of the underside. h never decreases with r, so within a layer the outline is the worst case and it is enough to compare
-the two surfaces. Both are divided into triangles so small that the slack covers every point of them.
+height of the underside. h never decreases with r, so the outline of a layer is its worst case and comparing the two surfaces
+suffices. Both are divided into triangles small enough for the slack to cover every point of them.
 """
 
 from collections.abc import Sequence
@@ -27,16 +28,16 @@ from mdp.pose import UP, Pose, poses, rotation, shift
 from profiles.frozen import Vector
 from profiles.machine import Machine
 
-CELLS_MM = (2.0, 0.6, 0.2)  # cell sizes, coarse to fine: only pairs that may collide are compared again
-MOST_TRIANGLES, MOST_PAIRS = 250_000, 20_000_000  # per surface, and pairs of cells; more are refused
+CELLS_MM = (2.0, 0.6, 0.2)  # cell sizes, coarse to fine: only pairs that may collide are compared again with finer cells
+MOST_TRIANGLES, MOST_PAIRS = 250_000, 20_000_000  # triangles per surface, pairs of cells; larger problems are rejected
 EVEN_MM = 1e-4  # up to this height above the base plane is the cut face itself
 NOTHING = -1e9
 Share = tuple[int, int]
-MOST_TRIED = 1000  # corners per surface for the first, quick test
+MOST_TRIED = 1000  # corners sampled per surface for the quick first test
 
 
-# The body of the head that asks for the greatest height of the tip above the table: that height, clearance included, its name,
-# and its point that comes nearest to the table, from the tip in the machine frame, mm.
+# The body of the head that determines the least height of the tip above the table: that height with clearance, the body's name,
+# and its point nearest to the table, mm from the tip in the machine frame.
 LowestBody = tuple[float, str, Vector]
 
 
@@ -46,7 +47,7 @@ def least_tip_height_mm(machine: Machine, pose: Pose) -> float:
 
 
 def lowest_body(machine: Machine, pose: Pose) -> LowestBody:
-    """The body that asks for that height."""
+    """The body of the head that determines the least height of the tip above the table's plane at a pose."""
     p, q, r = (rotation(machine, pose) @ UP).tolist()
     across = hypot(p, q)
     if across < 1e-9:
@@ -62,17 +63,19 @@ def lowest_body(machine: Machine, pose: Pose) -> LowestBody:
 
 
 def least_height_mm(machine: Machine, direction: Floats) -> float:
-    """Least height of what is printed along a direction, over the poses that reach it; infinite when none does."""
+    """Least height at which material can be printed along a direction, over the poses that reach it; infinite if no pose does."""
     return min((least_tip_height_mm(machine, pose) for pose in poses(machine, direction)), default=np.inf)
 
 
 def allowed_poses(machine: Machine, direction: Floats, points_mm: Floats, near_turn_deg: float | None = None) -> list[Pose]:
-    """Poses at which a part with these (n, 3) workpiece points can be printed: clear of the table, inside X Y Z limits."""
+    """Poses at which a part with these (n, 3) workpiece points can be printed: clear of the table and within the limits of X, Y
+    and Z.
+    """
     return [pose for pose in poses(machine, direction, near_turn_deg) if find_obstacle(machine, pose, points_mm) is None]
 
 
 def find_obstacle(machine: Machine, pose: Pose, points_mm: Floats) -> str | None:
-    """Why a part with these (n, 3) workpiece points cannot be printed at a pose; None: it can."""
+    """Why a part with these (n, 3) workpiece points cannot be printed at a pose; None if it can."""
     reached = points_mm @ rotation(machine, pose).T + shift(machine, pose)
     low, high = reached.min(axis=0), reached.max(axis=0)
     for axis, letter in enumerate("XYZ"):
@@ -87,8 +90,9 @@ def find_obstacle(machine: Machine, pose: Pose, points_mm: Floats) -> str | None
 
 
 def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str, str] | None:
-    """The body of the head and that of the cradle, of those that stand higher than the table, that could meet, the tip anywhere
-    in the hull of (n, 3) machine points: one direction must part each body there from each box."""
+    """The head's body and the cradle's box that could collide with the tip anywhere in the hull of (n, 3) machine points; None if
+    a separating direction exists for each pair. Only boxes that rise above the table are tested.
+    """
     higher = [box for box in machine.cradle if box.max_mm[2] > 0.0]
     if not higher:
         return None
@@ -105,37 +109,39 @@ def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str,
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
-    """What stands beside a limb, and the head that must pass it. points_mm (k, 3): x, y and top of each printed column in the
-    part's frame, highest first; slack_mm: how far a column may extend beyond its point."""
+class StandingColumns:
+    """The parts that stand beside a limb, and the head that must pass them. points_mm (k, 3): x, y and top of each printed column
+    in the part frame, highest first; slack_mm: how far a column may extend beyond its point.
+    """
 
     points_mm: Floats
     slack_mm: float
     head: Head
 
     @classmethod
-    def of(cls, points_mm: Floats, slack_mm: float, machine: Machine) -> "Standing":
-        """The standing columns for (k, 3) points of the part's frame."""
+    def of(cls, points_mm: Floats, slack_mm: float, machine: Machine) -> "StandingColumns":
+        """Columns for (k, 3) points in the part frame."""
         highest_first = np.argsort(-points_mm[:, 2], kind="stable")
         return cls(np.ascontiguousarray(points_mm[highest_first]), slack_mm, head_of(machine))
 
     def least_tip_mm(self, places_mm: Floats, known_mm: float = NOTHING) -> Floats:
-        """(n,) the lowest safe heights of the tip at (n, 2) places; NOTHING where any height is safe.
+        """(n,) least safe heights of the tip at (n, 2) positions, mm; NOTHING where any height is safe.
 
-        known_mm: a height that the tip has anyway; results at or below it may come out too low.
+        known_mm: a lower bound of the tip's height; results at or below it may be too low.
         """
         count = int(np.searchsorted(-self.points_mm[:, 2], self.slack_mm - known_mm))
         return _least_tip(np.ascontiguousarray(places_mm), self.points_mm[:count], self.slack_mm, self.head)
 
 
 def highest_in_cells(points_mm: Floats, cell_mm: float) -> Floats:
-    """(c, 3) the highest of (n, 3) points in each cell of a lattice over X and Y, moved to the middle of the cell."""
+    """(c, 3) the highest of (n, 3) points in each cell of a lattice over X and Y, moved to the centre of the cell."""
     return _per_cell(points_mm[:, :2], points_mm[:, 2], cell_mm, np.maximum)[0]
 
 
 def _per_cell(places: Floats, heights: Floats, cell_mm: float, extreme: np.ufunc) -> tuple[Floats, Indices]:
-    """(c, 3) the middles of the cells that hold any of (n, 2) places with the extreme (np.minimum, np.maximum) of their heights,
-    and (n,) the cell of each place."""
+    """(c, 3) centres of the cells that hold any of (n, 2) positions, with the extreme (np.minimum or np.maximum) of their heights
+    as z, and (n,) the cell of each position.
+    """
     cells = np.floor(places / cell_mm).astype(np.int64)
     _, first, of_place = np.unique(cells[:, 0] * 1_000_003 + cells[:, 1], return_index=True, return_inverse=True)
     reached = heights[first]
@@ -144,9 +150,10 @@ def _per_cell(places: Floats, heights: Floats, cell_mm: float, extreme: np.ufunc
 
 
 @no_nrt
-def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head) -> float:
-    """The lowest safe height of the tip beside a column that ends at `top`. square: of the distance to its point; beyond: how
-    much nearer the column may be."""
+def _height_under_hot_end(square: float, top: float, beyond: float, head: Head) -> float:
+    """Least safe height of the tip beside a column that ends at `top`. square: squared distance to the column's point; beyond:
+    how much nearer the column may be.
+    """
     widest = head.silhouette[len(head.silhouette) - 1, 0] + beyond
     if square > widest * widest:
         return NOTHING
@@ -156,7 +163,7 @@ def _asked_by_hot_end(square: float, top: float, beyond: float, head: Head) -> f
 
 @no_nrt
 def _is_under(box: Floats, across: float, along: float, beyond: float) -> bool:
-    """Whether a point at that offset from the tip lies under a box enlarged by `beyond`."""
+    """Whether a point at an offset from the tip lies under a box enlarged by `beyond`."""
     inside = box[0] - beyond <= across and across <= box[3] + beyond
     return bool(inside and box[1] - beyond <= along and along <= box[4] + beyond)
 
@@ -171,7 +178,7 @@ def _least_tip(places: Floats, points: Floats, slack: float, head: Head) -> Floa
                 break
             across, along = points[j, 0] - places[i, 0], points[j, 1] - places[i, 1]
             square = across * across + along * along
-            least[i] = max(least[i], _asked_by_hot_end(square, top, beyond, head))
+            least[i] = max(least[i], _height_under_hot_end(square, top, beyond, head))
             for k in range(len(head.boxes)):
                 if _is_under(head.boxes[k], across, along, beyond):
                     least[i] = max(least[i], top - max(head.boxes[k, 2] - head.clearance_mm, 0.0))
@@ -179,7 +186,9 @@ def _least_tip(places: Floats, points: Floats, slack: float, head: Head) -> Floa
 
 
 def _within_reach(head: Head, around_mm: Floats, points: Floats, slack_mm: float) -> Mask:
-    """(j,) which of (j, 3) standing points the head might hit with the tip on a limb's base plane in its bounding box, (2, 3)."""
+    """(j,) whether the head might hit each of (j, 3) standing points while the tip is on the limb's base plane within its
+    bounding box (2, 3).
+    """
     outside = np.maximum(np.maximum(around_mm[0] - points, points - around_mm[1]), 0.0)
     met = _under_boxes(head, around_mm, points, slack_mm)
     met &= points[:, None, 2] > np.maximum(head.boxes[:, 2] - head.clearance_mm, 0.0)
@@ -189,36 +198,37 @@ def _within_reach(head: Head, around_mm: Floats, points: Floats, slack_mm: float
 
 
 def _under_boxes(head: Head, around_mm: Floats, points: Floats, slack_mm: float) -> Mask:
-    """(j, b) which of (j, 3) points lie under which box of the head, the tip somewhere in a box around a limb."""
+    """(j, b) whether each of (j, 3) points lies under each box of the head for some tip position in the limb's bounding box."""
     boxes, beyond = head.boxes, slack_mm + head.clearance_mm
     low, high = around_mm[0, :2] + boxes[:, :2] - beyond, around_mm[1, :2] + boxes[:, 3:5] + beyond
     under: Mask = np.all((points[:, None, :2] >= low) & (points[:, None, :2] <= high), axis=2)
     return under
 
 
-def _close(head: Head, around_mm: Floats, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
-    """(i,) which tips may make the head hit any of (j, 3) standing points, and (j,) which of those points are hit.
+def _may_collide(head: Head, around_mm: Floats, tips: Floats, points: Floats, slack_mm: float) -> tuple[Mask, Mask]:
+    """(i,) tip positions at which the head may hit any of (j, 3) standing points, and (j,) the points that it hits.
 
     The tips lie on the limb's surface only. Extending every box to the nozzle makes the outline the worst case inside the limb,
     too; a box is tested only against points that it can reach from somewhere in the limb's bounding box, around_mm (2, 3).
     """
     wide = head.boxes.copy()
     wide[:, :2], wide[:, 3:5] = np.minimum(head.boxes[:, :2], 0.0), np.maximum(head.boxes[:, 3:5], 0.0)
-    return _find_close(tips, points, slack_mm, head._replace(boxes=wide), _under_boxes(head, around_mm, points, slack_mm))
+    return _find_collisions(tips, points, slack_mm, head._replace(boxes=wide), _under_boxes(head, around_mm, points, slack_mm))
 
 
-Surfaces = tuple[Floats, Floats]  # (m, 3, 3) corners of the faces of a limb, and of all that stands, in the workpiece frame
+# (m, 3, 3) corners of the faces of a limb, and of everything that stands, in the workpiece frame
+Surfaces = tuple[Floats, Floats]
 
 
 def passes_clear(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float, cells_mm: Sequence[float] = CELLS_MM) -> bool:
-    """Whether the head clears everything that stands while a limb is printed; base_mm: the offset of the limb's base plane.
+    """Whether the head clears everything that stands while a limb is printed. base_mm: offset of the limb's base plane.
 
-    Triangles below the base plane are ignored. False also where there are too many triangles to compare, and where the finest of
-    cells_mm leaves it in doubt, which is so within five of them.
+    Triangles below the base plane are ignored. Also False if there are too many triangles to compare, or if the finest of
+    cells_mm cannot decide, which happens within five cells of a collision.
     """
     tips, stands, around_mm = _above_base(machine, pose, surfaces, base_mm)
     head = head_of(machine)
-    if _close(head, around_mm, _few(tips), _few(stands), 0.0)[0].any():
+    if _may_collide(head, around_mm, _sample_points(tips), _sample_points(stands), 0.0)[0].any():
         return False
     for cell_mm in cells_mm:
         if max(count_divided(corners, cell_mm) for corners in (tips, stands)) > MOST_TRIANGLES:
@@ -233,13 +243,13 @@ def passes_clear(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: floa
         if len(low) * int(near.sum()) > MOST_PAIRS:
             return False
         close_stands = np.zeros(len(high), np.bool_)
-        close_tips, close_stands[near] = _close(head, around_mm, low, high[near], slack_mm)
+        close_tips, close_stands[near] = _may_collide(head, around_mm, low, high[near], slack_mm)
         tips, stands = tips[close_tips[of_tip]], stands[close_stands[of_stand]]
     return len(tips) == 0
 
 
 def _above_base(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float) -> tuple[Floats, Floats, Floats]:
-    """Both surfaces above the base plane in the part's frame, and (2, 3) the bounding box of the limb, where the tip goes."""
+    """Both surfaces above the base plane in the part frame, and the limb's bounding box (2, 3), the range of the tip."""
     turn, down = rotation(machine, pose), np.array([0.0, 0.0, base_mm])
     tips = _above(np.ascontiguousarray(surfaces[0] @ turn.T - down))
     stands = _above(np.ascontiguousarray(surfaces[1] @ turn.T - down - np.array([0.0, 0.0, EVEN_MM])))
@@ -247,13 +257,15 @@ def _above_base(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float
     return tips, stands, np.stack([places.min(axis=0), places.max(axis=0)])
 
 
-def places_met(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float) -> Floats:
-    """(k, 3) points of what stands that the head certainly hits while a limb is printed, highest first; see passes_clear."""
+def collision_points(machine: Machine, pose: Pose, surfaces: Surfaces, base_mm: float) -> Floats:
+    """(k, 3) points of standing parts that the head certainly hits while a limb is printed, highest first; compare
+    passes_clear.
+    """
     tips, stands, around_mm = _above_base(machine, pose, surfaces, base_mm)
     if max(count_divided(corners, CELLS_MM[0]) for corners in (tips, stands)) <= MOST_TRIANGLES:
         tips, stands = (subdivide(corners, CELLS_MM[0]) for corners in (tips, stands))
-    points = _few(stands)
-    _, met = _close(head_of(machine), around_mm, _few(tips), points, 0.0)
+    points = _sample_points(stands)
+    _, met = _may_collide(head_of(machine), around_mm, _sample_points(tips), points, 0.0)
     places: Floats = (np.unique(points[met], axis=0) + np.array([0.0, 0.0, base_mm])) @ rotation(machine, pose)
     return places[np.argsort(-places[:, 2], kind="stable")]
 
@@ -264,7 +276,7 @@ def _above(corners: Floats) -> Floats:
     return above
 
 
-def _few(corners: Floats) -> Floats:
+def _sample_points(corners: Floats) -> Floats:
     """(k, 3) an even sample of about MOST_TRIED corners above the base plane."""
     points = corners.reshape(-1, 3)
     points = points[points[:, 2] >= 0.0]
@@ -272,8 +284,8 @@ def _few(corners: Floats) -> Floats:
 
 
 @kernel
-def _find_close(tips: Floats, points: Floats, slack: float, head: Head, reached: Mask) -> tuple[Mask, Mask]:
-    """See _close; reached (j, b): which points each box can reach."""
+def _find_collisions(tips: Floats, points: Floats, slack: float, head: Head, reached: Mask) -> tuple[Mask, Mask]:
+    """Kernel of _may_collide. reached (j, b): the points that each box can reach."""
     close_tips, close_points, beyond = flags(len(tips)), flags(len(points)), slack + head.clearance_mm
     for i in range(len(tips)):
         for j in range(len(points)):
@@ -281,7 +293,7 @@ def _find_close(tips: Floats, points: Floats, slack: float, head: Head, reached:
             if top <= tips[i, 2]:
                 continue
             across, along = points[j, 0] - tips[i, 0], points[j, 1] - tips[i, 1]
-            meets = _asked_by_hot_end(across * across + along * along, top, beyond, head) > tips[i, 2]
+            meets = _height_under_hot_end(across * across + along * along, top, beyond, head) > tips[i, 2]
             for k in range(len(head.boxes)):
                 if reached[j, k] and top - max(head.boxes[k, 2] - head.clearance_mm, 0.0) > tips[i, 2]:
                     meets = meets or _is_under(head.boxes[k], across, along, beyond)
@@ -292,16 +304,16 @@ def _find_close(tips: Floats, points: Floats, slack: float, head: Head, reached:
 
 @kernel
 def _under_hot_end(squares: Floats, tops: Floats, beyond: float, head: Head) -> Mask:
-    """(n,) whether columns at (n,) squared distances from the nearest place of the tip reach the hot end, the tip at height 0."""
+    """(n,) whether columns at (n,) squared distances from the nearest tip position reach the hot end with the tip at height 0."""
     met = flags(len(tops))
     for i in range(len(tops)):
-        met[i] = _asked_by_hot_end(squares[i], tops[i], beyond, head) > 0.0
+        met[i] = _height_under_hot_end(squares[i], tops[i], beyond, head) > 0.0
     return met
 
 
 @kernel
 def count_divided(corners: Floats, longest: float) -> int:
-    """How many triangles `subdivide` makes."""
+    """The number of triangles that `subdivide` returns."""
     return _count_divided(corners, longest)
 
 
@@ -315,7 +327,7 @@ def _count_divided(corners: Floats, longest: float) -> int:
 
 @kernel
 def subdivide(corners: Floats, longest: float) -> Floats:
-    """(k, 3, 3) similar triangles that (m, 3, 3) triangles are divided into, so that no edge is longer than `longest`."""
+    """Divide (m, 3, 3) triangles into (k, 3, 3) similar ones whose edges are no longer than `longest`."""
     count, at = _count_divided(corners, longest), 0
     points = table(3 * count, 3)
     for f in range(len(corners)):
@@ -341,7 +353,7 @@ def _put(points: Floats, at: int, corners: Floats, shares: tuple[Share, Share, S
 
 @no_nrt
 def _divisions(corners: Floats, most: float) -> int:
-    """How many pieces each edge of a triangle is divided into."""
+    """The number of pieces into which each edge of a triangle is divided."""
     longest = 0.0
     for k in range(3):
         square = 0.0

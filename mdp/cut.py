@@ -14,8 +14,9 @@ Solid: TypeAlias = m3.Manifold
 
 
 def solid_of(mesh: Mesh, apart: bool = False) -> Solid:
-    """The mesh as a manifold3d solid; apart: no cut ever joins two faces of a flat place, so that run_faces tells each for
-    itself. MeshError when it is none."""
+    """The mesh as a manifold3d solid. apart: coplanar faces stay separate in cuts, so run_faces distinguishes them. Raises
+    MeshError for an invalid solid.
+    """
     own = np.arange(len(mesh.faces), dtype=np.uint64) if apart else None
     solid = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64), face_id=own))
     if solid.status() != m3.Error.NoError:
@@ -30,8 +31,9 @@ def mesh_of(solid: Solid) -> Mesh:
 
 
 def run_faces(solid: Solid) -> list[tuple[int, Ints]]:
-    """The faces of a solid, as mesh_of orders them, in runs: manifold3d's number of the solid that a run was made in, and which
-    of that solid's faces each is a piece of. A cutter has a number of its own."""
+    """The faces of a solid in runs, ordered as in mesh_of: manifold3d's ID of the original solid, and the source face in it of
+    each face. A cutter has an ID of its own.
+    """
     mesh = solid.to_mesh64()
     ends = np.asarray(mesh.run_index, dtype=np.int64) // 3
     faces = np.asarray(mesh.face_id).astype(np.int32)
@@ -39,7 +41,7 @@ def run_faces(solid: Solid) -> list[tuple[int, Ints]]:
 
 
 def cut(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
-    """What a plane cuts off a solid, all of it above the plane or the limbs that it names, and the rest; their volumes add up."""
+    """Cut a solid: the pieces above the plane, or only the limbs that the plane names, and the rest; their volumes add up."""
     if plane.limbs_mm is None:
         return above(solid, plane), below(solid, plane)
     limbs, standing = divide(above(solid, plane), plane.limbs_mm)
@@ -47,7 +49,7 @@ def cut(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
 
 
 def divide(upper: Solid, points_mm: Floats) -> tuple[Solid, Solid]:
-    """The pieces of a solid that lie nearest to (k, 3) points, and its other pieces; a void goes with the piece around it."""
+    """The pieces of a solid nearest to (k, 3) points, and its other pieces; a void goes with the piece around it."""
     pieces = upper.decompose()
     bodies = [piece for piece in pieces if piece.volume() > 0.0]
     meshes = [mesh_of(body) for body in bodies]
@@ -68,12 +70,12 @@ def below(solid: Solid, plane: Plane) -> Solid:
 
 
 def corners_above(mesh: Mesh, plane: Plane) -> Floats:
-    """(n, 3) the corners of the part of a mesh above a plane: its vertices, and where its edges cross it. Nothing is cut."""
+    """(n, 3) corners of the part of a mesh above a plane: its vertices and the crossing points of its edges, without cutting."""
     return np.concatenate([mesh.vertices[plane.heights_mm(mesh.vertices) > 0.0], passing_places(mesh, plane)])
 
 
 def passing_places(mesh: Mesh, plane: Plane) -> Floats:
-    """(k, 3) where the edges of a closed mesh pass through a plane."""
+    """(k, 3) points where the edges of a closed mesh pass through a plane."""
     heights = plane.heights_mm(mesh.vertices)
     starts, ends = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     rising = (heights[starts] <= 0.0) & (heights[ends] > 0.0)  # every edge rises along one of its two faces
@@ -88,13 +90,14 @@ def convex_hull(points: Floats) -> Mesh:
 
 
 def simplify(mesh: Mesh, tolerance_mm: float) -> Mesh:
-    """The mesh with fewer faces, its surface moved by at most about tolerance_mm."""
+    """The mesh with fewer faces, its surface moved by about tolerance_mm at most."""
     return mesh_of(solid_of(mesh).simplify(tolerance_mm))
 
 
 def _half_space(solid: Solid, plane: Plane) -> Solid:
-    """A cube whose one face lies in the plane and covers the solid, all of the cube above it: the cutter of manifold3d's own
-    split_by_plane, which makes both halves and takes half as long again as one."""
+    """Cutter: a cube above the plane, one face of it in the plane, large enough to cover the solid. manifold3d's split_by_plane
+    uses the same cutter, but computes both halves and takes half as long again as one.
+    """
     low, high = np.array(solid.bounding_box()).reshape(2, 3)
     x, y, z = (float(value) for value in plane.normal)
     size_mm = float(np.linalg.norm(0.5 * (low + high) - plane.offset_mm * plane.normal) + 0.5 * np.linalg.norm(high - low))

@@ -12,23 +12,22 @@ from mdp.pose import Pose
 from mdp.zone import UNMARKED, Marked, Modifier
 from profiles.errors import UserError
 
-VOLUME_TOLERANCE = 1e-6  # of the model's: 200 cuts at random lost 4e-16 of it at most, and a sliver left out is more
-ORDER_TOLERANCE_MM = 1e-4  # the same cuts left corners 5e-14 mm off their planes; no print shows a ten thousandth
+VOLUME_TOLERANCE = 1e-6  # of the model's: 200 random cuts lost at most 4e-16 of it, while a lost sliver is larger
+ORDER_TOLERANCE_MM = 1e-4  # 200 random cuts left corners 5e-14 mm off their planes; no print shows 0.1 µm
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
     """One part: printed at one pose of the table, upward from its base plane.
 
-    mesh lies in the workpiece frame. rotation (3, 3) turns the workpiece frame into the part frame's orientation at
-    the pose, so rotation @ direction = +z and a point w has part coordinates rotation @ w - (0, 0, base.offset_mm).
-    seam_mm is how long its base's rim is where that is seen, feather_share the share of it at which base and surface meet at less
-    than 20 degrees.
-    needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
-    up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up;
-    support: where whatever overhangs is to be held up; modifiers: where other settings hold. of: which part of which model of the
-    plate it is, in words; "": of the only one, or of several. lifted_mm: how far its base plane lies above the platform where it
-    stands on a raft there.
+    mesh lies in the workpiece frame. rotation (3, 3) turns the workpiece frame into the part frame's orientation at the pose, so
+    rotation @ direction = +z and a point w has part coordinates rotation @ w - (0, 0, base.offset_mm). seam_mm is the visible
+    length of its base's rim; feather_share the share of the rim at which base and surface meet at less than 20 degrees. needing
+    (m,): faces that need support; needing_upright (m,): faces that would need it if the model were printed straight up in one
+    piece; None: all overhangs. no_seam, no_support: user-marked zones without layer seams and without support; support: zones in
+    which every overhang is supported; modifiers: zones with other settings. of: which part of which model on the plate this is,
+    in words; "" on a plate with one model, or for parts of several. lifted_mm: height of its base plane above the build plate,
+    for a part on a raft.
     """
 
     index: int
@@ -51,12 +50,12 @@ class Part:
 
     @property
     def direction(self) -> Floats:
-        """Unit printing direction in the workpiece frame: the base plane's normal."""
+        """Unit printing direction in the workpiece frame, which is the base plane's normal."""
         return self.base.normal
 
     @property
-    def on_platform(self) -> bool:
-        """Whether it stands on the platform, or on a raft there: the first part of each model does."""
+    def on_plate(self) -> bool:
+        """Whether the part stands on the build plate or on a raft there, as the first part of each model does."""
         return self.base.offset_mm == self.lifted_mm and bool((self.base.normal == UP).all())
 
     def with_marks(self, change: Callable[[Marked], Marked], change_modifier: Callable[[Modifier], Modifier]) -> "Part":
@@ -70,17 +69,18 @@ class Part:
         )
 
     def in_part_frame(self) -> Mesh:
-        """The part's mesh in its own frame: direction is +z, base plane is z = 0."""
+        """The part's mesh in the part frame: direction is +z, base plane is z = 0."""
         return self.mesh.transform(self.rotation, (0.0, 0.0, -self.base.offset_mm))
 
 
 @dataclass(frozen=True, eq=False)
 class FrontRow:
-    """A decomposition: its planes in the order of the cuts, and what it costs.
+    """A decomposition on the Pareto front: its planes in the order of the cuts, and its cost.
 
-    seam_mm: length of the rims of all cuts; stairs_mm2: what the stairs of all parts count in the cost; time_s, filament_mm:
-    estimates, None where there is none; reason: why it is chosen; sound: whether its joints bear the nozzle's push, no cut
-    passes through the bulk of the model, and the first part is no sliver of it."""
+    seam_mm: length of the rims of all cuts; stairs_mm2: cost of the stair-stepping of all parts; time_s, filament_mm: estimates,
+    None if not estimated; reason: why it was chosen; sound: whether its joints bear the nozzle's push, no cut passes through the
+    bulk of the model, and the first part is not a sliver.
+    """
 
     planes: tuple[Plane, ...]
     support_area_mm2: float
@@ -95,18 +95,18 @@ class FrontRow:
 
     @property
     def parts(self) -> int:
-        """How many parts it has."""
+        """The number of parts."""
         return len(self.planes) + 1
 
 
 @dataclass(frozen=True, eq=False)
 class Decomposition:
     """A model, or several on one plate, and their parts in print order (index 1, 2, ...); the first part of each model stands on
-    the platform.
+    the build plate.
 
-    risky_area_mm2 is what printing the whole model straight up leaves to support, residual_area_mm2 what the parts do.
-    folded_mm3 is how far the mesh's volume may be from what the parts add up to, because its surface passes through itself.
-    uncut is each model as one part with its marks, about the turn axis; (): not known, nothing is marked.
+    risky_area_mm2 is the area that needs support when the whole model is printed straight up, residual_area_mm2 the area that the
+    parts leave. folded_mm3 is how far the mesh's volume may differ from the parts' total, because its surface intersects itself.
+    uncut is each model as one part with its marks, centred about the turn axis; () if unknown, which means without marks.
     """
 
     name: str
@@ -132,36 +132,38 @@ class Decomposition:
 
     @property
     def reduction(self) -> float:
-        """Share of the risky area that the parts make safe, 0..1; 0 for a model without risky faces."""
+        """Share of the risky area that the decomposition saves, 0 to 1; 0 for a model without risky faces."""
         return 1.0 - self.residual_area_mm2 / self.risky_area_mm2 if self.risky_area_mm2 > 0 else 0.0
 
     @property
     def chosen(self) -> FrontRow | None:
-        """The row of the front that the parts are; None where they come from no search."""
+        """The chosen row of the front; None if the parts do not come from a search."""
         return next((row for row in self.front if row.chosen), None)
 
     @property
     def cost_mm2(self) -> float:
-        """Area that needs support and the scars of the seams; the area alone where the parts come from no search."""
+        """Cost of the chosen row, mm2: area that needs support plus blemishes; the area alone if the parts do not come from a
+        search.
+        """
         return self.residual_area_mm2 if self.chosen is None else self.chosen.cost_mm2
 
     @property
     def seam_mm(self) -> float:
-        """Length of the seams that are seen."""
+        """Visible length of the cut seams, mm."""
         return 0.0 if self.chosen is None else self.chosen.seam_mm
 
     @property
     def stairs_mm2(self) -> float:
-        """What the stairs of all parts count in the cost."""
+        """Cost of the stair-stepping of all parts, mm2."""
         return 0.0 if self.chosen is None else self.chosen.stairs_mm2
 
     @property
     def volume_mm3(self) -> float:
-        """What the parts add up to."""
+        """Total volume of the parts, mm3."""
         return sum(part.volume_mm3 for part in self.parts)
 
     def _check_order(self) -> None:
-        """A part lies above its base plane; everything printed before it lies below, unless the part is a limb."""
+        """Check that each part lies above its base plane, and everything printed before it lies below, unless it is a limb."""
         for position, part in enumerate(self.parts):
             if part.index != position + 1:
                 raise UserError(f"part {part.index} of {self.name} stands at place {position + 1} of the print order")

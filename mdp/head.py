@@ -1,8 +1,8 @@
-"""Head: the convex bodies that move with the tip, and the directions in which they are tried against what they could meet.
+"""Head: the convex bodies that move with the tip, and the directions of the separating-axis test between them and obstacles.
 
-The distance of two convex bodies is the greatest gap over all unit directions d, where the gap is the least d . x of the one
-minus the greatest d . x of the other. Trying some directions gives a lower bound of the distance: a verdict "clear" is always
-right.
+The distance of two convex bodies is the greatest gap over all unit directions d, where the gap is the least d . x of one body
+minus the greatest d . x of the other. A sample of directions gives a lower bound of the distance, so the verdict "clear" is
+always right.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,14 @@ from mdp.pose import UP
 from profiles.frozen import Vector
 from profiles.machine import Machine
 
-FIELD = 120  # directions all around, some 18 degrees apart
+FIELD = 120  # number of directions over the sphere, some 18 degrees apart
 
 
 @dataclass(frozen=True)
 class Ring:
-    """A piece of the hot end: the hull of discs [radius, height above the tip] and everything above them."""
+    """A piece of the hot end: the hull of discs [radius, height above the tip] and everything above them. need_mm: the distance
+    it must keep.
+    """
 
     name: str
     discs_mm: tuple[tuple[float, float], ...]
@@ -38,7 +40,7 @@ class Ring:
 
 @dataclass(frozen=True)
 class Block:
-    """A box that moves with the head, relative to the tip."""
+    """A box that moves with the head, relative to the tip. need_mm: the distance it must keep."""
 
     name: str
     min_mm: Vector
@@ -55,8 +57,9 @@ Body = Ring | Block
 
 
 class Head(NamedTuple):
-    """The head for kernels: (k, 2) radii and heights of the hot end's lowest points, (j, 6) least and greatest x y z of boxes
-    that go with the tip, and the distance to keep."""
+    """The head as kernels take it: (k, 2) radii and heights of the hot end's lowest points, (j, 6) least and greatest x y z of
+    the boxes, relative to the tip, and the distance to keep.
+    """
 
     silhouette: Floats
     boxes: Floats
@@ -64,14 +67,14 @@ class Head(NamedTuple):
 
 
 def head_of(machine: Machine) -> Head:
-    """The machine's head as the kernels take it."""
+    """The machine's head in the form that kernels take."""
     boxes = np.array([[*box.min_mm, *box.max_mm] for box in machine.head.boxes], dtype=np.float64).reshape(-1, 6)
     return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes, float(machine.clearance_mm))
 
 
 @no_nrt
 def lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
-    """Height above the tip of the hot end's lowest point at a radius; a great number beyond its widest."""
+    """Height above the tip of the hot end's lowest point at a radius; a huge number beyond its greatest radius."""
     if radius <= silhouette[0, 0]:
         return float(silhouette[0, 1])
     for k in range(len(silhouette) - 1):
@@ -84,7 +87,7 @@ def lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
 def bodies(machine: Machine) -> tuple[Body, ...]:
     """The head's bodies with the distance each must keep: clearance_mm, or its own height above the tip when that is less.
 
-    (The tip itself prints one layer above the table, so what hangs lower than clearance_mm cannot keep clearance_mm.)
+    (The tip itself prints one layer above the table, so a body that hangs lower than clearance_mm cannot keep that distance.)
     """
     profile = machine.head.silhouette_mm
     rings = [
@@ -96,7 +99,9 @@ def bodies(machine: Machine) -> tuple[Body, ...]:
 
 
 def directions(normal: Floats) -> Floats:
-    """(k, 3) unit directions to try against a table of this normal: between it and up, beside it, and all around."""
+    """(k, 3) unit directions for the separating-axis test against a table with this normal: between the normal and up, beside the
+    normal, and over the whole sphere.
+    """
     share = np.linspace(0.0, 1.0, 9)[:, None]
     across = np.array([normal[0], normal[1], 0.0])
     fan = [(1.0 - share) * normal + share * UP, (1.0 - share) * UP - share * across, (1.0 - share) * normal + share * across]

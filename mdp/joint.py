@@ -1,8 +1,8 @@
-"""Joint: the force that breaks a part off its base: a push where it is easiest, at the far end of what the base holds.
+"""Joint: the force that breaks a part off its base: a push at the far end of what the base holds, where it is easiest.
 
-The base is a cold weld. A force F at the distance a from the middle of its section bends it with F a there, whatever way the
-arm points when the force is square to it; in the worst direction that stresses the section by F a / W, W its least section
-modulus, so F = s W / a with the strength s of the weld. Pulled straight off it bears s A, A its area.
+The base is a cold weld. A force F at the distance a from the middle of its section bends it with F a there, whatever the
+direction of the arm, with the force square to it; in the worst direction that stresses the section by F a / W, W its least
+section modulus, so F = s W / a with the strength s of the weld. Pulled straight off it bears s A, A its area.
 """
 
 from collections.abc import Sequence
@@ -19,20 +19,21 @@ from mdp.mesh import Floats, Mesh
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
 from profiles.profile import Profile
 
-BESIDE_MM = 0.02  # of a base plane sections are taken: on it they would be those of a face
-# A share of the square of a model's diameter: the convex hull of a cut through a neck or the root of a limb is smaller.
+BESIDE_MM = 0.02  # from a base plane, where sections are taken: in the plane itself they would be those of a face
+# of the square of a model's diameter: the convex hull of a cut through a neck or the root of a limb is smaller
 BULK = 0.15
-FIRST = 0.15  # of the volume: a first part that is less is a sliver, and no foot for all that leans on it
-TOUCHING_MM2 = 0.01  # sections that share less only meet in an edge
+FIRST = 0.15  # of the volume: a smaller first part is a sliver, not a base for all the parts on it
+TOUCHING_MM2 = 0.01  # sections with less common area meet only in an edge
 
 
 @dataclass(frozen=True)
 class Joint:
-    """What a part's base bears. area_mm2: of all its pieces, each of which is a joint of its own; arm_mm, load_n, tension_n are
-    those of the piece that breaks first: how far its end is, from the middle of its section, and the forces that break it, in
-    newtons, sideways at the end and straight off. seam_mm: how long its rim is where that is seen. contact_share: of its section,
-    what the first layer's beads cover and earlier parts reach up to; plastic_over_room: what that layer gets of the plastic that
-    fits there; None: it is not sliced."""
+    """The strength of a part's base. area_mm2: total area of its pieces, each of which is a joint of its own; arm_mm, load_n,
+    tension_n describe the piece that breaks first: the distance of its far end from the middle of its section, and the forces
+    that break it, N, sideways at that end and straight off. seam_mm: visible length of its rim. contact_share: share of its
+    section that the first layer's beads cover and earlier parts reach; plastic_over_room: plastic in that layer as a share of its
+    volume; None if it is not sliced.
+    """
 
     part: int
     area_mm2: float
@@ -46,7 +47,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A connected piece of a part, the edges (k, 4) of where it stands on others, and the numbers of those."""
+    """A connected piece of a part, the edges (k, 4) of its contact with other pieces, and the numbers of those pieces."""
 
     part: Part
     solid: Solid
@@ -55,14 +56,15 @@ class _Piece:
 
 
 def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
-    """The joints of a decomposition's parts 2, 3, ... in print order; what is printed later and held by nothing else counts
-    with what holds it. Pieces lower than the search's fragments count for nothing where there are others."""
+    """The joints of a decomposition's parts 2, 3, ... in print order; a later part that only this part holds counts as its load.
+    Pieces lower than the search's fragments are ignored if there are others.
+    """
     if len(parts) < 2:
         return ()
     pieces, fragment_mm = _pieces(parts), float(np.sqrt(profile.search.least_interface_mm2))
     joints = []
     for part in parts:
-        if part.on_platform:
+        if part.on_plate:
             continue
         own = [k for k, piece in enumerate(pieces) if piece.part is part]
         high = [k for k in own if part.base.heights_mm(mesh_of(pieces[k].solid).vertices).max() >= fragment_mm] or own
@@ -73,14 +75,15 @@ def joints_of(parts: Sequence[Part], profile: Profile) -> tuple[Joint, ...]:
 
 
 def weakest_of(joints: Sequence[Joint]) -> Joint | None:
-    """The joint that breaks first; None where there is none."""
+    """The joint that breaks first; None if there are none."""
     return min(joints, key=lambda joint: joint.load_n, default=None)
 
 
 def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int = 0) -> bool:
-    """Whether no joint of a model's parts breaks when the nozzle pushes the far end of what it holds, no cut passes through the
-    bulk of the model, where its seam runs round all that one sees of it, and the first part is no sliver of it; always on the
-    paper's terms, which know none of this. by_hand: how many of the last parts a person cut off; theirs are not tested."""
+    """Whether a decomposition is sound: no joint breaks when the nozzle pushes the far end of what it holds, no cut passes
+    through the bulk of the model, where its seam would surround the whole model, and the first part is not a sliver. Always true
+    on the paper's terms, which have none of these. by_hand: number of last parts that the user cut off; these are not tested.
+    """
     search = profile.search.effective
     if search.seam_mm <= 0.0:
         return True
@@ -92,7 +95,7 @@ def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int =
 
 
 def _base_hull_mm2(part: Part) -> float:
-    """The area of the convex hull of what a part stands on, of the largest of its pieces."""
+    """Area of the convex hull of a part's base; of its largest piece, if there are several."""
     pieces = _in_frame(solid_of(part.mesh), part).slice(BESIDE_MM).decompose()
     return max((piece.hull().area() for piece in pieces), default=0.0)
 
@@ -111,7 +114,7 @@ def _joint(pieces: Sequence[_Piece], number: int, strength_mpa: float) -> Joint:
 
 
 def _held(pieces: Sequence[_Piece], number: int) -> set[int]:
-    """The pieces that come off with a piece; where others hold it, too, itself alone."""
+    """The pieces that come off with a piece; only the piece itself if others hold it too."""
     off, waiting = {number}, [number]
     while waiting:
         at = waiting.pop()
@@ -123,7 +126,7 @@ def _held(pieces: Sequence[_Piece], number: int) -> set[int]:
 
 
 def _pieces(parts: Sequence[Part]) -> list[_Piece]:
-    """The pieces of all parts in print order; those of the first part, and they alone, stand on none."""
+    """The pieces of all parts in print order; only those of the first part stand on none."""
     pieces: list[_Piece] = []
     for part in parts:
         earlier = list(pieces)
@@ -138,7 +141,7 @@ def _pieces(parts: Sequence[Part]) -> list[_Piece]:
 
 
 def _meet(one: Solid, other: Solid) -> bool:
-    """Whether the boxes of two solids come as near to each other as pieces that touch."""
+    """Whether the bounding boxes of two solids are as near to each other as touching pieces."""
     (low, high), (least, most) = (np.reshape(solid.bounding_box(), (2, 3)) for solid in (one, other))
     return bool(np.all((low <= most + BESIDE_MM) & (least <= high + BESIDE_MM)))
 

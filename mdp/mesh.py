@@ -1,4 +1,4 @@
-"""Mesh: a closed, oriented triangle mesh in mm, its measures, and what its file paints its faces with: whole numbers 0xRRGGBB."""
+"""Mesh: a closed, oriented triangle mesh in mm with its measures and face colours (integers 0xRRGGBB)."""
 
 import re
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ WRITTEN_COLOUR = re.compile(r"#([0-9a-fA-F]{6})(?:[0-9a-fA-F]{2})?")
 
 
 def dot(vectors: Floats, direction: Floats) -> Floats:
-    """(n,) products of (n, 3) vectors with one direction.
+    """(n,) dot products of (n, 3) vectors with one direction.
 
-    Written out: the same on every machine, and numpy's library for products waits for its threads by spinning, which on two
-    busy cores costs more than the products.
+    Written out so that the result is the same on every machine; numpy's library for products also waits for its threads by
+    spinning, which on two busy cores costs more than the products.
     """
     x, y, z = (float(value) for value in direction)
     products: Floats = vectors[:, 0] * x
@@ -35,7 +35,7 @@ def dot(vectors: Floats, direction: Floats) -> Floats:
 
 
 def crosses_of(vertices: Floats, faces: Ints | Indices) -> Floats:
-    """(m, 3) normals of the faces, as long as twice their areas."""
+    """(m, 3) normals of the faces, with twice their area as length."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
 
@@ -50,8 +50,8 @@ def areas_of(vertices: Floats, faces: Ints | Indices) -> Floats:
 class Mesh:
     """A closed, consistently outward-oriented triangle mesh.
 
-    vertices: (n, 3) float64, mm; faces: (m, 3) int32, counter-clockwise seen from outside; colours: (m,) what the model's file
-    paints each face with, NO_COLOUR: nothing; None: it paints none. The arrays are read-only.
+    vertices: (n, 3) float64, mm; faces: (m, 3) int32, counter-clockwise seen from outside; colours: (m,) colour of each face in
+    the model's file, NO_COLOUR if unpainted; None if the file has no colours. The arrays are read-only.
     """
 
     vertices: Floats
@@ -104,13 +104,13 @@ class Mesh:
         return Mesh(vertices, self.faces, self.colours)
 
     def nearest_face(self, point: Floats) -> tuple[int, float]:
-        """The face with area that is nearest to a point (3,), the first of several, and its distance, mm."""
+        """The nearest face with an area to a point (3,), the first of several, and its distance, mm."""
         corners = self.vertices[self.faces] - point
         edges = np.roll(corners, -1, axis=1) - corners
         lengths = np.einsum("fki,fki->fk", edges, edges)
         share = np.clip(-np.einsum("fki,fki->fk", corners, edges) / np.where(lengths > 0.0, lengths, 1.0), 0.0, 1.0)
         least = np.linalg.norm(corners + share[..., None] * edges, axis=2).min(axis=1)
-        sides = np.einsum("fki,fki->fk", np.cross(corners, edges), self.normals[:, None])  # of the point's shadow on the face
+        sides = np.einsum("fki,fki->fk", np.cross(corners, edges), self.normals[:, None])  # of the point's projection on the face
         height = np.abs(np.einsum("fi,fi->f", corners[:, 0], self.normals))
         distance = np.where((sides >= 0.0).all(axis=1), height, least)
         distance[self.areas_mm2 == 0.0] = np.inf
@@ -123,24 +123,24 @@ class Mesh:
         return 0.0 if at_vertex else self.nearest_face(point)[1]
 
     def to_trimesh(self) -> "Trimesh":
-        """The same as a trimesh.Trimesh, the door to other programs; vertices and faces stay as they are."""
+        """The mesh as a trimesh.Trimesh, for other programs; vertices and faces stay as they are."""
         from trimesh import Trimesh
 
         return Trimesh(self.vertices, self.faces, process=False)
 
     @classmethod
     def from_trimesh(cls, mesh: "Trimesh") -> "Mesh":
-        """A closed trimesh.Trimesh in mm as it is, nothing repaired or moved; mdp.read does both with a file.
+        """A mesh from a closed trimesh.Trimesh in mm, neither repaired nor moved; mdp.read does both with a file.
 
-        Raises MeshError for one that is open, wound both ways or inside out.
+        Raises MeshError for a trimesh that is open, inconsistently wound or inside out.
         """
         if not (mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0):
-            raise MeshError("the trimesh is no solid: closed, one way wound and outside out is expected")
+            raise MeshError("the trimesh is not a solid: a closed, consistently wound mesh with outward normals is expected")
         return cls(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
 def parse_colour(text: str) -> int | None:
-    """The colour of #RRGGBB or #RRGGBBAA, whose alpha is not kept; None for anything else."""
+    """The colour of #RRGGBB or #RRGGBBAA, whose alpha is ignored; None for anything else."""
     match = WRITTEN_COLOUR.fullmatch(text.strip())
     return None if match is None else int(match[1], 16)
 
@@ -151,7 +151,7 @@ def colour_text(colour: int) -> str:
 
 
 def together(meshes: Sequence[Mesh]) -> Mesh:
-    """The surfaces of several meshes as one mesh, their vertices and faces one after the other."""
+    """Several meshes as one mesh, their vertices and faces one after the other."""
     first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     faces = [mesh.faces + begin for mesh, begin in zip(meshes, first, strict=False)]
     colours = None

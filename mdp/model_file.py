@@ -1,4 +1,4 @@
-"""Model file: which file a MODEL argument names, and whether it can be a model at all; loads nothing that takes long."""
+"""Model file: the file that a MODEL argument names, and a quick check that it can be a model; imports nothing slow."""
 
 import os
 from importlib import resources
@@ -13,7 +13,7 @@ DEMO = "demo:"
 def locate(model: str) -> Path:
     """The file of a MODEL argument: `demo:NAME` is a model that ships with the program, anything else a path.
 
-    Raises MeshError for no name at all, and for an unknown demo, naming those there are.
+    Raises MeshError for an empty name, and for an unknown demo, listing the available ones.
     """
     if not model.strip():
         raise MeshError(f"the model's name is empty: a {', '.join(READERS)} file or {DEMO}NAME is expected")
@@ -33,13 +33,13 @@ def locate(model: str) -> Path:
 
 
 def plan_beside(model: str) -> Path | None:
-    """The plan by which a demo is cut where it comes with one, None else, and for any other model. Raises MeshError."""
+    """The plan that ships with a demo model; None for demos without a plan and for other models. Raises MeshError."""
     plan = locate(model).with_suffix(".toml") if model.startswith(DEMO) else None
     return plan if plan is not None and plan.exists() else None
 
 
 def check_file(path: Path) -> None:
-    """Refuse what is no model file at all before any work is done. Raises MeshError."""
+    """Refuse a path that cannot be a model file before any work is done. Raises MeshError."""
     if os.path.isdir(path):  # unlike pathlib's, false for a name that is too long to exist
         raise MeshError(f"{path}: is a folder, not a model file")
     if not os.path.exists(path):

@@ -12,11 +12,11 @@ from profiles.frozen import Vector
 
 UP = np.array([0.0, 0.0, 1.0])
 LEAST_LENGTH, MOST_LENGTH = 1e-6, 1e6  # of a vector that is meant as a direction
-UNIT = 1e-12  # a vector whose squared length differs less from 1 keeps its bits, so that a plan cuts the same planes again
+UNIT = 1e-12  # a vector whose squared length is this close to 1 keeps its bits, so that a plan repeats exactly the same planes
 
 
 def unit_direction(x: float, y: float, z: float) -> Vector | None:
-    """The vector scaled to length 1, no component beyond 1; None if it is not finite, or too short or long to be a direction.
+    """The vector scaled to length 1, no component beyond 1; None if it is not finite, or too short or too long to be a direction.
 
     A component beyond 1, even by one rounding, has no arc sine.
 
@@ -35,11 +35,11 @@ def unit_direction(x: float, y: float, z: float) -> Vector | None:
 class Plane:
     """The points p with normal . p = offset_mm; normal (3,) is the printing direction above the plane.
 
-    limbs_mm: (k, 3) a point on each limb that a cut takes off, where it leaves other pieces above the plane standing; None: it
-    takes all that lies above.
+    limbs_mm: (k, 3) a point on each limb that a cut removes while other pieces above the plane stay; None: the cut removes
+    everything above the plane.
 
-    A normal of another length than 1 is scaled to it; offset_mm is along the scaled one. Raises PlanError for a normal that
-    `unit_direction` refuses.
+    A normal is scaled to length 1; offset_mm refers to the scaled one. Raises PlanError for a normal that `unit_direction`
+    refuses.
     """
 
     normal: Floats

@@ -1,9 +1,9 @@
 """Pose: the tilt and turn of the table that bring a direction of the workpiece upright, and the poses of a whole print.
 
-The table's rotation is R = R_tilt R_turn with each factor a right-handed rotation about its axis by
--sign * (value - zero_deg), the rule of LinuxCNC's xyzac-trt-kins written for any two axes. The search asks for poses as well as
-the machine does; where the workpiece's points are at a pose is in machine.kinematics. A rotation of a whole model is also given
-as turns about x, then y, then z, as process.rotate_deg has it.
+The table's rotation is R = R_tilt R_turn with each factor a right-handed rotation about its axis by -sign * (value - zero_deg),
+the rule of LinuxCNC's xyzac-trt-kins written for any two axes. Poses are here because the search needs them too;
+machine.kinematics has the positions of workpiece points at a pose. A rotation of a whole model is also given as turns about x,
+then y, then z, as in process.rotate_deg.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,23 +19,23 @@ from mdp.plane import UP as UP
 from profiles.axes import RotaryAxis
 from profiles.machine import Machine
 
-SINGULAR = 1e-7  # sine of an angle that no table can show; nearer to the singular pose the turn is not defined
-KNOWN = 256  # rotations
-DECIMALS = 9  # of an angle as a file or a person says it: off by less than a tenth of a micrometre over a metre
-LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
-Three = list[float]  # a vector; numpy's operations on a single one take longer than all else that a pose needs
+SINGULAR = 1e-7  # sine of an angle below any table's resolution; the turn is undefined nearer to the singular pose
+KNOWN = 256  # cached rotations
+DECIMALS = 9  # of an angle as a file or a user states it: accurate to a tenth of a micrometre over a metre
+LEVEL = 1.0 - 1e-12  # sine of the turn about y above which the turns about x and z are about the same axis
+Three = list[float]  # a vector; numpy's operations on a single one take longer than the rest of a pose
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Values of the tilt and the turn axis as the firmware knows them, degrees."""
+    """Positions of the tilt and the turn axis as the firmware counts them, degrees."""
 
     tilt_deg: float
     turn_deg: float
 
 
 def level(machine: Machine) -> Pose:
-    """The pose in which the table is level and unturned."""
+    """The pose with a level, unturned table."""
     return Pose(machine.tilt.zero_deg, machine.turn.zero_deg)
 
 
@@ -57,7 +57,7 @@ def unit(vector: object) -> Floats:
 
 
 def turned_by(angles_deg: tuple[float, float, float]) -> Floats:
-    """(3, 3) the rotation of turns about x, then y, then z."""
+    """(3, 3) rotation composed of turns about x, then y, then z, degrees."""
     whole = np.eye(3)
     for axis, angle in zip(np.eye(3), np.radians(angles_deg), strict=True):
         whole = about(axis, float(angle)) @ whole
@@ -65,7 +65,7 @@ def turned_by(angles_deg: tuple[float, float, float]) -> Floats:
 
 
 def turns_of(rotation: Floats) -> tuple[float, float, float]:
-    """The turns about x, then y, then z that a (3, 3) rotation is made of, degrees.
+    """The turns about x, then y, then z, degrees, that compose a (3, 3) rotation.
 
     >>> turns_of(turned_by((0.0, 0.0, 90.0)))
     (0.0, 0.0, 90.0)
@@ -78,8 +78,7 @@ def turns_of(rotation: Floats) -> tuple[float, float, float]:
 
 
 def turned_further(rotate_deg: tuple[float, float, float], rotation: Floats) -> tuple[float, float, float]:
-    """The process.rotate_deg by which a model is read as it lies when it was read by another one and then turned by a (3, 3)
-    rotation, degrees.
+    """The value of process.rotate_deg that combines an earlier rotate_deg with a further (3, 3) rotation, degrees.
 
     >>> turned_further((30.0, 0.0, 0.0), turned_by((60.0, 0.0, 0.0)))
     (90.0, 0.0, 0.0)
@@ -95,7 +94,7 @@ def axis_rotation(axis: RotaryAxis, value_deg: float) -> Floats:
 
 @lru_cache(maxsize=KNOWN)
 def _about(axis: tuple[float, ...], angle_rad: float) -> Floats:
-    """The same about an axis of any length; everything that turns asks for it at one pose after the other."""
+    """(3, 3) rotation about an axis of any length, radians; cached, since it is needed at one pose after the other."""
     turned = about(unit(axis), angle_rad)
     turned.flags.writeable = False
     return turned
@@ -117,8 +116,8 @@ def shift(machine: Machine, pose: Pose) -> Floats:
 def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = None) -> list[Pose]:
     """Poses within the axis limits that bring `direction` (unit, workpiece frame) to the machine's +z.
 
-    Both branches, each with the turn equivalent nearest to `near_turn_deg` (default: the turn's zero) inside the
-    limits. At a level table any turn serves and the one nearest to `near_turn_deg` is given. Empty: out of reach.
+    Both branches, each with the equivalent turn nearest to `near_turn_deg` (default: the turn's zero) inside the limits. At a
+    level table any turn works, and the nearest to `near_turn_deg` is returned. Empty if the direction is out of reach.
 
     >>> from profiles.profile import load
     >>> [(round(pose.tilt_deg), round(pose.turn_deg)) for pose in poses(load().machine, unit([0.0, 1.0, 1.0]))]
@@ -138,7 +137,7 @@ def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = Non
 
 
 def nearest_turn(value_deg: float, limits_deg: tuple[float, float], near_deg: float) -> float | None:
-    """The value plus whole turns that lies inside the limits and nearest to near_deg; None when none does."""
+    """The equivalent angle (plus whole turns) inside the limits that is nearest to near_deg; None if there is none."""
     least, most = limits_deg[0] - 1e-9, limits_deg[1] + 1e-9
     low, high = ceil((least - value_deg) / 360.0), floor((most - value_deg) / 360.0)
     if low > high:
@@ -152,11 +151,10 @@ def least_rotation(
 ) -> list[Pose]:
     """One pose for every part so that tilt and turn together move least over the whole print, inside limits and cables.
 
-    options: for every part the poses that reach its direction, at least one each; turn equivalents (whole turns) are
-    added here, but not to the first part's, where the print begins. A part printed on the level table may keep the turn
-    of the part before it, whatever that is, where fits(position in options, pose) is true (None: anywhere).
-    Shortest path through the parts, so the result is the best of all combinations; where the cables are wound up, the
-    turn back is part of the path.
+    options: for every part the poses that reach its direction, at least one each; equivalent turns are added here, except for the
+    first part, where the print begins. A part printed on the level table may keep any turn of the part before it, if
+    fits(position in options, pose) is true (None: always). Shortest path through the parts, so the result is optimal; unwinding
+    of the cables is part of the path.
     """
     states = [list(options[0])]
     for position, poses in enumerate(options[1:], start=1):
@@ -178,12 +176,12 @@ def least_rotation(
 
 
 def rotation_deg(a: Pose, b: Pose) -> float:
-    """How far tilt and turn together move from one pose to the other."""
+    """Total rotation of tilt and turn between two poses, degrees."""
     return abs(a.tilt_deg - b.tilt_deg) + abs(a.turn_deg - b.turn_deg)
 
 
 def _equivalents(machine: Machine, poses: Sequence[Pose], reach: int) -> list[Pose]:
-    """The poses with whole turns added, inside the turn's limits and cables, at most `reach` turns from where they are."""
+    """The poses with whole turns added, inside the turn's limits and cables, at most `reach` turns from the given values."""
     least, most = machine.turn.reach_deg
     equivalents = []
     for pose in poses:
@@ -194,14 +192,14 @@ def _equivalents(machine: Machine, poses: Sequence[Pose], reach: int) -> list[Po
 
 
 def _keep_turn(machine: Machine, poses: Sequence[Pose], before: Sequence[Pose], known: Sequence[Pose]) -> list[Pose]:
-    """The poses in which any turn serves, at each turn the part before may be printed at."""
+    """The poses in which any turn works, with each turn of the poses before."""
     free = dict.fromkeys(pose.tilt_deg for pose in poses if _any_turn_serves(machine, pose))
     unturned = dict.fromkeys(Pose(tilt, pose.turn_deg) for tilt in free for pose in before)
     return [pose for pose in unturned if pose not in known]
 
 
 def _any_turn_serves(machine: Machine, pose: Pose) -> bool:
-    """True when the turn axis stands upright: turning does not change which direction of the workpiece is up."""
+    """Whether the turn axis is vertical: turning then does not change the upward direction of the workpiece."""
     x, y, _ = axis_rotation(machine.tilt, pose.tilt_deg) @ unit(machine.turn.axis)
     return hypot(x, y) < SINGULAR
 
@@ -210,8 +208,8 @@ def _angles(tilt_axis: Three, turn_axis: Three, direction: Three) -> list[tuple[
     """Rotations (tilt, turn), radians, with R_tilt R_turn direction = up: subproblem 2 of Paden and Kahan.
 
     The turned direction c has the same turn_axis component as `direction` and the same tilt_axis component as up. Its third
-    component is the height of the corner c of a spherical triangle whose sides are angles; taken from their sines it keeps its
-    digits where c comes near to the plane of the axes (L'Huilier's way of writing the triple product).
+    component is the height of the corner c of a spherical triangle whose sides are angles; computed from their sines it keeps its
+    digits where c comes near to the plane of the axes (L'Huilier's form of the triple product).
     """
     up = UP.tolist()
     k, p, q = _dot(tilt_axis, turn_axis), _dot(turn_axis, direction), tilt_axis[2]
@@ -237,22 +235,22 @@ def _angles(tilt_axis: Three, turn_axis: Three, direction: Three) -> list[tuple[
 
 
 def _angle(a: Three, b: Three) -> float:
-    """Angle between two unit vectors, radians, exact for small ones too."""
+    """Angle between two unit vectors, radians; exact for small angles too."""
     return atan2(hypot(*_cross(a, b)), _dot(a, b))
 
 
 def _turn_between(axis: Three, a: Three, b: Three) -> float:
-    """Angle about `axis` that turns the part of a across it onto that of b, radians in (-pi, pi]."""
+    """Angle about `axis` from the projection of a across it to that of b, radians in (-pi, pi]."""
     across_a, across_b = ([x - n * _dot(axis, vector) for x, n in zip(vector, axis, strict=True)] for vector in (a, b))
     return atan2(_dot(axis, _cross(across_a, across_b)), _dot(across_a, across_b))
 
 
 def _dot(a: Three, b: Three) -> float:
-    """Product of two single vectors, a number."""
+    """Dot product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _cross(a: Three, b: Three) -> Three:
-    """Product of two single vectors, a vector."""
+    """Cross product of two vectors."""
     (ax, ay, az), (bx, by, bz) = a, b
     return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]

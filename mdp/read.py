@@ -1,4 +1,4 @@
-"""Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
+"""Read: a model file as one closed solid in mm that rests on the build plate, centred about the turn axis."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ from mdp.formats.slicer_file import Build
 from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import check_file
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.pose import turned_by
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair
@@ -22,18 +22,19 @@ from mdp.zone import NO_ZONES, Zones
 from profiles.errors import MeshError
 from profiles.messages import advice, key_name, option
 
-LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
+LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of a printable model
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
-SMALL_MM = 10.0  # largest extent of a model that may well be of another unit
+SMALL_MM = 10.0  # a model of a smaller extent may be in another unit
 INCH_MM, METRE_MM = 25.4, 1000.0
-TYPICAL_MM = 100.0  # of several units that would fit the one is proposed by which a model is nearest to this
-MANY_FACES = 500_000  # more make no better print: at 0.2 mm an edge they are an area of 90 cm2
+TYPICAL_MM = 100.0  # among several fitting units, the one that brings the model nearest to this size is proposed
+MANY_FACES = 500_000  # more do not improve a print: with edges of 0.2 mm they cover an area of 90 cm2
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
 
 
 class SizeError(MeshError):
-    """A size that no printer makes. question: that as somebody asks it who can scale the model; units: those that its coordinates
-    may be in instead of mm, the likeliest first, each with what it is scaled by then."""
+    """A size that cannot be printed. question: wording for a front end that can scale the model; units: units that the
+    coordinates may have instead of mm, likeliest first, with the scale of each.
+    """
 
     def __init__(self, sentence: str, question: str, units: dict[str, float]) -> None:
         super().__init__(sentence)
@@ -42,8 +43,9 @@ class SizeError(MeshError):
 
 @dataclass(frozen=True, eq=False)
 class ReadModel:
-    """A model as its file has it: its solid, a short sentence for every repair and for what else a person must know, the marks
-    that a slicer file brings along, where they lie on the solid, and the names of its plates by their numbers."""
+    """A model from a file: its solid, a short sentence for every repair and any other note to the user, the marks of a slicer
+    file placed on the solid, and the names of its plates by number.
+    """
 
     mesh: Mesh
     notes: tuple[str, ...] = ()
@@ -54,8 +56,8 @@ class ReadModel:
 def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0)) -> tuple[Mesh, tuple[str, ...]]:
     """The solid of a model file, and a short sentence for every repair that was made.
 
-    Scaled, then rotated about x, then y, then z, then moved so that its box rests on z = 0 and is centred in x and y.
-    Raises MeshError with one sentence: unreadable, damaged, open, flat, or of a size that no printer makes.
+    Scaled, then rotated about x, then y, then z, then moved so that its box rests on z = 0 and is centred in x and y. Raises
+    MeshError for a model that is unreadable, damaged, open, flat, or of an unprintable size.
     """
     model = read_model(path, scale, rotate_deg)
     return model.mesh, model.notes
@@ -64,11 +66,10 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
 def read_model(
     path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0), plate: int | None = None
 ) -> ReadModel:
-    """The same with the marks that the file brings along.
-
-    plate: of a slicer file with several; None: the first that holds something. Raises MeshError.
+    """A model file as a ReadModel: its solid, notes, and the marks of a slicer file. plate: number of the plate in a slicer file
+    with several; None for the first plate with objects. Raises MeshError.
     """
-    with np.errstate(all="ignore"):  # what overflows is no finite number, or too large: both are said in a sentence below
+    with np.errstate(all="ignore"):  # an overflow gives a value that is not finite or too large, and the checks below report both
         build = _read_build(path, plate)
     try:
         surfaces, taken = printed(build)
@@ -77,7 +78,7 @@ def read_model(
             surfaces = [replace(surface, vertices=surface.vertices * scale, gap=surface.gap * scale) for surface in surfaces]
         solid, repairs = repair(surfaces)
         solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
-        mesh, turn, shift_mm = _place_on_platform(solid, rotate_deg)
+        mesh, turn, shift_mm = _place_on_plate(solid, rotate_deg)
         zones, mark_notes = Marks(build, path, mesh, (scale, turn, shift_mm)).zones()
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
@@ -90,7 +91,7 @@ def read_model(
 
 
 def read_in_place(path: Path) -> Mesh:
-    """The solid of a model file where the file has it, in mm. Raises MeshError as read_mesh, but for sizes."""
+    """The solid of a model file in the file's coordinates, mm. Raises MeshError like read_mesh, except for sizes."""
     try:
         solid, _ = repair(printed(_read_build(path))[0])
     except MeshError as error:
@@ -100,8 +101,9 @@ def read_in_place(path: Path) -> Mesh:
 
 
 def small(mesh: Mesh, suffix: str, turned: bool) -> tuple[str, ...]:
-    """What its unit may be and how to scale it, for a small model in a format that has none (STL, OBJ, PLY, OFF), or whose metres
-    with y up many programs leave out of account (glTF). turned: whether it is rotated as it is read."""
+    """A note that proposes a unit and scale, for a small model in a format without units (STL, OBJ, PLY, OFF), or in glTF, whose
+    metres with y up many programs ignore. turned: whether the model is rotated while it is read.
+    """
     size_mm = float(np.ptp(mesh.bounds_mm, axis=0).max())
     if size_mm >= SMALL_MM or suffix not in (".stl", ".obj", ".ply", ".off", ".glb", ".gltf"):
         return ()
@@ -111,17 +113,17 @@ def small(mesh: Mesh, suffix: str, turned: bool) -> tuple[str, ...]:
     turn = "" if turned else f" and {option('set', 'process.rotate_deg=[90,0,0]')}"
     if size_mm * METRE_MM <= MOST_MM:
         return (
-            f"{longest}if its coordinates are metres with y up, as glTF has them, "
+            f"{longest}if its coordinates are metres with y up, as glTF specifies, "
             f"{advice('set', 'process.scale=1000', 'give')}{turn}",
         )
     return (
-        f"{longest}metres with y up, as glTF has them, would be more than {MOST_MM:g} mm; for a tenth of that "
+        f"{longest}metres with y up, as glTF specifies, would be more than {MOST_MM:g} mm; for a tenth of that "
         f"{advice('set', 'process.scale=100', 'give')}{turn}",
     )
 
 
 def too_fine(mesh: Mesh) -> tuple[str, ...]:
-    """What to reduce, for a mesh of far more faces than a print shows."""
+    """A note that proposes to simplify a mesh with far more faces than a print shows."""
     count = len(mesh.faces)
     if count <= MANY_FACES:
         return ()
@@ -133,21 +135,21 @@ def too_fine(mesh: Mesh) -> tuple[str, ...]:
 
 
 def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
-    """A sentence about the pieces that do not reach the platform, if there are any; closed voids are no pieces."""
+    """A note on pieces that do not reach the build plate, if there are any; closed voids do not count."""
     label, corners = vertex_components(len(mesh.vertices), mesh.faces)[mesh.faces[:, 0]], mesh.vertices[mesh.faces]
     volumes = np.bincount(label, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
     lowest = np.full(len(volumes), np.inf)
     np.minimum.at(lowest, label, corners[:, :, 2].min(axis=1))
-    heights = lowest[(volumes > 0) & (lowest > PLATFORM_TOLERANCE_MM)]
+    heights = lowest[(volumes > 0) & (lowest > PLATE_TOLERANCE_MM)]
     if not len(heights):
         return ()
     pieces = "1 piece floats" if len(heights) == 1 else f"{len(heights)} pieces float at least"
-    height = f"{heights.min():.3g} mm above the platform"
-    return (f"{pieces} {height}, as its file has it, on nothing: only support can hold such, whatever is cut",)
+    height = f"{heights.min():.3g} mm above the build plate"
+    return (f"{pieces} {height} in its file: only support can hold {'it' if len(heights) == 1 else 'them'}, whatever is cut",)
 
 
 def _read_build(path: Path, plate: int | None = None) -> Build:
-    """What a model file prints; one that no slicer has saved is one object."""
+    """A model file as a build; a file without slicer data becomes one object."""
     check_file(path)
     try:
         size = path.stat().st_size
@@ -161,7 +163,9 @@ def _read_build(path: Path, plate: int | None = None) -> Build:
 
 
 def _check_size(surfaces: list[Surface], scale: float) -> None:
-    """Refuses what is too small or too large, naming the scale of the unit that would bring it nearest to a common size."""
+    """Raise MeshError for a model that is too small or too large, or SizeError if another unit would fit; the unit that gives the
+    commonest size comes first.
+    """
     if not scale > 0 or not np.isfinite(scale):
         raise MeshError(f"cannot be scaled by {scale:g}; {key_name('process.scale')} must be above 0")
     corners = np.concatenate([surface.vertices[surface.faces.ravel()] for surface in surfaces])
@@ -183,8 +187,8 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
     )
 
 
-def _place_on_platform(solid: Surface, rotate_deg: tuple[float, float, float]) -> tuple[Mesh, Floats, Floats]:
-    """The mesh of a solid on the platform, and the rotation and the shift that bring it there."""
+def _place_on_plate(solid: Surface, rotate_deg: tuple[float, float, float]) -> tuple[Mesh, Floats, Floats]:
+    """The mesh of a solid on the build plate, and the rotation and shift that move it there."""
     vertices, turn = solid.vertices, np.eye(3)
     if any(rotate_deg):
         turn = np.round(turned_by(rotate_deg), 15)  # rounded so that quarter turns are exact

@@ -15,7 +15,7 @@ from mdp.joint import Joint, weakest_of
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 
-# Okabe and Ito's palette, told apart by colour-blind people too.
+# Okabe and Ito's palette, which colour-blind people can distinguish.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#999999")
 _STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
 _TYPES = (
@@ -37,13 +37,13 @@ _MODEL = (
     'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
 )
 MODEL_PART = "3D/3dmodel.model"
-_DATE = (1980, 1, 1, 0, 0, 0)  # of all entries: the same bytes every time
+_DATE = (1980, 1, 1, 0, 0, 0)  # date of all entries, fixed so that the bytes are always the same
 
 _GLTF = 0.001 * np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000.0]])  # mm with z up to metres with y up
 
 FOLDER_FILES = ("decomposition.3mf", "decomposition.json", "plan.toml", "decomposition.glb")  # beside the parts in a folder
-PART_FILES = "part-[0-9][0-9]*.stl"  # what part_file gives
-HEADING = b"tiltprint part"  # of the STL files that stl() gives
+PART_FILES = "part-[0-9][0-9]*.stl"  # glob pattern of the names from part_file
+HEADING = b"tiltprint part"  # of the STL files that stl() returns
 
 
 def part_file(index: int) -> str:
@@ -60,14 +60,14 @@ def stl(mesh: Mesh) -> bytes:
 
 
 def threemf(decomposition: Decomposition) -> bytes:
-    """All parts in place in one 3MF, each an object of its own colour, the same bytes every time."""
+    """All parts in place in one 3MF, each an object with its own colour; deterministic."""
     content = io.BytesIO()
     write_package(content, model_xml([(part.mesh, f"part {part.index}") for part in decomposition.parts], coloured=True))
     return content.getvalue()
 
 
 def model_xml(bodies: Sequence[tuple[Mesh, str]], metadata: Mapping[str, str] | None = None, coloured: bool = False) -> str:
-    """The model part of a 3MF package with named meshes in place. coloured: each has a colour of its own."""
+    """The model part of a 3MF package with named meshes in place. coloured: each mesh gets its own colour."""
     names = [escape(name, quote=False).replace('"', "&quot;") for _, name in bodies]
     said = "".join(f'<metadata name="{key}">{escape(text, quote=False)}</metadata>' for key, text in (metadata or {}).items())
     bases = "".join(f'<base name="{name}" displaycolor="{COLOURS[k % len(COLOURS)]}FF"/>' for k, name in enumerate(names))
@@ -78,7 +78,7 @@ def model_xml(bodies: Sequence[tuple[Mesh, str]], metadata: Mapping[str, str] | 
 
 
 def write_package(file: BinaryIO, model: str, others: Sequence[tuple[str, bytes]] = ()) -> None:
-    """Write a 3MF package: its model part and other files by their names; a PNG among them is its thumbnail."""
+    """Write a 3MF package: its model part and other files by name; a PNG among them is its thumbnail."""
     suffixes = sorted({suffix for name, _ in others if (suffix := Path(name).suffix.removeprefix(".").lower())})
     kinds = {"png": "image/png"}
     types = "".join(
@@ -100,9 +100,9 @@ def write_package(file: BinaryIO, model: str, others: Sequence[tuple[str, bytes]
 
 
 def glb(decomposition: Decomposition) -> bytes:
-    """All parts in place as one scene for viewers, named and coloured, in print order, the same bytes every time.
+    """All parts in place as one scene for viewers, named and coloured, in print order; deterministic.
 
-    As glTF wants it, in metres with y up: each part, in mm with z up, hangs on a node that turns and scales it.
+    In metres with y up, as glTF specifies: each part, in mm with z up, has a node that turns and scales it.
     """
     from trimesh import Scene
     from trimesh.visual.material import PBRMaterial
@@ -118,7 +118,7 @@ def glb(decomposition: Decomposition) -> bytes:
 
 
 def json_values(decomposition: Decomposition, joints: Sequence[Joint], read_s: float, total_s: float) -> dict[str, Any]:
-    """What `decompose --json` writes."""
+    """The values that `decompose --json` writes."""
     return {
         "model": decomposition.name,
         "faces": len(decomposition.mesh.faces),
@@ -155,18 +155,18 @@ def json_values(decomposition: Decomposition, joints: Sequence[Joint], read_s: f
 
 
 def joint_values(joints: Sequence[Joint]) -> list[dict[str, Any]]:
-    """Joints as JSON has them, the one that breaks first marked as the weakest."""
+    """Joints as JSON values, the one that breaks first marked as the weakest."""
     return [asdict(joint) | {"weakest": joint is weakest_of(joints)} for joint in joints]
 
 
 def front_values(row: FrontRow) -> dict[str, Any]:
-    """What is told of a row of the front."""
+    """A row of the front as JSON values."""
     names = ("parts", "support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2", "time_s", "filament_mm", "chosen")
     return {name: getattr(row, name) for name in names}
 
 
 def plane_values(plane: Plane) -> dict[str, Any]:
-    """A plane as JSON has it."""
+    """A plane as JSON values."""
     limbs = {} if plane.limbs_mm is None else {"limbs_mm": plane.limbs_mm.tolist()}
     return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm, **limbs}
 

@@ -1,8 +1,8 @@
-"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam, no support or support,
-and modifiers: volumes inside which other settings hold.
+"""Zones: boxes of the workpiece frame or faces of a surface that the user marks for no cut, no seam, no support or support, and
+modifiers: volumes with other settings.
 
-Faces are named by a colour of the model's file or by a point and how far they reach around it. Which colour means what is the
-person's to say: a colour alone marks nothing.
+Faces are named by a colour of the model's file, or by a point and an angle up to which the region around it grows. The meaning of
+a colour is the user's choice: a colour alone marks nothing.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,18 +22,20 @@ from mdp.topology.components import connected_components, vertex_components
 from mdp.topology.edges import edges_of
 from profiles.frozen import Vector
 
-FARTHEST_MM = 1.0  # from a surface that a point may lie to mean a place of it
-MOST_GROWN_DEG = 180.0  # no two normals are farther apart
-ROUNDING_COSINE = 1e-6  # an angle of 0 takes the faces of a flat place
-ROUNDING_MM = 1e-6  # a plane may touch what it must not pass through
-GRID_MM, GRID_SHIFT = 1e-4, 0.3141  # of what tells places apart; shifted, for coordinates lie on whole and half micrometres
-MOST_PRODUCTS = 4_000_000  # of directions and points at a time
+FARTHEST_MM = 1.0  # greatest distance of a point from the surface that it marks
+MOST_GROWN_DEG = 180.0  # greatest angle between two normals
+ROUNDING_COSINE = 1e-6  # an angle of 0 selects the faces of a flat region
+ROUNDING_MM = 1e-6  # a plane may touch a zone that it must not pass through
+# resolution for comparing points; shifted, since coordinates lie on whole and half micrometres
+GRID_MM, GRID_SHIFT = 1e-4, 0.3141
+MOST_PRODUCTS = 4_000_000  # of directions and points that are processed at a time
 
 
 @dataclass(frozen=True)
 class Zone:
-    """A box by its least and greatest x, y, z, mm; axes: rows of the rotation whose x, y, z they are, None: the frame's own.
-    room: a box around its model, outside of which are others that it does not mark; None: there are no others."""
+    """A box by its least and greatest x, y, z, mm. axes: rows of the rotation to these coordinates, None for those of the frame.
+    room: a box around the zone's model, to which the zone is limited; None if there are no other models.
+    """
 
     min_mm: Vector
     max_mm: Vector
@@ -41,17 +43,17 @@ class Zone:
     room: "Zone | None" = None
 
     def along(self, places: Floats) -> Floats:
-        """(..., 3) places or directions of the frame as the box's own x, y, z."""
+        """(..., 3) points or directions of the frame in the box's own coordinates."""
         return places if self.axes is None else places @ np.array(self.axes).T
 
     @property
     def corners(self) -> Floats:
-        """(8, 3) corners."""
+        """(8, 3) corners of the box."""
         own = corners(self.min_mm, self.max_mm)
         return own if self.axes is None else own @ np.array(self.axes)
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Zone":
-        """The box with every place p of it at rotation @ p + shift_mm."""
+        """The box after moving every point p to rotation @ p + shift_mm."""
         axes = self.axes
         if not np.array_equal(rotation, np.eye(3)):
             x, y, z = ((np.eye(3) if axes is None else np.array(axes)) @ rotation.T).tolist()
@@ -69,7 +71,9 @@ class Zone:
         return np.stack([centre - reach, centre + reach], axis=1)[:, None]
 
     def faces(self, mesh: Mesh) -> Mask:
-        """(m,) which faces reach into the box: no axis of a box, a triangle or two edges parts them (Akenine-Moeller)."""
+        """(m,) faces that extend into the box: no axis of the box, normal of the triangle or product of edges separates them
+        (Akenine-Moeller).
+        """
         middle, half = 0.5 * np.add(self.min_mm, self.max_mm), 0.5 * np.subtract(self.max_mm, self.min_mm)
         places, normals = self.along(mesh.vertices)[mesh.faces] - middle, self.along(mesh.normals)
         edges = np.roll(places, -1, axis=1) - places
@@ -89,24 +93,24 @@ class Painted:
     colour: int
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Painted":
-        """The same, for they stay those wherever the model is."""
+        """The zone itself: painted faces stay the same wherever the model is."""
         return self
 
     def faces(self, mesh: Mesh) -> Mask:
-        """(m,) which faces of a mesh they are."""
+        """(m,) faces of a mesh with the colour."""
         return np.zeros(len(mesh.faces), dtype=np.bool_) if mesh.colours is None else mesh.colours == self.colour
 
 
 @dataclass(frozen=True, eq=False)
 class KeptFaces:
-    """Faces of a model by what hangs together: the vertices of each patch, one patch after the other, and where each begins."""
+    """Connected patches of a model's faces: their vertices, patch by patch, and the start of each patch."""
 
     points: Floats
     starts: Indices
 
     @classmethod
     def of(cls, mesh: Mesh, chosen: Mask) -> "KeptFaces":
-        """The chosen (m,) faces of a mesh."""
+        """The patches of the chosen (m,) faces of a mesh."""
         faces = mesh.faces[chosen]
         label = vertex_components(len(mesh.vertices), faces)
         vertices = np.unique(faces)
@@ -114,8 +118,9 @@ class KeptFaces:
         return cls(mesh.vertices[vertices], np.unique(label[vertices], return_index=True)[1])
 
     def spans_mm(self, directions: Floats) -> Floats:
-        """(k, n, 2) spans of direction . p between which a plane passes through a patch, for (k, 3) directions; those that
-        overlap are one, and where that leaves a direction fewer than others it ends in empty ones."""
+        """(k, n, 2) spans of direction . p in which a plane passes through a patch, for (k, 3) directions; overlapping spans are
+        merged, and unused entries at the end are empty.
+        """
         step = max(1, MOST_PRODUCTS // max(len(self.points), 1))
         low, high = np.empty((2, len(directions), len(self.starts)))
         for first in range(0, len(directions), step):
@@ -126,7 +131,7 @@ class KeptFaces:
 
 
 def _united(low: Floats, high: Floats) -> Floats:
-    """(k, n, 2) unions of (k, s) spans by rows."""
+    """(k, n, 2) row-wise unions of (k, s) spans."""
     order = np.argsort(low, axis=1)
     low, high = np.take_along_axis(low, order, 1), np.take_along_axis(high, order, 1)
     reach = np.maximum.accumulate(high, axis=1)
@@ -142,18 +147,20 @@ def _united(low: Floats, high: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Grown:
-    """The faces that hang together with the one at a point of the workpiece frame and turn from it by at most so much."""
+    """The faces connected with the one at a point of the workpiece frame whose normals deviate from its normal by at most
+    angle_deg.
+    """
 
     point_mm: Vector
     angle_deg: float
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Grown":
-        """The same with its point p at rotation @ p + shift_mm."""
+        """The zone after moving its point p to rotation @ p + shift_mm."""
         x, y, z = (rotation @ np.array(self.point_mm) + shift_mm).tolist()
         return replace(self, point_mm=(x, y, z))
 
     def faces(self, mesh: Mesh) -> Mask:
-        """(m,) which faces of a mesh they are; those without area count where they link others."""
+        """(m,) faces of a mesh in the zone; faces without area count if they connect others."""
         face = mesh.nearest_face(np.array(self.point_mm))[0]
         alike = mesh.normals @ mesh.normals[face] >= cos(radians(self.angle_deg)) - ROUNDING_COSINE
         alike |= mesh.areas_mm2 == 0.0
@@ -164,22 +171,22 @@ class Grown:
         return together
 
     def away_mm(self, mesh: Mesh) -> float:
-        """How far from the surface the point lies."""
+        """Distance of the point from the surface, mm."""
         return mesh.nearest_face(np.array(self.point_mm))[1]
 
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """Faces of a model by where their corners lie, (k, 3, 3)."""
+    """Faces of a model given by the positions of their corners, (k, 3, 3)."""
 
     corners: Floats
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Triangles":
-        """The same with every corner p at rotation @ p + shift_mm."""
+        """The zone after moving every corner p to rotation @ p + shift_mm."""
         return Triangles(self.corners @ rotation.T + shift_mm)
 
     def faces(self, mesh: Mesh) -> Mask:
-        """(m,) which faces of a mesh they are, by their middles to a tenth of a micrometre."""
+        """(m,) faces of a mesh in the zone, matched by their centres to a tenth of a micrometre."""
         middles = [corners.mean(axis=1) for corners in (self.corners, mesh.vertices[mesh.faces])]
         cells = [np.floor(places / GRID_MM + GRID_SHIFT).astype(np.int64) for places in middles]
         _, cell = np.unique(np.concatenate(cells), axis=0, return_inverse=True)
@@ -190,25 +197,25 @@ class Triangles:
 
 @dataclass(frozen=True)
 class MeshVolume:
-    """A closed mesh that lies in the workpiece frame, and the file that it is read from; room: as of Zone."""
+    """A closed mesh in the workpiece frame, and the file from which it was read. room: as in Zone."""
 
     file: Path
     mesh: Mesh = field(compare=False, repr=False)
     room: Zone | None = None
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "MeshVolume":
-        """The volume with every place p of it at rotation @ p + shift_mm."""
+        """The volume after moving every point p to rotation @ p + shift_mm."""
         room = None if self.room is None else self.room.transform(rotation, shift_mm)
         return replace(self, mesh=self.mesh.transform(rotation, shift_mm), room=room)
 
     @property
     def box(self) -> Zone:
-        """The box around it."""
+        """The bounding box."""
         (x0, y0, z0), (x1, y1, z1) = self.mesh.bounds_mm.tolist()
         return Zone((x0, y0, z0), (x1, y1, z1), room=self.room)
 
     def faces(self, mesh: Mesh) -> Mask:
-        """(m,) which faces of a mesh reach into the box around it."""
+        """(m,) faces of a mesh that extend into the bounding box."""
         return self.box.faces(mesh)
 
 
@@ -216,7 +223,7 @@ Volume = Zone | MeshVolume
 
 
 def in_room(volume: Volume, room: Zone) -> Volume:
-    """A volume that ends at a box around its model, too, where other models stand beside it."""
+    """A volume limited to a box around its model as well, for a plate with several models."""
     return replace(volume, room=replace(room, room=volume.room))
 
 
@@ -225,23 +232,23 @@ AnyZone = Zone | MeshVolume | Painted | Grown | Triangles
 
 @dataclass(frozen=True)
 class Modifier:
-    """A volume inside which other values of the process hold, by their keys."""
+    """A volume with other values of process settings, by their keys."""
 
     volume: Volume
     process: dict[str, Any]
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Modifier":
-        """The same with every place p at rotation @ p + shift_mm."""
+        """The modifier after moving every point p to rotation @ p + shift_mm."""
         return replace(self, volume=self.volume.transform(rotation, shift_mm))
 
 
 @dataclass(frozen=True)
 class Zones:
-    """The places of a model that a person marks.
+    """The zones that a user marks on a model.
 
-    keep: no plane passes through; no_seam: rims there weigh many times, and layers do not begin there; no_support: what overhangs
-    there is not held up, and weighs many times; support: whatever overhangs there is held up. modifiers: where other settings
-    hold, those of a later one in place of an earlier one's.
+    keep: no plane passes through; no_seam: rims there have a large weight, and z-seams avoid them; no_support: overhangs there
+    get no support and have a large weight; support: all overhangs there get support; modifiers: volumes with other settings,
+    where later ones override earlier ones.
     """
 
     keep: tuple[AnyZone, ...] = ()
@@ -251,36 +258,36 @@ class Zones:
     modifiers: tuple[Modifier, ...] = ()
 
     def on(self, mesh: Mesh) -> "ZonesOnModel":
-        """The zones with the faces that they mean on a model."""
+        """The zones resolved to the faces of a model."""
         keep = tuple(zone if isinstance(zone, Zone) else KeptFaces.of(mesh, zone.faces(mesh)) for zone in self.keep)
         no_seam, no_support, support = (Marked.of(mesh, zones) for zones in (self.no_seam, self.no_support, self.support))
         return ZonesOnModel(keep, no_seam, no_support, support, self.modifiers)
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Zones":
-        """The zones with every place p at rotation @ p + shift_mm."""
+        """The zones after moving every point p to rotation @ p + shift_mm."""
         return self._each(lambda zones: tuple(zone.transform(rotation, shift_mm) for zone in zones))
 
     def _each(self, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> "Zones":
-        """The zones with every kind of them changed, and the modifiers."""
+        """The zones with every kind, modifiers included, changed by a function."""
         return Zones(*(change(getattr(self, kind.name)) for kind in fields(self)))
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of zones."""
         return sum(len(getattr(self, entry.name)) for entry in fields(self))
 
     @property
     def boxes(self) -> "Zones":
-        """Those that are boxes."""
+        """The zones that are boxes."""
         return self._each(lambda zones: tuple(filter(_is_box, zones)))
 
     @property
     def shapes(self) -> "Zones":
-        """Those that are none."""
+        """The zones that are not boxes."""
         return self._each(lambda zones: tuple(zone for zone in zones if not _is_box(zone)))
 
     def beside(self, others: "Zones") -> "Zones":
-        """These zones and others; where modifiers of both meet, the others' settings hold."""
+        """These zones and others; where modifiers of both overlap, the others override."""
         return Zones(*(getattr(self, entry.name) + getattr(others, entry.name) for entry in fields(self)))
 
 
@@ -290,41 +297,43 @@ def _is_box(zone: "AnyZone | Modifier") -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Marked:
-    """The marks of one kind: volumes of the workpiece frame, and (m,) faces of a mesh; None: none is named."""
+    """The marks of one kind: volumes of the workpiece frame, and (m,) faces of a mesh; None if no faces are marked."""
 
     volumes: tuple[Volume, ...] = ()
     faces: Mask | None = None
 
     @classmethod
     def of(cls, mesh: Mesh, zones: Sequence[AnyZone]) -> "Marked":
-        """What zones mark of a mesh."""
+        """The marks of some zones on a mesh."""
         named = [zone.faces(mesh) for zone in zones if not isinstance(zone, Volume)]
         volumes = tuple(zone for zone in zones if isinstance(zone, Volume))
         return cls(volumes, np.any(named, axis=0) if named else None)
 
     @property
     def anywhere(self) -> bool:
-        """Whether anything is marked at all."""
+        """Whether anything is marked."""
         return bool(self.volumes) or self.faces is not None
 
     def among(self, sources: Ints) -> "Marked":
-        """The same for a piece of the mesh. sources: (k,) of which of its faces each of the piece's is one, below 0: of none."""
+        """The marks on a piece of the mesh. sources: (k,) source face in the mesh of each of the piece's faces, negative if it
+        has none.
+        """
         if self.faces is None:
             return self
         known = (sources >= 0) & (sources < len(self.faces))
         return replace(self, faces=known & self.faces[np.where(known, sources, 0)])
 
     def transform(self, rotation: Floats, shift_mm: Floats) -> "Marked":
-        """The same for a mesh with every vertex v at rotation @ v + shift_mm."""
+        """The marks after moving every vertex v of the mesh to rotation @ v + shift_mm."""
         return replace(self, volumes=tuple(volume.transform(rotation, shift_mm) for volume in self.volumes))
 
     def within(self, room: Zone) -> "Marked":
-        """The same, but nothing is marked outside of a box around the mesh."""
+        """The marks limited to a box around the mesh."""
         return replace(self, volumes=tuple(in_room(volume, room) for volume in self.volumes))
 
     @classmethod
     def together(cls, marks: Sequence[tuple["Marked", int]]) -> "Marked":
-        """The marks of several meshes that become one; with each the number of its mesh's faces."""
+        """The marks of several meshes that become one, each given with its number of faces."""
         volumes = tuple(volume for mark, _ in marks for volume in mark.volumes)
         if all(mark.faces is None for mark, _ in marks):
             return cls(volumes)
@@ -332,14 +341,14 @@ class Marked:
         return cls(volumes, np.concatenate(faces))
 
     def touched(self, mesh: Mesh) -> Mask:
-        """(m,) the faces of the mesh that are marked or reach into a volume."""
+        """(m,) faces of the mesh that are marked or extend into a marked volume."""
         faces = touched(mesh, self.volumes)
         return faces if self.faces is None else faces | self.faces
 
 
 @dataclass(frozen=True, eq=False)
 class ZonesOnModel:
-    """The zones of a search, with the faces of the model that they mean."""
+    """The zones of a search, resolved to faces of the model."""
 
     keep: tuple[Zone | KeptFaces, ...] = ()
     no_seam: Marked = Marked()
@@ -349,11 +358,11 @@ class ZonesOnModel:
 
     @property
     def by_face(self) -> bool:
-        """Whether it matters of which face of the model each face of a part is a piece."""
+        """Whether the source face of each face of a part matters."""
         return self.no_seam.faces is not None or self.no_support.anywhere or self.support.faces is not None
 
     def crossed(self, plane: Plane) -> int | None:
-        """Number, from 1, of the first zone to keep whole that a plane passes through."""
+        """Number, from 1, of the first [[keep]] zone that a plane passes through; None if there is none."""
         for number, zone in enumerate(self.keep, start=1):
             low, high = zone.spans_mm(plane.normal[None])[0].T
             if ((low < plane.offset_mm) & (plane.offset_mm < high)).any():
@@ -365,7 +374,7 @@ NO_ZONES, NOWHERE, UNMARKED = Zones(), ZonesOnModel(), Marked()
 
 
 def touched(mesh: Mesh, zones: Sequence[Volume]) -> Mask:
-    """(m,) which faces reach into any of the zones."""
+    """(m,) faces that extend into any of the zones."""
     faces = np.zeros(len(mesh.faces), dtype=np.bool_)
     for zone in zones:
         faces |= zone.faces(mesh)
@@ -373,5 +382,5 @@ def touched(mesh: Mesh, zones: Sequence[Volume]) -> Mask:
 
 
 def spans_mm(directions: Floats, zones: Sequence[Zone | KeptFaces]) -> Floats:
-    """(k, n, 2) spans of direction . p between which a plane passes through a zone, for (k, 3) directions."""
+    """(k, n, 2) spans of direction . p in which a plane passes through a zone, for (k, 3) directions."""
     return np.concatenate([np.zeros((len(directions), 0, 2)), *(zone.spans_mm(directions) for zone in zones)], axis=1)

@@ -1,1 +1,1 @@
-"""What the user's machine, material and process are: TOML files read into validated, frozen models."""
+"""The user's machine, material and process profiles: TOML files read into validated, frozen models."""

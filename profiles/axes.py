@@ -1,4 +1,4 @@
-"""Axes: the linear axes of a machine, and the rotary ones that tilt and turn its table."""
+"""Axes: the linear axes of a machine, and the rotary axes that tilt and turn its table."""
 
 from collections.abc import Iterable
 from typing import Annotated, Literal
@@ -15,7 +15,7 @@ def _reversed(limits: Limits, name: str) -> list[str]:
 
 
 class LinearAxis(Frozen):
-    """One of X, Y, Z as the firmware means it."""
+    """One of the axes X, Y, Z, in the firmware's coordinates."""
 
     limits_mm: Limits = advanced("Travel", "limits build volume size stroke")(
         ..., "least and greatest position the firmware accepts, mm"
@@ -39,8 +39,8 @@ class LinearAxis(Frozen):
 class RotaryAxis(Frozen):
     """The tilt or the turn axis of the table.
 
-    A point w of the table moves by the right-handed rotation about `axis` through `point_mm` by
-    -sign * (value - zero_deg): the rule of LinuxCNC's xyzac-trt-kins, whose default sign is -1.
+    A point w of the table moves by the right-handed rotation about `axis` through `point_mm` by -sign * (value - zero_deg): the
+    rule of LinuxCNC's xyzac-trt-kins, whose default sign is -1.
     """
 
     letter: Letter = advanced("Letter in G-code", "axis A B C")(..., "the G-code word of this axis")
@@ -77,7 +77,7 @@ class RotaryAxis(Frozen):
 
     @property
     def reach_deg(self) -> Limits:
-        """Least and greatest value a print may use: the firmware's limits, and what the cables let the axis wind."""
+        """Least and greatest value that a print may use, limited by the firmware and by how far the cables let the axis turn."""
         if self.budget_deg is None:
             return self.limits_deg
         least, most = self.limits_deg
@@ -93,7 +93,7 @@ class RotaryAxis(Frozen):
 
 
 class StillAxis(RotaryAxis):
-    """The rotary axis of a machine that has none: it stands at 0."""
+    """The rotary axis of a machine without one; it stays at 0."""
 
     point_mm: Vector = (0.0, 0.0, 0.0)
     sign: Literal[-1, 1] = -1

@@ -1,7 +1,7 @@
-"""Effect of a changed setting on parts that were found before.
+"""Effect of a changed setting on parts that a search has already found.
 
-A search reads all of its own keys, most keys of the machine and few of process and material; the parts it finds are priced
-afterwards. So each section has a usual effect, and keys with another one say so where they are declared.
+A search reads all of its own keys, most keys of the machine and few of process and material; its parts are priced afterwards.
+Each section therefore has a usual effect, and a key with another one declares it.
 """
 
 from collections.abc import Iterator
@@ -17,13 +17,13 @@ USUAL = {"process": Effect.PRICES, "material": Effect.PRICES, "machine": Effect.
 
 
 def effect_of(key: str) -> Effect:
-    """The effect of a key, with its section and dots. Raises KeyError for one that is not known."""
+    """The effect of a key, given by its dotted name with the section. Raises KeyError for an unknown key."""
     section = key.partition(".")[0]
     return _effect(dict(keys(SECTIONS[section], f"{section}."))[key], USUAL[section])
 
 
 def effect_of_change(before: Profile, after: Profile) -> Effect:
-    """The greatest effect of all that differs between two profiles, the settings of single parts aside: no search reads them."""
+    """The greatest effect of all differences between two profiles, except for settings of single parts, which no search reads."""
     several = (_effects(getattr(before, section), getattr(after, section), usual) for section, usual in USUAL.items())
     return max((effect for effects in several for effect in effects), default=Effect.NONE)
 

@@ -1,20 +1,20 @@
-"""The tree of errors a person can fix; each class below it is raised in one package, machine/cli/cli.py makes sentences of them.
+"""Errors that the user can fix; each class below UserError is raised by one package, and machine/cli/cli.py prints them.
 
-UserError                         message (one sentence: thing, value, what is allowed) and exit 1; by itself where nobody
-                                  catches an error of its kind apart from others
+UserError                         message (one sentence: thing, value, what is allowed) and exit 1; raised itself where such an
+                                  error is not caught separately
   ProfileError                    profiles: all problems of a file or of the --set options at once
-  MeshError                       mdp: unreadable, empty, open, flat: says what and where
+  MeshError                       mdp: unreadable, empty, open, flat: what and where
   PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why
-  SliceError                      slicer: a setting that cannot be sliced with
+  SliceError                      slicer: a setting with which slicing is impossible
   MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
   GcodeError                      machine: a G-code text that cannot be read, with the line
   OutputError                     machine: a file that cannot be written
-  PrinterError                    machine/link; by itself what the protocol does not allow a printer to say
-    PortError                     cannot open, lost
-    LocalProtocolError            we broke the protocol
+  PrinterError                    machine/link; itself: a reply that the protocol does not allow
+    PortError                     cannot be opened, or was lost
+    LocalProtocolError            this program broke the protocol
     FirmwareError                 the printer reported an error; its own text is kept
-    SilenceError                silence beyond the bound
-    ServerError                 machine/printing/servers: a print server that cannot be reached or that refuses
+    SilenceError                the printer was silent for too long
+    ServerError                 machine/printing/servers: a print server that cannot be reached, or refuses
   JournalError                    machine/link: a journal from which a print cannot be resumed
 
 Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, exit 130.
@@ -24,8 +24,8 @@ from profiles.messages import terminal_words
 
 
 class UserError(Exception):
-    """Something the person at the keyboard can fix; str() is the full sentence for a terminal, f"{error}" keeps the marks of keys
-    and options (see messages.py). forcible: --force goes past it."""
+    """An error that the user can fix; str() is the full sentence for a terminal, f"{error}" keeps the marks of keys and options
+    (see messages.py). forcible: --force overrides it."""
 
     def __init__(self, *sentence: object, forcible: bool = False) -> None:
         super().__init__(*sentence)
@@ -39,7 +39,7 @@ class UserError(Exception):
 
 
 def reason(error: OSError) -> str:
-    """What the system says of it, as the end of a sentence."""
+    """The operating system's description of an error, as the end of a sentence."""
     return (error.strerror or str(error)).lower()
 
 
@@ -53,7 +53,7 @@ def first_line(error: BaseException) -> str:
 
 
 def causes(error: BaseException | None) -> list[BaseException]:
-    """An error, then what lies beneath it: what it was raised from, or while what was handled."""
+    """An error and the errors it was raised from, or while handling which it was raised."""
     beneath: list[BaseException] = []
     while error is not None and error not in beneath:
         beneath.append(error)
@@ -62,7 +62,7 @@ def causes(error: BaseException | None) -> list[BaseException]:
 
 
 def add_words(error: BaseException, words: str) -> None:
-    """Say more about an error on its way: a UserError in its sentence behind a semicolon, any other in a note."""
+    """Add details to an error on its way up: to the sentence of a UserError after a semicolon, to any other as a note."""
     if isinstance(error, UserError):
         error.args = (f"{error}; {words}",)
     else:
@@ -70,7 +70,7 @@ def add_words(error: BaseException, words: str) -> None:
 
 
 def notes(error: BaseException) -> str:
-    """The notes that were added to an error on its way, each behind a semicolon; "" where there are none."""
+    """The notes added to an error, each after a semicolon; "" if there are none."""
     return "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
 
 
@@ -87,11 +87,11 @@ class PlanError(UserError):
 
 
 class SliceError(UserError):
-    """A part cannot be sliced with these settings."""
+    """A part that cannot be sliced with these settings."""
 
 
 class MoveError(UserError):
-    """A move the machine cannot make; the message names part, axis, value and what is allowed."""
+    """A move that the machine cannot make; the message names part, axis, value and limit."""
 
 
 class GcodeError(UserError):
@@ -123,11 +123,11 @@ class SilenceError(PrinterError):
 
 
 class ServerError(PrinterError):
-    """A print server on the network cannot be reached, or refuses what was asked of it; the message names it."""
+    """A print server on the network that cannot be reached or refuses a request; the message names it."""
 
 
 class NoAnswerError(ServerError):
-    """A print server was reached but did not answer: whether it has done what was asked is not known."""
+    """A print server that was reached but did not answer: its state is unknown."""
 
 
 class JournalError(UserError):
@@ -135,7 +135,7 @@ class JournalError(UserError):
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
-    """A number of things in words.
+    """A count with its noun.
 
     >>> counted(1, "edge"), counted(2, "edge"), counted(0, "vertex", "vertices")
     ('1 edge', '2 edges', '0 vertices')

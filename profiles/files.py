@@ -1,5 +1,5 @@
-"""Files: written whole or not at all, locked for one process at a time on every system that Python runs on, only the newest
-kept; and damaged zips.
+"""Files: written completely or not at all, locked between processes on every system that Python supports, and limited to the
+newest; errors of damaged zips.
 """
 
 import errno
@@ -25,35 +25,35 @@ except ImportError:  # Windows
 if sys.platform == "win32":
     import msvcrt
 
-LOCKED_BYTE = 1 << 30  # on Windows, where nobody else can read what is locked: far behind the end, which LockFileEx allows
-LOCK = ".lock"  # the file in a folder that is locked for it, where a folder cannot be opened
-DAMAGED_ZIP: tuple[type[Exception], ...] = (  # what zipfile raises for one, beside OSError
+LOCKED_BYTE = 1 << 30  # on Windows, where others cannot read a locked byte: far beyond the end, which LockFileEx allows
+LOCK = ".lock"  # the file that is locked in place of its folder where a folder cannot be opened
+DAMAGED_ZIP: tuple[type[Exception], ...] = (  # what zipfile raises for a damaged file, besides OSError
     BadZipFile,
     EOFError,
     LookupError,  # there is no such member
-    NotImplementedError,  # a compression that is not known
+    NotImplementedError,  # an unknown compression
     RuntimeError,  # a password
     ValueError,
     lzma.LZMAError,
-    struct.error,  # a mangled directory
+    struct.error,  # a damaged directory
     zlib.error,
 )
-PRIVATE, SHARED = 0o600, 0o666  # modes: for this user alone, for all whom the umask does not exclude
+PRIVATE, SHARED = 0o600, 0o666  # modes: for this user only, for everybody whom the umask does not exclude
 
 
 def is_zip(file: Path) -> bool:
     """Whether a file is a zip, or was one before it was damaged."""
     try:
         return is_zipfile(file)
-    except BadZipFile:  # of its 64-bit directory; for all else that is wrong with it is_zipfile has an answer
+    except BadZipFile:  # a damaged 64-bit directory; is_zipfile detects everything else
         return True
 
 
 @contextmanager
 def whole_file(path: Path, mode: int = PRIVATE) -> Iterator[BinaryIO]:
-    """A binary file that gets its name only when the block ends without an error: a half-written one is never seen.
+    """A binary file that gets its name only when the block ends without an error, so that no incomplete file is ever visible.
 
-    Each writer has a temporary file of its own, in the same folder. mode: less what the umask takes away. Raises OSError.
+    Each writer has its own temporary file in the final folder. mode: reduced by the umask. Raises OSError.
     """
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".tiltprint-")
     beside = Path(name)
@@ -68,18 +68,18 @@ def whole_file(path: Path, mode: int = PRIVATE) -> Iterator[BinaryIO]:
 
 
 def write_whole(path: Path, content: bytes, mode: int = PRIVATE) -> None:
-    """Write a file whole or not at all. Raises OSError, then what was there before is there still."""
+    """Write a file completely or not at all. Raises OSError, which leaves an existing file unchanged."""
     with whole_file(path, mode) as file:
         file.write(content)
 
 
 def modified_s(path: Path) -> float:
-    """When a file was written last, seconds since 1970."""
+    """Time of a file's last change, seconds since 1970."""
     return path.stat().st_mtime
 
 
 def dated_name() -> str:
-    """Begin of a file's name that no other has, and by which names are sorted as their files were begun."""
+    """A unique beginning of a file name; names sort by the time at which they were made."""
     return f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
 
 
@@ -89,8 +89,8 @@ def keep_newest(
     when: Callable[[Path], Any] = modified_s,
     in_use: Callable[[Path], bool] = lambda path: False,
 ) -> list[Path]:
-    """Delete all but the newest `count` files or folders; those that stay, the newest first. when: what they are sorted by: their
-    date, or a name that begins with it. in_use: which older ones stay, too.
+    """Delete all but the newest `count` files or folders, and return those kept, newest first. when: the key they are sorted by,
+    a date or a name that begins with it. in_use: whether an older one is kept too.
 
     Raises OSError.
     """
@@ -107,7 +107,7 @@ def keep_newest(
 
 
 def remove_older(paths: Iterable[Path], seconds: float) -> None:
-    """Delete the files that were written longer ago, as far as possible."""
+    """Delete the files last written before a time, as far as possible."""
     for path in paths:
         with suppress(OSError):
             if time.time() - modified_s(path) > seconds:
@@ -121,15 +121,15 @@ def _umask() -> int:
 
 
 def lock(descriptor: int, shared: bool = False) -> bool:
-    """Lock an open file until it is closed; False when another process holds it. shared: with others who only read.
+    """Lock an open file until it is closed; False if another process holds it. shared: together with other readers.
 
-    Where the system or the disk has no locks nothing is known of other processes: True.
+    Returns True where the system or the disk has no locks, since other processes are then unknown.
     """
     return _try_lock(descriptor, shared) is not False
 
 
 def _try_lock(descriptor: int, shared: bool) -> bool | None:
-    """Whether it could be locked; None where there are no locks."""
+    """Whether the file could be locked; None where there are no locks."""
     try:
         if sys.platform == "win32":
             os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
@@ -144,13 +144,13 @@ def _try_lock(descriptor: int, shared: bool) -> bool | None:
 
 
 def lock_folder(folder: Path, surely: bool = False) -> int | None:
-    """Lock a folder of this user's until the descriptor is closed; None when another process holds it, or it is somebody else's.
+    """Lock a folder of this user until the descriptor is closed; None if another process holds it or it belongs to another user.
 
-    surely: None also where there are no locks, so that nothing is known of other processes. Raises OSError.
+    surely: None also where there are no locks. Raises OSError.
     """
     if hasattr(os, "O_DIRECTORY"):
         opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    else:  # Windows opens no folder, and keeps each user's own apart itself
+    else:  # Windows opens no folder, and separates users itself
         opened = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
     own = not hasattr(os, "geteuid") or os.fstat(opened).st_uid == os.geteuid()
     locked = _try_lock(opened, False) if own else False
@@ -161,7 +161,7 @@ def lock_folder(folder: Path, surely: bool = False) -> int | None:
 
 
 def remove_locked(folder: Path, descriptor: int) -> None:
-    """Remove a folder that lock_folder() has locked, as far as possible; the lock goes last. Windows removes no open file."""
+    """Remove a folder locked by lock_folder(), as far as possible, its lock last. Windows removes no open file."""
     for path in folder.iterdir() if folder.is_dir() else ():
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)

@@ -1,7 +1,7 @@
-"""Folders: where the user's settings, compiled kernels and traces of runs are, also where there is no home for them.
+"""Folders for the user's settings, compiled kernels and logs, also without a home folder.
 
-A container's user often has no name, no home, or one that cannot be written. Then the folder for temporary files has one for
-this user alone; where that belongs to somebody else, this run makes one of its own and removes it at its end.
+The user of a container often has no name, no home, or a home that cannot be written. Then a private folder among the temporary
+files is used; if that belongs to another user, this run creates its own and removes it at the end.
 """
 
 import atexit
@@ -22,28 +22,28 @@ PRIVATE = 0o700
 
 
 def settings_folder() -> Path:
-    """Where the user's own settings are, in $XDG_CONFIG_HOME or where the platform keeps such; it need not be there."""
+    """The folder of the user's own settings, in $XDG_CONFIG_HOME or the system's usual place; it may not exist."""
     with suppress(RuntimeError):  # a user without a home
         return user_config_path("tiltprint", appauthor=False, roaming=True)
     return _writable(iter((_temporary() / "settings",)))
 
 
 def cache_folder() -> Path:
-    """An existing folder that can be written, in $XDG_CACHE_HOME or where the platform keeps such."""
+    """An existing, writable folder for caches, in $XDG_CACHE_HOME or the system's usual place."""
     return _writable(_candidates("cache"))
 
 
 def state_folder() -> Path:
-    """The same for logs and journals, in $XDG_STATE_HOME; private, for what a person prints concerns nobody else."""
+    """An existing, writable folder for logs and journals, in $XDG_STATE_HOME or the system's usual place; private to the user."""
     folder = _writable(_candidates("state"))
     if stat.S_IMODE(folder.stat().st_mode) & ~PRIVATE:
-        with suppress(OSError):  # somebody else's: what is written there is private by itself
+        with suppress(OSError):  # another user's: what is written there is private itself
             folder.chmod(PRIVATE)
     return folder
 
 
 def state_folders() -> tuple[Path, ...]:
-    """The folders that state_folder() chooses among, the best first, whether or not they exist or can be written now."""
+    """The folders that state_folder() chooses from, best first, whether or not they exist or can be written."""
     folders = []
     with suppress(OutputError):
         for folder in _candidates("state"):
@@ -52,7 +52,7 @@ def state_folders() -> tuple[Path, ...]:
 
 
 def lost_at_end() -> Path | None:
-    """The folder that goes with this run, when it has one."""
+    """The folder that this run removes at its end, if it has one."""
     return _of_this_run() if _of_this_run.cache_info().currsize else None
 
 
@@ -70,7 +70,7 @@ def _writable(folders: Iterator[Path]) -> Path:
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether the folder can be written; it is made where it is missing. One for temporary files must be private to this user."""
+    """Whether the folder can be written; it is created if missing. A folder for temporary files must be private to this user."""
     try:
         if folder.parent == _temporary():
             folder.parent.mkdir(PRIVATE, exist_ok=True)
@@ -84,17 +84,17 @@ def _is_ours(folder: Path) -> bool:
 
 def _is_private(folder: Path) -> bool:
     status = folder.lstat()
-    if not hasattr(os, "geteuid"):  # Windows: each user has a folder for temporary files of their own
+    if not hasattr(os, "geteuid"):  # Windows: each user has a folder for temporary files
         return stat.S_ISDIR(status.st_mode)
     return stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid() and not stat.S_IMODE(status.st_mode) & ~PRIVATE
 
 
 def _temporary() -> Path:
-    """This user's folder among the temporary files. Raises OutputError where there can be none."""
+    """This user's folder among the temporary files. Raises OutputError if none can be created."""
     try:
         folder = Path(tempfile.gettempdir())
     except FileNotFoundError:
-        raise OutputError("no folder for temporary files can be written: name one by the variable TMPDIR") from None
+        raise OutputError("no folder for temporary files can be written: set the variable TMPDIR to one") from None
     return folder / (f"tiltprint-{os.geteuid()}" if hasattr(os, "geteuid") else "tiltprint")
 
 
@@ -103,7 +103,7 @@ def _of_this_run() -> Path:
     folder, owner = Path(tempfile.mkdtemp(prefix="tiltprint-")), os.getpid()
 
     def remove() -> None:
-        if os.getpid() == owner:  # and not a process that was forked from it
+        if os.getpid() == owner:  # and not a process forked from it
             shutil.rmtree(folder, ignore_errors=True)
 
     atexit.register(remove)

@@ -1,4 +1,4 @@
-"""Frozen: what all validated values of a profile share, and the keys that they are made of."""
+"""Frozen: the base of all validated values of a profile, and the declaration of their keys."""
 
 from collections.abc import Callable, Iterable
 from enum import IntEnum
@@ -11,8 +11,8 @@ from pydantic_core import PydanticCustomError
 
 Vector = tuple[float, float, float]
 Limits = tuple[float, float]
-KEY_BY_KEY = "key by key"  # context of a validation that leaves out what keys must be together
-# Of groups of keys: a matter of the process as its class is called, a table of the machine, or a section.
+KEY_BY_KEY = "key by key"  # context of a validation that skips checks between keys
+# Groups of keys: a class of process settings, a table of the machine, or a section.
 TITLES = {
     "process: layers": "Layers and lines",
     "process: shell": "Walls, top and bottom",
@@ -34,7 +34,7 @@ TITLES = {
     "machine.head": "Print head",
     "machine.gcode": "G-code blocks",
 }
-UNITS = (  # what the names of keys end with -> how a page shows the unit
+UNITS = (  # ending of a key's name -> unit on a page
     ("_g_cm3", "g/cm³"),
     ("_mm3_s", "mm³/s"),
     ("_mm_s2", "mm/s²"),
@@ -56,8 +56,9 @@ UNITS = (  # what the names of keys end with -> how a page shows the unit
 
 
 class Effect(IntEnum):
-    """What a changed key does to a front of parts that was found before, from the least to the greatest: nothing, its rows have
-    other prices, the machine may reach fewer of them, or a search may find another front."""
+    """Effect of a changed key on a front of parts found before, from least to greatest: none, its rows have other prices, the
+    machine may reach fewer of them, or a search may find another front.
+    """
 
     NONE = 0
     PRICES = 1
@@ -66,12 +67,12 @@ class Effect(IntEnum):
 
 
 def _key(level: str, title: str, synonyms: str = "", effect: Effect | None = None, **allowed: Any) -> Callable[[Any, str], Any]:
-    """A key of a profile, whose default (`...` where it has none) and meaning are the arguments of what is returned.
+    """A key of a profile. Its default (`...` if it has none) and meaning are the arguments of the returned function.
 
-    Two calls keep a key within a few lines: in one call each argument would have a line of its own. level: who needs the key;
-    title: what a page calls it; synonyms: words of other slicers that neither title nor key has; effect: of a change on the
-    parts that a search has found, None: as profiles.effect has it for the key's section; allowed: what pydantic's Field takes to
-    restrict values.
+    Two calls keep a key within a few lines: in a single call each argument would take its own line. level: who needs the key;
+    title: its name on a page; synonyms: words of other slicers that neither title nor key contains; effect: of a change on the
+    parts that a search has found, None: the default of the key's section in profiles.effect; allowed: restrictions for pydantic's
+    Field.
     """
 
     def field(default: Any, description: str) -> Any:
@@ -81,36 +82,36 @@ def _key(level: str, title: str, synonyms: str = "", effect: Effect | None = Non
     return field
 
 
-# Keys that everybody needs, that serve whoever tunes a print, and that are for whoever builds a machine or studies the method.
+# Keys that everybody needs, keys for tuning a print, and keys for building a machine or studying the method.
 simple, advanced, rare = (partial(_key, level) for level in ("simple", "advanced", "all"))
 
 
 class Frozen(BaseModel):
-    """A validated value: unknown keys are refused, nothing changes after loading."""
+    """A validated value: unknown keys are refused, and nothing changes after loading."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @field_validator("*", mode="before")
     @classmethod
     def _left_out(cls, value: Any, info: ValidationInfo) -> Any:
-        """An empty text leaves out what may be left out, also where a profile that is inherited has a value."""
+        """Treat an empty text as no value for an optional key, also if an inherited profile has a value."""
         return None if value == "" and may_be_left_out(cls.model_fields[str(info.field_name)].annotation) else value
 
     @field_validator("*", mode="before")
     @classmethod
     def _no_truth_as_number(cls, value: Any, info: ValidationInfo) -> Any:
-        """Refuses true and false where pydantic would read 1 and 0."""
+        """Refuse true and false where pydantic would read 1 and 0."""
         if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
-            raise PydanticCustomError("truth_as_number", "true and false are no numbers")
+            raise PydanticCustomError("truth_as_number", "true and false are not numbers")
         return value
 
     def _problems(self) -> Iterable[str]:
-        """What the keys must be together and are not, each one sentence."""
+        """Problems between keys, each one sentence."""
         return ()
 
     @model_validator(mode="after")
     def _check(self, info: ValidationInfo) -> Self:
-        """Raise all problems of the table at once, one a line: profiles.wording makes a sentence of each."""
+        """Raise all problems of the table at once, one per line; profiles.wording makes sentences of them."""
         sentences = () if info.context == KEY_BY_KEY else tuple(self._problems())
         if sentences:
             raise ValueError("\n".join(sentences))
@@ -123,7 +124,7 @@ def may_be_left_out(annotation: Any) -> bool:
 
 
 def unit_of(key: str) -> str:
-    """The unit of a key's value as a page shows it; "": it has none.
+    """The unit of a key's value as shown on a page; "" if it has none.
 
     >>> unit_of("machine.tilt.acceleration_deg_s2"), unit_of("process.walls")
     ('°/s²', '')

@@ -1,4 +1,4 @@
-"""The machine: its axes, the head's bodies, the table, its G-code blocks."""
+"""The machine: its axes, the bodies of the head, the table, and its G-code blocks."""
 
 from collections.abc import Iterable
 from math import acos, cos, degrees, hypot, radians
@@ -10,8 +10,8 @@ from profiles.axes import STANDING, LinearAxis, RotaryAxis
 from profiles.frozen import Effect, Frozen, Vector, advanced, rare, simple
 from profiles.wording import keys, nearest
 
-# The firmwares' dialects of G-code that a profile may name, which machine/firmware/ writes -> whether its firmware can keep the
-# tip on the workpiece while the table turns (TCP).
+# The G-code dialects that a profile may name and machine/firmware/ writes -> whether the firmware can keep the tip on the
+# workpiece while the table turns (TCP).
 FOLLOWS_TABLE = {
     "marlin": True,
     "reprapfirmware": False,
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 else:
     DialectName = Literal[tuple(FOLLOWS_TABLE)]
 
-LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright parts
+LEAST_LEAN_DEG = 1.0  # a table that tilts less can print only upright parts
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
 GCODE = "gcode"  # of a text in the schema: lines of G-code
-STEADY_S = 10.0  # a nozzle has to be at its heat so long before a firmware goes on
+STEADY_S = 10.0  # how long a nozzle must hold its temperature before firmware continues
 Block = Annotated[str, WithJsonSchema({"type": "string", "format": GCODE})]
 Pixels = Annotated[int, Field(ge=16, le=1024)]
 
@@ -70,7 +70,7 @@ class CradleBox(Frozen):
 
 
 class Head(Frozen):
-    """What must not touch the table: a silhouette revolved about the nozzle, and boxes."""
+    """Bodies that must not touch the table: a silhouette revolved about the nozzle, and boxes."""
 
     nozzle_mm: float = simple("Nozzle diameter", "size", gt=0.05, le=3)(..., "diameter of the nozzle's bore, mm")
     silhouette_mm: list[tuple[float, float]] = advanced(
@@ -105,7 +105,7 @@ class Table(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _circumscribed(cls, given: Any) -> Any:
-        """A rectangle's radius is that of the circle about it, so that who knows only discs stays on the safe side."""
+        """Give a rectangle the radius of its circumscribed circle, so that code that only handles discs is on the safe side."""
         size = given.get("size_mm") if isinstance(given, dict) else None
         numbers = isinstance(size, list | tuple) and all(isinstance(x, int | float) for x in size)
         return given | {"radius_mm": hypot(*size) / 2.0} if size and numbers else given
@@ -227,20 +227,21 @@ class Machine(Frozen):
     gcode: Blocks
 
     def heating_s(self, rise_c: float, since_s: float = 0.0) -> float:
-        """Seconds of waiting for a nozzle that was to be so much hotter since_s ago: for the rise, and for the time that Marlin's
-        M109 wants it steady (Configuration.h: TEMP_RESIDENCY_TIME); other firmwares wait no longer.
+        """Seconds until a nozzle that was set hotter by this much since_s ago is hot: the rise, and the time for which Marlin's
+        M109 requires a steady temperature (Configuration.h: TEMP_RESIDENCY_TIME); other firmware does not wait longer.
         """
         return max(rise_c / self.nozzle_heating_c_s - since_s, 0.0) + STEADY_S if rise_c > 0.0 else 0.0
 
     @property
     def tilts(self) -> bool:
-        """False for a machine with three axes only."""
+        """Whether the machine has rotary axes; False for three axes."""
         return self.shape == "table"
 
     @property
     def home(self) -> tuple[float, float, float, float, float]:
-        """X Y Z tilt turn, mm and deg, that Marlin believes in after a restart (module/motion.cpp: current_position is begun with
-        X_HOME_POS, Y_HOME_POS, Z_HOME_POS, I_HOME_POS, J_HOME_POS)."""
+        """X Y Z tilt turn, mm and deg, as Marlin assumes after a restart (module/motion.cpp: current_position starts with
+        X_HOME_POS, Y_HOME_POS, Z_HOME_POS, I_HOME_POS, J_HOME_POS).
+        """
         ends = (self.x.limits_mm[0], self.y.limits_mm[0], self.z.limits_mm[1], self.tilt.limits_deg[0], self.turn.limits_deg[0])
         named = (self.x.home_mm, self.y.home_mm, self.z.home_mm, self.tilt.home_deg, self.turn.home_deg)
         x, y, z, tilt, turn = (end if home is None else home for home, end in zip(named, ends, strict=True))
@@ -249,7 +250,7 @@ class Machine(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _stand_still(cls, given: Any) -> Any:
-        """A fixed machine gets rotary axes that stand at 0, so that one chain serves both shapes."""
+        """Give a fixed machine rotary axes that stay at 0, so that one kinematic chain serves both kinds."""
         if not isinstance(given, dict) or given.get("shape") != "fixed":
             return given
         return given | STANDING
@@ -265,7 +266,7 @@ class Machine(Frozen):
             yield f"tilt.letter and turn.letter are both {self.tilt.letter}: they must differ"
 
     def _axes(self) -> Iterable[str]:
-        """What no single axis can know: that the two of them can bring the table to lean."""
+        """Check the two rotary axes together: whether they can tilt the table."""
         dot = sum(a * b for a, b in zip(self.tilt.axis, self.turn.axis, strict=True))
         norm = hypot(*self.tilt.axis) * hypot(*self.turn.axis)
         if self.turn.axis[2] ** 2 < UPRIGHT**2 * sum(a * a for a in self.turn.axis):
@@ -279,13 +280,15 @@ class Machine(Frozen):
             )
 
     def _greatest_lean_deg(self, cosine: float) -> float:
-        """How far the turn axis leans at the limits of the tilt; cosine: of the angle between the two axes."""
+        """Greatest angle of the turn axis from the vertical within the limits of the tilt; cosine: of the angle between the two
+        axes.
+        """
         turned = (min(abs(limit - self.tilt.zero_deg), 180.0) for limit in self.tilt.limits_deg)
         leans = (cosine**2 + (1.0 - cosine**2) * cos(radians(angle)) for angle in turned)
         return max(degrees(acos(max(-1.0, min(1.0, lean)))) for lean in leans)
 
     def _named(self) -> Iterable[str]:
-        """Names of keys that are none."""
+        """Unknown names of keys."""
         known = [key for key, _ in keys(Machine, "machine.")]
         places = {key.rsplit(".", k)[0] for key in known for k in range(key.count(".") + 1)} - {"machine"}
         for field, named in (("uncalibrated", self.uncalibrated), ("sources", self.sources)):
@@ -295,7 +298,7 @@ class Machine(Frozen):
                     yield f"{field} names {key}, which is not a key of a machine" + (f": did you mean {near}?" if near else "")
 
     def _in_the_plate(self) -> Iterable[str]:
-        """Bodies of the cradle that the turning plate, or a print on it, would run into."""
+        """Bodies of the cradle that would collide with the turning plate or a print on it."""
         radius = self.table.radius_mm if self.table.size_mm is None else min(self.table.size_mm) / 2.0
         for box in self.cradle:
             if box.max_mm[2] > -self.table.thickness_mm and box.nearest_mm < radius:

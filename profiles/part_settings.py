@@ -1,4 +1,4 @@
-"""Part settings: what one part of a print, or a place of it, is sliced with in place of the process's own values."""
+"""Part settings: values that one part of a print, or a volume of it, uses in place of the process's own."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -8,13 +8,13 @@ from pydantic import Field
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
 from profiles.messages import key_name, option, phrase
-from profiles.problems import not_of_mended, table_problems, unfit_for_nozzle
+from profiles.problems import table_problems, unfit_for_nozzle, without_replaced
 from profiles.process import Process
 from profiles.settings.support import Plate, Support
 from profiles.toml_text import read_value
 
 MOST_PARTS = 1000
-# What decides where a model is cut or what stands on other parts, what only the plate knows, what moves between parts share.
+# Settings that decide where a model is cut or what rests on other parts, that concern the plate, or moves between parts.
 SUPPORT_OF_A_PART = {
     "overhang_share",
     "bridge_flow",
@@ -50,7 +50,7 @@ OF_PARTS_ON_PLASTIC = {
     "most_pins",
 }
 
-# What may change within a layer: the rest decides where layers lie, how wide lines are, or runs through a layer as a whole.
+# Settings that may change within a layer; the others decide where layers and lines are, or apply to a whole layer.
 OF_A_PLACE = (
     "walls",
     "top_layers",
@@ -84,24 +84,24 @@ SPEEDS_OF_A_PLACE = (
 
 
 class PartSettings(Frozen):
-    """Values of the process that hold for one part only, by their keys."""
+    """Process settings for one part only, by key."""
 
     part: int = Field(ge=1, le=MOST_PARTS, description="number of the part in print order")
     process: dict[str, Any] = Field(description="keys of the process and their values")
 
     @property
     def in_words(self) -> str:
-        """The settings as a person would write them."""
+        """The settings as a user would write them."""
         return ", ".join(f"{key} = {value}" for key, value in self.process.items())
 
 
 def part_keys() -> list[str]:
-    """The keys of a process that may differ from part to part."""
+    """The keys of a process that may differ between parts."""
     return [key for key in Process.model_fields if key not in OF_THE_PRINT]
 
 
 def parse_part_settings(text: str) -> PartSettings:
-    """The settings of `2:walls=4,infill_density=0.4`. Raises ProfileError where the text has another form."""
+    """The settings in `2:walls=4,infill_density=0.4`. Raises ProfileError if the text has another form."""
     number, colon, rest = text.partition(":")
     pairs = [pair.partition("=") for pair in rest.split(",")]
     known = colon and number.strip().isascii() and number.strip().isdigit() and 1 <= int(number.strip()[:9]) <= MOST_PARTS
@@ -114,10 +114,10 @@ def parse_part_settings(text: str) -> PartSettings:
 
 
 def merge_part_settings(process: Process, given: Iterable[PartSettings], nozzle_mm: float) -> list[PartSettings]:
-    """One entry a part, in print order, values as the process's own keys have them; what is given later wins.
+    """One entry per part, in print order, with values as in the process; later values override earlier ones.
 
-    Raises ProfileError with every key that is none, that holds for the whole print, or whose value is not allowed, also by the
-    nozzle's diameter.
+    Raises ProfileError with every key that is unknown or holds for the whole print, and every value that is not allowed, also
+    because of the nozzle diameter.
     """
     merged: dict[int, dict[str, Any]] = {}
     for settings in given:
@@ -143,12 +143,12 @@ def _problems(process: Process, part: int, own: dict[str, Any], nozzle_mm: float
                 f"{key_name(f'process.{key}')} holds for the whole print: {phrase('for all', f'--set process.{key}=... sets it')}"
             )
         elif part == 1 and key in OF_PARTS_ON_PLASTIC:
-            yield f"{key_name(f'process.{key}')} holds for parts that stand on plastic: part 1 stands on the platform"
+            yield f"{key_name(f'process.{key}')} holds for parts that rest on plastic: part 1 rests on the build plate"
     yield from _value_problems(process, own, nozzle_mm)
 
 
 def problems_of_place(process: Process, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
-    """The problems of values that are to hold in some place of a layer, a sentence for each."""
+    """The problems of values for a region of a layer, a sentence each."""
     for key in own:
         if key in Process.model_fields and key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
             yield (
@@ -163,6 +163,6 @@ def problems_of_place(process: Process, own: dict[str, Any], nozzle_mm: float) -
 
 def _value_problems(process: Process, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
     table = process.model_dump()
-    problems, checked, mended = table_problems(Process, "process.", table | own, table)
+    problems, checked, replaced = table_problems(Process, "process.", table | own, table)
     yield from problems
-    yield from not_of_mended(unfit_for_nozzle(checked, nozzle_mm), mended)
+    yield from without_replaced(unfit_for_nozzle(checked, nozzle_mm), replaced)

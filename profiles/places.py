@@ -1,4 +1,4 @@
-"""Places: where profiles stand (shipped with the program, the user's own folder, any file) and what they inherit."""
+"""Places: the locations of profiles (shipped with the program, the user's own folder, any file) and inheritance."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -16,7 +16,7 @@ from profiles.toml_text import read_toml
 KINDS = {"machine": "machines", "material": "materials", "process": "processes"}
 OF_KIND = {"machine": ("machine",), "material": ("material",), "process": ("process", "search")}
 PARENT = "inherits"
-MOST_INHERITED = 32  # profiles one by way of another
+MOST_INHERITED = 32  # profiles in one chain of inheritance
 
 
 def shipped(kind: str) -> list[str]:
@@ -26,17 +26,17 @@ def shipped(kind: str) -> list[str]:
 
 
 def shipped_of_dialect(dialect: str) -> list[str]:
-    """Names of the shipped machines whose firmware is written so, sorted."""
+    """Names of the shipped machines with a firmware dialect, sorted."""
     return [name for name in shipped("machine") if _shipped_document("machine", name)["machine"]["dialect"] == dialect]
 
 
 def own_folder(kind: str) -> Path:
-    """The user's folder for profiles of a kind: in $XDG_CONFIG_HOME, else where the platform keeps settings."""
+    """The user's folder for profiles of a kind, in $XDG_CONFIG_HOME or the system's usual place for settings."""
     return settings_folder() / "profiles" / KINDS[kind]
 
 
 def own(kind: str) -> list[str]:
-    """Names of the user's own profiles of a kind, sorted; one named as a shipped profile stands in its place."""
+    """Names of the user's own profiles of a kind, sorted; one with a shipped profile's name replaces it."""
     try:
         return sorted(file.stem for file in own_folder(kind).glob("*.toml"))
     except PermissionError:  # the home of another user, as sudo may leave it
@@ -49,7 +49,7 @@ def known(kind: str) -> list[str]:
 
 
 def kind_of(name: str) -> str:
-    """The kind of a profile by name, or of a profile file: machine, material or process."""
+    """The kind of a profile, given by name or file: machine, material or process."""
     for kind in KINDS:
         if name in known(kind):
             return kind
@@ -59,7 +59,7 @@ def kind_of(name: str) -> str:
 
 
 def kind_in(path: Path) -> str:
-    """The kind of a profile file by its tables."""
+    """The kind of a profile file, from its tables."""
     document = parse(path)
     kind = next((kind for kind, sections in OF_KIND.items() if any(section in document for section in sections)), None)
     if kind is None:
@@ -68,7 +68,7 @@ def kind_in(path: Path) -> str:
 
 
 def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The tables of a profile by name or path, with those it inherits; ProfileError when there is no such profile."""
+    """The tables of a profile, given by name or path, with inherited ones. Raises ProfileError if there is no such profile."""
     document, source = _document(kind, name, seen)
     if source in seen:
         raise ProfileError(f"{name} inherits itself by way of {', '.join(seen[seen.index(source) + 1 :]) or 'its own name'}")
@@ -81,8 +81,9 @@ def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def shipped_base(kind: str, name: str) -> str | None:
-    """The shipped profile that a profile is, or inherits by way of whatever others; None where it says all itself, or where one
-    of the user's own stands in the shipped one's place."""
+    """The shipped profile that a profile is or inherits, directly or not; None if it inherits nothing, or if a user's profile
+    replaces the shipped one.
+    """
     seen: tuple[str, ...] = ()
     while True:
         document, source = _document(kind, name, seen)
@@ -95,7 +96,7 @@ def shipped_base(kind: str, name: str) -> str | None:
 
 
 def inherited(kind: str, name: str, document: Mapping[str, Any], seen: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The tables of the profile that a document inherits; none when it inherits nothing."""
+    """The tables of the profile that a document inherits; empty if it inherits nothing."""
     parent = document.get(PARENT)
     if parent is None:
         return {}
@@ -105,12 +106,12 @@ def inherited(kind: str, name: str, document: Mapping[str, Any], seen: tuple[str
 
 
 def _parent_of(name: str, parent: str) -> str:
-    """The name of the profile that another inherits; the path of a file counts from the inheriting one."""
+    """The name of the profile that another inherits; a file's path is relative to the inheriting one."""
     return str(Path(name).parent / parent) if Path(parent).suffix == ".toml" else parent
 
 
 def strangers(kind: str, name: str, document: Mapping[str, Any]) -> str | None:
-    """What a document holds that a profile of its kind cannot hold, as a sentence."""
+    """The unknown tables and keys of a document, as a sentence."""
     unknown = [key for key in document if key not in (*OF_KIND[kind], PARENT)]
     if not unknown and own_tables(document):
         return None
@@ -121,18 +122,18 @@ def strangers(kind: str, name: str, document: Mapping[str, Any]) -> str | None:
 
 
 def misspelt_parent(document: Mapping[str, Any]) -> bool:
-    """Whether a document means to inherit, under a name like that of the key."""
+    """Whether a document has a misspelt `inherits` key."""
     words = [key for key, value in document.items() if isinstance(value, str)]
     return PARENT not in document and bool(get_close_matches(PARENT, words, 1, 0.7))
 
 
 def own_tables(document: Mapping[str, Any]) -> dict[str, Any]:
-    """A document without the name of what it inherits."""
+    """A document without the name of its parent."""
     return {key: value for key, value in document.items() if key != PARENT}
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables merged key by key; what is no table is replaced as a whole."""
+    """Tables merged key by key; other values are replaced."""
     out = dict(base)
     for key, value in over.items():
         below = out.get(key)
@@ -141,7 +142,7 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse(path: Path, what: str = "profile") -> dict[str, Any]:
-    """A TOML file; ProfileError says what is wrong with it. what: the file's name for a person."""
+    """The content of a TOML file. Raises ProfileError with the reason. what: the file's name in messages."""
     try:
         return read_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -153,9 +154,9 @@ def parse(path: Path, what: str = "profile") -> dict[str, Any]:
 
 
 def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, Any], str]:
-    """A profile's own tables and where they stand: the shipped name or the file's full path.
+    """A profile's own tables and where they are: the shipped name or the file's full path.
 
-    An own profile that inherits its own name means the shipped one, in whose place it stands.
+    A user's profile that inherits its own name inherits the shipped one that it replaces.
     """
     file = own_folder(kind) / f"{name}.toml"
     if name in own(kind) and not (str(file.resolve()) in seen and name in shipped(kind)):
@@ -169,7 +170,7 @@ def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, An
 
 @cache
 def _shipped_document(kind: str, name: str) -> dict[str, Any]:
-    """The tables of a shipped profile, read once: they stay as they are while a program runs."""
+    """The tables of a shipped profile, read once, since they do not change while a program runs."""
     source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
     return read_toml(source.read_text(encoding="utf-8"))
 
@@ -184,5 +185,5 @@ def _unknown(what: str, name: str, names: Iterable[str]) -> ProfileError:
 
 
 def is_file_name(name: str) -> bool:
-    """Whether a profile is named by its file."""
+    """Whether a profile is given as a file."""
     return bool(name) and (Path(name).suffix == ".toml" or os.path.exists(name))

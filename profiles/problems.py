@@ -1,6 +1,6 @@
-"""Problems of profiles, each one sentence: of one table by itself, and what only several tables know together.
+"""Problems of profiles, each one sentence: within one table, and between tables.
 
-What is found wrong in a table is replaced by a sound value, so that the checks that come later see it too.
+A wrong value is replaced by a valid one, so that later checks also run.
 """
 
 from collections.abc import Iterable, Mapping
@@ -18,42 +18,42 @@ from profiles.search import Search
 from profiles.wording import sentences
 
 NOZZLE_TEMPERATURES = ("nozzle_c", "first_layer_nozzle_c", "homing_nozzle_c", "standby_c")
-LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diameters
-MOST_INTERFACE_WIDTH = 2.0  # thin beads on plastic: beyond the flat around the orifice nothing presses them down
+LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # widths of printable lines in nozzle diameters
+MOST_INTERFACE_WIDTH = 2.0  # thin beads on plastic: beyond the flat of the nozzle nothing presses them down
 
 
 def table_problems(
     model: type[BaseModel], prefix: str, table: Any, sound: Mapping[str, Any]
 ) -> tuple[list[str], Any, frozenset[str]]:
-    """All problems of a table whose keys are dotted after the prefix; the table built key by key, None where it is no table; and
-    the dotted keys whose wrong values were replaced.
+    """All problems of a table whose keys are dotted after the prefix; the table validated key by key, None if it is not a table;
+    and the dotted keys whose wrong values were replaced.
 
-    sound: the values of a profile that is fine.
+    sound: the values of a valid profile.
     """
     given = deepcopy(table)
-    wrong, mended, value = _rounds(model, prefix, given, sound, KEY_BY_KEY)
+    wrong, replaced, value = _rounds(model, prefix, given, sound, KEY_BY_KEY)
     if value is not None:
         together, _, _ = _rounds(model, prefix, given, sound, None)
-        wrong += not_of_mended(together, mended)
-    return wrong, value, mended
+        wrong += without_replaced(together, replaced)
+    return wrong, value, replaced
 
 
-def not_of_mended(problems: Iterable[str], mended: frozenset[str]) -> list[str]:
-    """The problems without those that name a replaced value. mended: the keys whose values were replaced."""
-    return [sentence for sentence in problems if not _tells_of(sentence, mended)]
+def without_replaced(problems: Iterable[str], replaced: frozenset[str]) -> list[str]:
+    """The problems that do not name a replaced value. replaced: the keys whose values were replaced."""
+    return [sentence for sentence in problems if not _names_any(sentence, replaced)]
 
 
-def _tells_of(sentence: str, mended: frozenset[str]) -> bool:
+def _names_any(sentence: str, replaced: frozenset[str]) -> bool:
     named = [f".{word}." for word in terminal_words(sentence).replace(":", " ").split()]
-    return any(f".{key}." in word or word == f".{key.rpartition('.')[2]}." for word in named for key in mended)
+    return any(f".{key}." in word or word == f".{key.rpartition('.')[2]}." for word in named for key in replaced)
 
 
 def _rounds(
     model: type[BaseModel], prefix: str, given: Any, sound: Mapping[str, Any], context: str | None
 ) -> tuple[list[str], frozenset[str], Any]:
-    """The problems, the keys mended in the table given, and what it is when it is sound; None where it cannot be mended."""
+    """The problems, the keys replaced in the given table, and its valid model; None if it cannot be repaired."""
     problems: dict[str, None] = {}
-    mended: set[tuple[str, ...]] = set()
+    replaced: set[tuple[str, ...]] = set()
     value = None
     while value is None:
         try:
@@ -61,16 +61,16 @@ def _rounds(
         except ValidationError as error:
             problems |= dict.fromkeys(sentences(error.errors(), model, prefix))
             key_paths = {_key_path(problem) for problem in error.errors()}
-            if not isinstance(given, dict) or () in key_paths or key_paths <= mended:
+            if not isinstance(given, dict) or () in key_paths or key_paths <= replaced:
                 break
             for key_path in key_paths:
-                _mend(given, key_path, sound)
-            mended |= key_paths
-    return list(problems), frozenset(prefix + ".".join(key_path) for key_path in mended), value
+                _replace_value(given, key_path, sound)
+            replaced |= key_paths
+    return list(problems), frozenset(prefix + ".".join(key_path) for key_path in replaced), value
 
 
 def _key_path(problem: Any) -> tuple[str, ...]:
-    """Where to mend a problem: lists are replaced as a whole."""
+    """The key to replace for a problem: lists are replaced as a whole."""
     path: list[str] = []
     for step in problem["loc"]:
         if isinstance(step, int):
@@ -79,8 +79,8 @@ def _key_path(problem: Any) -> tuple[str, ...]:
     return tuple(path)
 
 
-def _mend(given: dict[str, Any], key_path: tuple[str, ...], sound: Mapping[str, Any]) -> None:
-    """Put the sound value where the wrong one stands, or take it out where there is none."""
+def _replace_value(given: dict[str, Any], key_path: tuple[str, ...], sound: Mapping[str, Any]) -> None:
+    """Replace a wrong value by the valid one, or remove it if there is none."""
     inner, value = given, sound
     for step in key_path[:-1]:
         if not isinstance(inner.get(step), dict):
@@ -105,7 +105,7 @@ def too_hot(material: Material, machine: Machine) -> Iterable[str]:
 
 
 def lifted_twice(process: Process, search: Search) -> Iterable[str]:
-    """A raft under a model that a pedestal lifts already."""
+    """A raft under a model that a pedestal already lifts."""
     if process.raft_layers and search.pedestal_mm > 0.0:
         yield (
             f"{key_name('process.raft_layers')} is {process.raft_layers}: 0 is allowed with a pedestal "

@@ -1,4 +1,4 @@
-"""The process: how a part is sliced and printed."""
+"""The process: settings for slicing and printing a part."""
 
 from collections.abc import Iterable
 
@@ -18,7 +18,7 @@ WIDTHS = (
 )
 
 MOST_SHARE = 0.9  # of a line's width: a higher bead does not stick
-ROUGHEST = 2.0  # line widths by which a rough wall may be moved
+ROUGHEST = 2.0  # line widths by which a fuzzy wall may be moved
 
 
 class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
@@ -26,12 +26,12 @@ class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
 
     @property
     def heights(self) -> tuple[str, ...]:
-        """The keys of the heights that layers are made with."""
+        """The keys of all layer heights."""
         return (*HEIGHTS, *(("least_layer_height_mm", "most_layer_height_mm") if self.adaptive_cusp_mm > 0 else ()))
 
     @property
     def highest_layer_mm(self) -> float:
-        """The highest layer that all lines but those of the first layer can be."""
+        """The highest layer that all line widths except the first layer's allow."""
         widths: list[float | None] = [getattr(self, key) for key in WIDTHS if key != "first_layer_line_width_mm"]
         return MOST_SHARE * min(width for width in widths if width is not None)
 

@@ -27,7 +27,7 @@ from profiles.places import (
     strangers,
     tables,
 )
-from profiles.problems import lifted_twice, not_of_mended, table_problems, too_hot, unfit_for_nozzle
+from profiles.problems import lifted_twice, table_problems, too_hot, unfit_for_nozzle, without_replaced
 from profiles.process import Process
 from profiles.search import Search
 from profiles.toml_text import read_value
@@ -37,13 +37,13 @@ __all__ = ["DEFAULTS", "KINDS", "OF_KIND", "SECTIONS", "Profile", "kind_of", "kn
 
 DEFAULTS = {"machine": "generic_ac", "material": "pla", "process": "standard"}
 SECTIONS: dict[str, type[Frozen]] = {"machine": Machine, "material": Material, "process": Process, "search": Search}
-# Keys of earlier versions: what a G-code file or a journal tells of them is passed over.
+# Keys of earlier versions, ignored in a G-code file or a journal.
 GONE = {"process": {"wall_generator", "top_skin_monotonic"}}
 LIMITS = {"machine", "machine.nozzle_limit_c", "machine.bed_limit_c", "machine.head", "machine.head.nozzle_mm"}
 
 
 class Profile(Frozen):
-    """Everything a run needs to know about machine, material, process and search; parts: those with settings of their own."""
+    """All settings of a run: machine, material, process and search; parts: settings of single parts."""
 
     machine: Machine
     material: Material
@@ -52,13 +52,13 @@ class Profile(Frozen):
     parts: list[PartSettings] = Field(default=[])
 
     def of_part(self, index: int) -> "Profile":
-        """What a part is sliced with."""
+        """The profile of one part, with its own settings."""
         own = next((settings.process for settings in self.parts if settings.part == index), None)
         return self if own is None else self.model_copy(update={"process": process_of_part(self.process, own), "parts": []})
 
     @property
     def of_all_parts(self) -> "Profile":
-        """What all parts share: for decompositions whose parts are others."""
+        """The profile without settings of single parts, for other decompositions."""
         return self.model_copy(update={"parts": []}) if self.parts else self
 
 
@@ -68,7 +68,8 @@ def load(
     process: str = DEFAULTS["process"],
     settings: Iterable[str] = (),
 ) -> Profile:
-    """Resolve one profile of each kind (shipped or own name, or path of a TOML file) and apply KEY=VALUE settings.
+    """The profile of one machine, material and process (shipped or own name, or path of a TOML file) with KEY=VALUE settings
+    applied.
 
     Raises ProfileError naming every problem at once.
     """
@@ -80,20 +81,23 @@ def load(
         _apply(whole, setting)
     profile = _validated(whole)
     if profile.process.bridge_longest_mm is None:
-        asked = profile.process.model_copy(update={"bridge_longest_mm": profile.material.bridge_longest_mm})
-        profile = profile.model_copy(update={"process": asked})
+        with_bridges = profile.process.model_copy(update={"bridge_longest_mm": profile.material.bridge_longest_mm})
+        profile = profile.model_copy(update={"process": with_bridges})
     return profile
 
 
 def with_part_settings(profile: Profile, given: Iterable[PartSettings]) -> Profile:
-    """The profile with these settings of single parts under those it has. Raises ProfileError naming every problem at once."""
+    """The profile with these settings of single parts added; its own override them. Raises ProfileError naming every problem at
+    once.
+    """
     parts = merge_part_settings(profile.process, [*given, *profile.parts], profile.machine.head.nozzle_mm)
     return profile.model_copy(update={"parts": parts})
 
 
 def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[str, Frozen]:
-    """The sections of one profile by name, resolved and with settings applied; ProfileError when it is wrong. kind: where it is
-    known."""
+    """The sections of one profile by name, with inherited ones and settings. Raises ProfileError if it is invalid. kind: if
+    known.
+    """
     kind = kind or kind_of(name)
     whole: dict[str, Any] = {section: {} for section in OF_KIND[kind]} | tables(kind, name)
     for setting in settings:
@@ -108,7 +112,7 @@ def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[st
 
 
 def section(name: str, table: Any) -> Frozen:
-    """One section made of a plain table, whose values may be text. Raises ProfileError."""
+    """A section from a plain table, whose values may be text. Raises ProfileError."""
     try:
         return SECTIONS[name].model_validate(table)
     except ValidationError:
@@ -116,7 +120,7 @@ def section(name: str, table: Any) -> Frozen:
 
 
 def profile_of_tables(tables: dict[str, Any]) -> Profile:
-    """A profile made of plain tables, as one that was dumped to JSON, be it by an earlier version. Raises ProfileError."""
+    """A profile from plain tables, such as a JSON dump, also of an earlier version. Raises ProfileError."""
     sections = {name: section(name, _without_gone(name, tables.get(name))) for name in SECTIONS}
     try:
         return Profile.model_validate(sections | {"parts": tables.get("parts", [])})
@@ -125,7 +129,7 @@ def profile_of_tables(tables: dict[str, Any]) -> Profile:
 
 
 def sound_section(name: str, table: Any) -> Frozen | None:
-    """The same of a table that was recorded, be it by an earlier version; None where it makes no valid section."""
+    """A section from a recorded table, also of an earlier version; None if it is not valid."""
     try:
         return SECTIONS[name].model_validate(_without_gone(name, table))
     except ValidationError:
@@ -133,7 +137,7 @@ def sound_section(name: str, table: Any) -> Frozen | None:
 
 
 def check_file(path: Path) -> list[str]:
-    """All problems of a profile file, each one sentence; empty when it is fine."""
+    """All problems of a profile file, each one sentence; empty if it is valid."""
     try:
         kind, document = kind_in(path), parse(path)
     except ProfileError as error:
@@ -160,7 +164,7 @@ def _without_gone(name: str, table: Any) -> Any:
 
 
 def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:
-    """Every key of a model with its plain value and what it means, tables flattened with dots."""
+    """Every key of a model with its plain value and its meaning; nested tables are flattened with dots."""
     for key, field in type(model).model_fields.items():
         value = getattr(model, key)
         if isinstance(value, Frozen):
@@ -196,10 +200,10 @@ def _validated(whole: dict[str, Any]) -> Profile:
 
 
 def _all_problems(whole: dict[str, Any]) -> list[str]:
-    """The problems of all tables, and what is wrong between those of their values that are right by themselves."""
+    """The problems of each table, and those between valid values of different tables."""
     sound = {name: table for kind, name_of_kind in DEFAULTS.items() for name, table in tables(kind, name_of_kind).items()}
-    problems, checked, mended = table_problems(Profile, "", whole, sound)
-    return problems if checked is None or mended & LIMITS else problems + not_of_mended(_of_several(checked), mended)
+    problems, checked, replaced = table_problems(Profile, "", whole, sound)
+    return problems if checked is None or replaced & LIMITS else problems + without_replaced(_of_several(checked), replaced)
 
 
 def _of_several(profile: Profile) -> list[str]:

@@ -1,4 +1,4 @@
-"""The search: how the parts of a model are looked for; a table of a process profile."""
+"""The search: settings for finding the parts of a model; a table of a process profile."""
 
 from functools import cache
 from importlib import resources
@@ -10,7 +10,7 @@ from profiles.toml_text import read_toml
 
 @cache
 def _mode(name: str) -> dict[str, Any]:
-    """The settings that hold in a mode of the search, with those of the mode that it inherits."""
+    """The settings of a mode of the search, with those of the mode it inherits."""
     file = resources.files("profiles") / "searches" / f"{name}.toml"
     document = read_toml(file.read_text(encoding="utf-8"))
     below = _mode(document["inherits"]) if "inherits" in document else {}
@@ -24,7 +24,7 @@ class Search(Frozen):
         600, "directions sampled on the Gaussian sphere"
     )
     least_elevation_deg: float = rare("Least angle of a direction", ge=0, le=89)(
-        10.0, "least angle of a direction above the platform, deg"
+        10.0, "least angle of a direction above the build plate, deg"
     )
     offset_step_mm: float = advanced("Distance of the planes tried", "step samples", gt=0, le=100)(
         1.0, "distance of the sampled planes of a direction, mm"
@@ -57,9 +57,9 @@ class Search(Frozen):
     )
     stair_weight: float = advanced("Stairs count", "staircase layer lines stepping quality", ge=0, le=10)(
         0.1,
-        "how much an area counts that shows stairs as high as a layer of 0.2 mm, beside 1 where support scars it; less where the "
-        "layers or the angle make them lower: walls and level faces show none, so parts are printed along their faces; 0: stairs "
-        "do not count",
+        "weight of an area with stair-stepping as high as a layer of 0.2 mm, compared with 1 where support blemishes it; less "
+        "where the layers or the angle make the steps lower: walls and level faces have none, so parts are printed along their "
+        "faces; 0: stair-stepping does not count",
     )
     second_mm2: float = advanced("What a second costs", "print time penalty", ge=0, le=1000)(
         0.1,
@@ -109,7 +109,7 @@ class Search(Frozen):
     nozzle_load_n: float = rare("Push of the nozzle", "strength force", ge=0, le=1000)(
         5.0,
         "push of the nozzle against the top of a part, sideways, that its base must bear while it is printed, N; 0: strength is "
-        "not looked at",
+        "ignored",
     )
     strength_safety: float = rare("Safety of a joint", "strength factor", ge=1, le=100)(
         1.0,
@@ -132,7 +132,7 @@ class Search(Frozen):
         None, "the search ends after this time with the best so far, s"
     )
     least_gain: float = rare("Least share a cut makes safe", ge=0, le=1)(
-        0.002, "a cut must make at least this share of the risky area safe, faces that stand on the platform not counted"
+        0.002, "a cut must make at least this share of the risky area safe, faces that stand on the build plate not counted"
     )
     least_gain_preferred: float = rare("Least share a preferred cut makes safe", ge=0, le=1)(
         1e-4, "the same for parts of the preferred volume in the classic ranking, which may be many (published: 0.0001)"
@@ -140,8 +140,8 @@ class Search(Frozen):
     platform_radius_mm: float | None = rare("Radius that planes must clear", gt=0)(
         None, "criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
     )
-    count_platform_faces: bool = rare("Count faces on the platform")(
-        False, "true: faces standing on the platform count as risky (the authors' terms)"
+    count_platform_faces: bool = rare("Count faces on the build plate")(
+        False, "true: faces standing on the build plate count as risky (the authors' terms)"
     )
     single_limb: bool = simple("Cut off single limbs", "branch arm leg tree one at a time")(
         True,
@@ -154,7 +154,7 @@ class Search(Frozen):
 
     @property
     def effective(self) -> "Search":
-        """The settings as they hold: the published search has the paper's terms, and what means nothing beside others is nothing.
+        """The settings in effect: the published search uses the paper's terms, and settings without effect are 0 or off.
 
         >>> Search(objective="risky").effective.cut_mm2
         0.0

@@ -1,5 +1,6 @@
-"""TOML text: what a person has written, read once for all files and options, and values written so that it reads them back;
-whatever is wrong with a text is one short reason."""
+"""TOML text: read in one way for all files and options, and values written so that they can be read back; every error is one
+short reason.
+"""
 
 import json
 import re
@@ -8,23 +9,23 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 BARE = re.compile(r"[A-Za-z0-9_-]+")
-DELETE = "\x7f"  # the one character that JSON leaves as it is and TOML forbids
+DELETE = "\x7f"  # the one character that JSON keeps and TOML forbids
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """The tables of a text, with or without a byte order mark. Raises ValueError with a reason of one line."""
+    """The tables in a text, with or without a byte order mark. Raises ValueError with a reason of one line."""
     try:
         return tomllib.loads(text.removeprefix("\ufeff"))
     except RecursionError:
         raise ValueError("it is nested too deep") from None
     except tomllib.TOMLDecodeError as error:
         raise ValueError(" ".join(str(error).split())[:200]) from None
-    except ValueError:  # Python reads no number of more digits
+    except ValueError:  # Python's limit for the digits of a number
         raise ValueError("a number in it has too many digits") from None
 
 
 def read_value(text: str) -> Any:
-    """A single value as TOML has it; what is no TOML is text. A table in braces may take several lines, as in TOML 1.1."""
+    """A single TOML value; other text is a string. A table in braces may have several lines, as in TOML 1.1."""
     line = text.replace("\n", " ") if text.startswith("{") else text
     try:
         return read_toml(f"value = {line}")["value"]
@@ -42,7 +43,7 @@ def value_text(value: Any) -> str:
 
 
 def rows_text(value: Mapping[str, Any] | Sequence[Any]) -> str:
-    """The same of a list or a table, a line for each of what is in it."""
+    """A list or a table as TOML, one line per item."""
     if isinstance(value, Mapping):
         rows = ",\n".join(f"  {key_text(key)} = {value_text(entry)}" for key, entry in value.items())
         return f"{{\n{rows}\n}}" if rows else "{}"
@@ -51,5 +52,5 @@ def rows_text(value: Mapping[str, Any] | Sequence[Any]) -> str:
 
 
 def key_text(key: str) -> str:
-    """A key of a table, in quotation marks where it needs them."""
+    """A key of a table, in quotation marks if necessary."""
     return key if BARE.fullmatch(key) else value_text(key)

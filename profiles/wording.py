@@ -1,4 +1,4 @@
-"""Wording: what a key of a profile allows, and one sentence for each problem pydantic finds."""
+"""Wording: the allowed values of a key, and one sentence for each problem found by pydantic."""
 
 import json
 import re
@@ -19,18 +19,18 @@ KINDS = (("A-Za-z", "letters"), ("0-9", "digits"))
 
 
 def sentences(problems: list[Any], root: type[BaseModel], prefix: str = "") -> list[str]:
-    """One sentence for each problem of a ValidationError: key, value, what is allowed; keys are dotted after the prefix."""
+    """One sentence for each problem of a ValidationError: key, value, allowed values; keys are dotted after the prefix."""
     unique = dict.fromkeys(sentence for problem in problems for sentence in _sentences(problem, root, prefix))
     return list(unique)
 
 
 def allowed(field: FieldInfo) -> str:
-    """What a field allows, in words: "a number from 0.02 to 2"."""
+    """The allowed values of a field in words: "a number from 0.02 to 2"."""
     return _allowed(field.annotation, field.metadata)
 
 
 def keys(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, FieldInfo]]:
-    """Every dotted key of a model with its field, tables opened."""
+    """Every dotted key of a model with its field, including nested tables."""
     for name, field in model.model_fields.items():
         if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
             yield from keys(field.annotation, f"{prefix}{name}.")
@@ -39,7 +39,7 @@ def keys(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, FieldInfo]]
 
 
 def _sentences(problem: Any, root: type[BaseModel], prefix: str) -> Iterator[str]:
-    """The sentences of one problem: a check of a whole table may tell several, one a line."""
+    """The sentences of one problem: the check of a table may report several, one per line."""
     for text in problem["msg"].removeprefix("Value error, ").splitlines():
         yield _sentence(problem, text, root, prefix)
 
@@ -77,7 +77,7 @@ def _with_marks(text: str, table: str, fields: Collection[str]) -> str:
 
 
 def nearest(key: str, known: list[str]) -> str | None:
-    """The known key most like a mistyped one: of the same table by its last word, else of any table."""
+    """The known key most similar to a mistyped one: in its table by its last word, else in any table."""
     table, _, word = key.rpartition(".")
     same = {name.rpartition(".")[2]: name for name in known if name.rpartition(".")[0] == table}
     every = {name.rpartition(".")[2]: name for name in known}
@@ -85,7 +85,7 @@ def nearest(key: str, known: list[str]) -> str | None:
 
 
 def _field(root: type[BaseModel], steps: tuple[str | int, ...]) -> FieldInfo | None:
-    """The innermost field on the way of an error."""
+    """The innermost field on the path of an error."""
     model: type[BaseModel] | None = root
     field = None
     for step in steps:
@@ -133,7 +133,7 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
 
 
 def _matching(pattern: str) -> str:
-    """A text's pattern in words: one character of a few, or a name of some kinds of character."""
+    """The pattern of a text in words: a character from a few, or a name of certain characters."""
     letter, name = ONE_OF.fullmatch(pattern), NAME_OF.fullmatch(pattern)
     if letter:
         return f"one letter of {letter[1]}"
@@ -163,7 +163,7 @@ def _range(metadata: list[Any]) -> str:
 
 
 def _bound(rule: Any, name: str) -> Any:
-    """A bound of a constraint: annotated-types keep it as an attribute, pydantic's Field and general metadata below it."""
+    """The bound of a constraint: an attribute in annotated-types, nested in the metadata of pydantic's Field."""
     for holder in (rule, *getattr(rule, "metadata", ())):
         value = getattr(holder, name, None)
         if value is not None:
@@ -172,7 +172,7 @@ def _bound(rule: Any, name: str) -> Any:
 
 
 def _shown(value: Any) -> str:
-    """A value as TOML shows it, cut when it is long."""
+    """A value as TOML, shortened if long."""
     try:
         text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError):

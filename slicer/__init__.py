@@ -1,1 +1,1 @@
-"""From a part to layers of paths in the part's own frame. Public: parts.slice_parts, slice.slice_part; values: paths, heights."""
+"""From a part to layers of paths in the part frame. Public: parts.slice_parts, slice.slice_part; values: paths, heights."""

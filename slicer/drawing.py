@@ -1,4 +1,4 @@
-"""Drawing: one layer as SVG, every bead as wide as it is printed, coloured by kind, with travels and seams."""
+"""Drawing: a layer as SVG, with beads as wide as printed and coloured by kind, travels and seams."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -27,17 +27,17 @@ COLOURS = {
 WALLS = (Kind.OUTER_WALL, Kind.OVERHANG)
 TRAVEL_COLOUR, RETRACTED_COLOUR, SEAM_COLOUR = "#3c8d93", "#c2185b", "#000000"
 MARGIN_MM = 2.0  # around the paths, more than half of any bead
-LINE_MM = 0.06  # how thick travels are drawn
-SCALE = 10  # pixels a millimetre, for viewers that do not zoom
+LINE_MM = 0.06  # thickness of travels
+SCALE = 10  # pixels per millimetre, for viewers without zoom
 LEGEND_MM = 3.0  # height of a row of the legend
 
 
 def layer_svg(sliced: SlicedPart, number: int) -> str:
-    """The picture of a part's layer, counted from 1, in the part's frame: x to the right, y up, 1 unit = 1 mm.
+    """SVG of a part's layer, counted from 1, in the part frame: x to the right, y up, 1 unit = 1 mm.
 
-    Each bead is a polyline as wide as the bead in the group of its kind (id: the kind's name), with round ends; travels are
-    thin lines, dashed without and solid with a retraction; a dot stands at the beginning of every outer wall. Raises
-    SliceError for a layer that the part does not have.
+    Each bead is a polyline as wide as the bead in the group of its kind (id: the kind's name), with round ends; travels are thin
+    lines, dashed without and solid with a retraction; a dot marks the start of every outer wall. Raises SliceError for a layer
+    that does not exist.
     """
     if not 1 <= number <= len(sliced.layers):
         raise SliceError(f"part {sliced.index} has no layer {number}: its layers are 1 to {len(sliced.layers)}")
@@ -59,7 +59,7 @@ def layer_svg(sliced: SlicedPart, number: int) -> str:
 
 
 def _frame(title: str, low: Floats, high: Floats, kinds: Sequence[Kind]) -> Iterator[str]:
-    """The beginning of the picture, its background, and the kinds with their colours below the layer."""
+    """The head of the SVG, its background, and below the layer the legend of its kinds."""
     width, height = high - low
     width, height = max(width, 10.0 * LEGEND_MM), height + LEGEND_MM * (len(kinds) + 1)
     yield (
@@ -87,7 +87,7 @@ def _travels(paths: Sequence[Path]) -> Iterator[str]:
 
 
 def _seams(paths: Sequence[Path]) -> Iterator[str]:
-    """Where outer walls begin; the stretches of one wall follow each other without a travel."""
+    """Dots at the starts of outer walls; consecutive strokes of one wall have no travel between them."""
     yield f'<g id="seams" fill="{SEAM_COLOUR}">'
     end = np.full(2, np.nan)
     for path in paths:

@@ -1,7 +1,7 @@
-"""Heights: where the layers of a part lie and where its mesh is cut for them; adaptive layers follow its surface.
+"""Layer heights: the layers of a part and the heights at which its mesh is cut for them; adaptive layers follow its surface.
 
-A layer of height h leaves steps of depth h |n_z| on a surface with normal n, measured across the surface (Dolenc and Makela
-1994, cusp height). Level surfaces have no steps but a height of their own, where a layer should end.
+A layer of height h leaves steps of depth h |n_z| on a surface with normal n, measured across the surface (Dolenc and Makela 1994,
+cusp height). Level surfaces have no steps, but a layer should end at their height.
 """
 
 from collections.abc import Sequence
@@ -20,20 +20,20 @@ from profiles.messages import key_name
 from profiles.process import Process
 from profiles.profile import Profile
 
-LEAST_SHARE = 0.25  # by which a layer may differ from its neighbours: thinner than this share of them it comes out unevenly
+LEAST_SHARE = 0.25  # of a neighbour's height: thinner layers print unevenly
 SHELL_KEYS = ("top_layers", "top_thickness_mm", "bottom_layers", "bottom_thickness_mm")
-SAME_MM = 1e-5  # heights nearer than this are one: what STL files round to, 200 mm up
-LEVEL = 1e-9  # of the cosine between two directions that are the same
-BIN_SHARE = 0.125  # of the least layer height: slopes are known in bins of this height, each by its worst face
+SAME_MM = 1e-5  # heights that differ less are equal: STL files round to this, 200 mm up
+LEVEL = 1e-9  # tolerance on the cosine between two equal directions
+BIN_SHARE = 0.125  # of the least layer height: height of the bins in which slopes are recorded, by their worst face
 FLAT = 0.9998  # cosine of one degree: flatter faces count as level
-LEAST_LEVEL_MM2 = 1.0  # a smaller level face is no surface that a layer should end at
+LEAST_LEVEL_MM2 = 1.0  # a layer need not end at a smaller level face
 MOST_BINS = 2_000_000  # 16 MB; a part 300 mm high has 24,000 at a least layer height of 0.1 mm
-MOST_LAYERS = 50_000  # ten metres of 0.2 mm; beyond that a unit or the scale is wrong
+MOST_LAYERS = 50_000  # ten metres of 0.2 mm; more means a wrong unit or scale
 
 
 @dataclass(frozen=True, eq=False)
 class Heights:
-    """Per layer, each (n,) mm above the base plane: the tip, the bead's height and the plane of the section."""
+    """Layers, each (n,) mm above the base plane: height of the tip, height of the bead, and plane of the section."""
 
     tip_mm: Floats
     height_mm: Floats
@@ -41,7 +41,7 @@ class Heights:
 
     @cached_property
     def bottom_mm(self) -> Floats:
-        """(n,) lower sides of the layers."""
+        """(n,) heights of the layers' lower sides."""
         return self.tip_mm - self.height_mm
 
     def __getitem__(self, layers: slice | Indices) -> "Heights":
@@ -52,23 +52,23 @@ class Heights:
         return Heights(*(np.concatenate(pair) for pair in pairs))
 
     def up_to(self, top_mm: float, height_mm: float) -> "Heights":
-        """The layers with more of one height on top as far as that."""
+        """The layers, extended up to a top with layers of one height."""
         count = max(int(np.ceil((top_mm - self.tip_mm[-1]) / height_mm - 1e-9)), 0)
         tips_mm = self.tip_mm[-1] + height_mm * np.arange(1, count + 1)
         return self + Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
 
 
 def layer_heights(
-    mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0, limb_planes_mm: Sequence[float] = ()
+    mesh: Mesh, profile: Profile, on_plate: bool, pedestal_mm: float = 0.0, limb_planes_mm: Sequence[float] = ()
 ) -> Heights:
-    """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
+    """The layers of a part's mesh in the part frame, adaptive if process.adaptive_cusp_mm is set.
 
-    A pedestal is sliced for itself and ends pedestal_gap_mm below the model. A layer ends in each of the limb planes: heights,
-    lowest first, at which the part goes on beside limbs that are printed later; but for planes less than the least layer
-    from the top or from the one below. Raises SliceError as equal_heights().
+    A pedestal is sliced separately and ends pedestal_gap_mm below the model. A layer ends at each of limb_planes_mm, the
+    ascending heights at which the part continues beside limbs that are printed later, unless that is closer than the least layer
+    to the top or to the plane below. Raises SliceError like equal_heights().
     """
     process, nozzle_mm, top_mm = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
-    first_mm = process.first_layer_height_mm if on_platform else interface_height_mm(process)
+    first_mm = process.first_layer_height_mm if on_plate else interface_height_mm(process)
     from_mm, heights = 0.0, Heights(*np.zeros((3, 0)))
     roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top_mm and roof_mm >= process.least_layer_height_mm:
@@ -79,33 +79,35 @@ def layer_heights(
             heights += _heights_from(mesh, plane_mm, process, nozzle_mm, from_mm, first_mm)
             from_mm, first_mm = plane_mm, process.layer_height_mm
     heights += _heights_from(mesh, top_mm, process, nozzle_mm, from_mm, first_mm)
-    # Sections at the height of a corner lie just below it, or rounding would tell to which layer a ceiling there belongs.
+    # Sections at the height of a corner are taken just below it, otherwise rounding would decide the layer of a ceiling there.
     corners_mm, cuts_mm = np.sort(mesh.vertices[:, 2]), heights.cut_mm
     below, up_to = (np.searchsorted(corners_mm, cuts_mm + by_mm) for by_mm in (-SAME_MM, SAME_MM))
     return replace(heights, cut_mm=np.where(below < up_to, cuts_mm - 2.0 * SAME_MM, cuts_mm))
 
 
 def part_heights(part: Part, later: Sequence[Part], profile: Profile) -> Heights:
-    """The layers of a part printed before `later` ones, with the planes of limbs that are level there; profile: its own."""
+    """The layers of a part printed before `later` parts, with the planes of limbs that are level in its frame. profile: the
+    part's own.
+    """
     limbs = [limb.base for limb in later if limb.base.limbs_mm is not None]
     planes_mm = {base.offset_mm - part.base.offset_mm for base in limbs if float(base.normal @ part.base.normal) > 1.0 - LEVEL}
-    pedestal_mm = profile.search.pedestal_mm if part.on_platform else 0.0
-    return layer_heights(part.in_part_frame(), profile, part.on_platform, pedestal_mm, sorted(planes_mm))
+    pedestal_mm = profile.search.pedestal_mm if part.on_plate else 0.0
+    return layer_heights(part.in_part_frame(), profile, part.on_plate, pedestal_mm, sorted(planes_mm))
 
 
 def shell_layers(process: Process) -> tuple[int, int]:
-    """Solid layers under and over a surface: as many as asked for, more where layers are thin; 0 stays 0."""
+    """Numbers of solid layers below a top and above a bottom: the configured ones, more if layers are thin; 0 stays 0."""
     counts = (process.top_layers, process.top_thickness_mm), (process.bottom_layers, process.bottom_thickness_mm)
     top, bottom = (max(count, ceil(mm / process.layer_height_mm - 1e-6)) if count else 0 for count, mm in counts)
     return top, bottom
 
 
 def equal_heights(top_mm: float, process: Process, nozzle_mm: float, first_mm: float, from_mm: float = 0.0) -> Heights:
-    """Equal layers above the first one, which has a height of its own, up to top_mm above the base plane.
+    """Equal layers above a first layer of another height, up to top_mm above the base plane.
 
-    Each section is taken in the middle of its layer. The last layer meets the top: it is lower, or, where that would make it
-    lower than least_layer_height_mm or a quarter layer, the last few share what remains. A part lower than the least layer is
-    one of that height. Raises SliceError for a part that is too high to be meant.
+    Each section is taken in the middle of its layer. The last layer meets the top: it is lower, or, if that would make it lower
+    than least_layer_height_mm or a quarter layer, the last few share the remainder. A part lower than the least layer becomes one
+    layer of that height. Raises SliceError for an implausibly high part.
 
     >>> equal_heights(0.9, Process(name="example"), 0.4, 0.3).tip_mm.round(6).tolist()
     [0.3, 0.5, 0.7, 0.9]
@@ -128,7 +130,7 @@ def equal_heights(top_mm: float, process: Process, nozzle_mm: float, first_mm: f
 
 
 def interface_height_mm(process: Process) -> float:
-    """Height of a first layer on plastic: a layer's less the overlap, no lower than the least layer.
+    """Height of a first layer on plastic, mm: a layer less the overlap, no lower than the least layer.
 
     >>> interface_height_mm(Process(name="example", layer_height_mm=0.2, interface_overlap=0.5))
     0.1
@@ -138,7 +140,7 @@ def interface_height_mm(process: Process) -> float:
 
 
 def _heights_from(mesh: Mesh, top: float, process: Process, nozzle_mm: float, from_mm: float, first_mm: float) -> Heights:
-    """Layers from one height up to a top, the first of a height of its own."""
+    """Layers from one height up to a top, with a separate height of the first one."""
     least = process.least_layer_height_mm
     _check(top, process)
     adaptive = process.adaptive_cusp_mm > 0.0 and top - from_mm > first_mm + least
@@ -152,7 +154,7 @@ def _heights_from(mesh: Mesh, top: float, process: Process, nozzle_mm: float, fr
 
 
 def _stack_layers(thick_mm: list[float], from_mm: float, top_mm: float) -> Heights:
-    """Layers of those heights on each other, cut in the middle of what they fill below the top."""
+    """Stack layers of given heights; each is cut in the middle of its part below the top."""
     thick, tip = np.array(thick_mm), from_mm + np.cumsum(thick_mm)
     return Heights(tip, thick, 0.5 * (tip - thick + np.minimum(tip, top_mm)))
 
@@ -168,8 +170,9 @@ def _check(top_mm: float, process: Process) -> None:
 
 
 def _spread(thick: list[float], rest: float, least: float, most: float) -> list[float]:
-    """Layers with the last few made alike, so that they take a rest too: as few as stay between least and most and are not much
-    higher than they were. All of them, none above most, where there are too few."""
+    """Spread a remainder over the last few layers, made equal: as few as stay between least and most and are not much higher than
+    before; over all of them, none above most, if there are too few.
+    """
     total = rest
     for tail, last in enumerate(reversed(thick), 1):
         total += last
@@ -183,7 +186,7 @@ def _spread(thick: list[float], rest: float, least: float, most: float) -> list[
 
 @kernel
 def _worst(z: Floats, faces: Ints, leaning: Floats, bin_mm: float, bins: int) -> Floats:
-    """(bins,) greatest |n_z| of the faces that reach into each bin."""
+    """(bins,) greatest |n_z| of the faces that extend into each bin."""
     worst: Floats = floats(bins, 0.0)
     for f in range(len(faces)):
         a, b, c = z[faces[f, 0]], z[faces[f, 1]], z[faces[f, 2]]
@@ -195,11 +198,12 @@ def _worst(z: Floats, faces: Ints, leaning: Floats, bin_mm: float, bins: int) ->
 
 
 def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float) -> list[float]:
-    """Heights of layers from one height up towards another, each as high as the surface beside it allows; mesh: part frame.
+    """Heights of layers from one height up towards another, each as high as the surface beside it allows. mesh: in the part
+    frame.
 
-    Layers end at level surfaces and at the top, none is lower than least_layer_height_mm or higher than most_layer_height_mm:
-    where what is left under a level is less than two of the least, one layer takes all of it, or the level is passed over where
-    that one would be too high. What is left so under the top is not taken.
+    Layers end at level surfaces and at the top, none lower than least_layer_height_mm or higher than most_layer_height_mm: a
+    remainder under a level of less than two least layers becomes one layer, or the level is skipped if that layer would be too
+    high. Such a remainder under the top is left to the caller.
     """
     least_mm, highest_mm = process.least_layer_height_mm, float(mesh.bounds_mm[1, 2])
     leaning = np.abs(mesh.normals[:, 2])
@@ -228,7 +232,7 @@ def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float
 
 
 def _highest(most_mm: Floats, bin_mm: float, z_mm: float) -> float:
-    """The highest layer from a height up that every bin it touches allows."""
+    """Greatest height of a layer from a given height that every bin it touches allows."""
     k = min(int(z_mm / bin_mm), len(most_mm) - 1)
     height = float(most_mm[k])
     while k + 1 < len(most_mm) and (k + 1) * bin_mm < z_mm + height:

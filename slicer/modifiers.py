@@ -1,7 +1,7 @@
-"""Modifiers: where in the layers of a part other settings hold, from the volumes that a person gives them.
+"""Modifiers: the areas of a part's layers with modified settings, from volumes that the user defines.
 
-Walls, skins and infill are those of the part's own settings outside, of the modifier's inside, each cut along the volume: outer
-walls run on as they are, and no wall is made where only the settings change.
+Outside a modifier's volume, walls, skins and infill have the part's own settings, inside those of the modifier. They are split
+along the volume: outer walls continue across, and no wall is added where only the settings change.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -23,28 +23,28 @@ from profiles.process import Process
 from slicer.geometry.polygons import Polygons, clean, closing, offset, rectangle, union, unite_layers
 from slicer.heights import SHELL_KEYS, shell_layers
 
-AROUND_MM = 5.0  # beside a part, which is more than its outlines may reach beyond its mesh
+AROUND_MM = 5.0  # margin beside a part, more than its outlines can extend beyond its mesh
 LEAST_MM2 = 0.01  # smaller areas of a layer are rounding
-SLIT_MM = 0.001  # places that meet are joined over the rounding of their borders
+SLIT_MM = 0.001  # adjoining areas are joined across the rounding of their borders
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Values of the process, by their keys, and the areas of a part's layers in which they hold."""
+    """Modified values of process settings, by key, and the areas of a part's layers in which they apply."""
 
     settings: Mapping[str, Any]
     areas: Sequence[Polygons]
 
     def over(self, process: Process) -> Process:
-        """A process with these values in place of its own."""
+        """A process with these values overriding its own."""
         return process.model_copy(update=self.settings)
 
 
 def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -> list[Place]:
-    """Where in the layers of a part other settings hold than those of its process, those of a later place over an earlier one's.
+    """The areas in a part's layers with modified settings, where later ones override earlier ones.
 
-    mesh: the part's, in its frame; cuts_mm: the middles of the layers. Raises SliceError for settings that do not go with the
-    process's own.
+    mesh: the part's, in its frame; cuts_mm: mid-heights of the layers. Raises SliceError for settings that conflict with the
+    part's process.
     """
     places = []
     (x0, y0, _), (x1, y1, _) = mesh.bounds_mm + np.array([[-AROUND_MM], [AROUND_MM]])
@@ -53,7 +53,8 @@ def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -
         settings = process_of_part(process, own).model_dump(include=set(own))
         if process.spiral_vase:
             raise SliceError(
-                f"{key_name('process.spiral_vase')} is one wall all the way up: a [[modifier]] of the plan changes nothing in it"
+                f"{key_name('process.spiral_vase')} prints one wall all the way up: "
+                "a [[modifier]] of the plan has no effect on it"
             )
         if process.walls == 0 and "walls" in settings:
             raise SliceError(
@@ -65,8 +66,7 @@ def modified_places(part: Part, mesh: Mesh, process: Process, cuts_mm: Floats) -
 
 
 def combined(places: Sequence[Place], keys: Collection[str]) -> list[Place]:
-    """The places in which some keys have values of their own, each with all that hold there: none overlaps another, and no two
-    have the same values."""
+    """The areas in which some keys have modified values, each with all of these values: disjoint, and with distinct values."""
     found = list[Place]()
     for place in places:
         settings = {key: value for key, value in place.settings.items() if key in keys}
@@ -76,7 +76,7 @@ def combined(places: Sequence[Place], keys: Collection[str]) -> list[Place]:
 
 
 def _with_place(found: Sequence[Place], new: Place) -> list[Place]:
-    """Places that do not overlap, with one that lies over them: where they meet, its values replace theirs."""
+    """Disjoint areas with another one laid over them: where they overlap, its values override theirs."""
     pieces, alone = list[Place](), list(new.areas)
     for old in found:
         both = [a ^ b for a, b in zip(old.areas, new.areas, strict=True)]
@@ -97,7 +97,7 @@ def _with_place(found: Sequence[Place], new: Place) -> list[Place]:
 
 
 def volume_sections(part: Part, volume: Volume, cuts_mm: Floats) -> list[Polygons]:
-    """The sections of a volume in each layer of a part, within its room."""
+    """The sections of a volume in each layer of a part, limited to the volume's room."""
     mesh = volume.mesh if isinstance(volume, MeshVolume) else convex_hull(volume.corners)
     in_part = mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
     areas = [clean(loops, 0.0) for loops in cross_sections(in_part, cuts_mm)]
@@ -107,13 +107,13 @@ def volume_sections(part: Part, volume: Volume, cuts_mm: Floats) -> list[Polygon
 
 
 def most_shell_layers(process: Process, places: Sequence[Place]) -> tuple[int, int]:
-    """The number of solid layers under and over a surface: the most that the process or any place has."""
+    """The greatest numbers of solid layers below a top and above a bottom, in the process or any modified area."""
     counts = [shell_layers(own) for own in (process, *(place.over(process) for place in combined(places, SHELL_KEYS)))]
     return max(top for top, _ in counts), max(bottom for _, bottom in counts)
 
 
 def overlaid(base: Polygons, others: Sequence[tuple[Polygons, Polygons]]) -> Polygons:
-    """An area with others in its place within some places; where places overlap the last one wins. others: places and areas."""
+    """An area replaced within some places by other areas; where places overlap the last one counts. others: places and areas."""
     there = [(place, area) for place, area in others if not place.is_empty()]
     for place, area in there:
         base = (base - place) + (area ^ place)
@@ -122,22 +122,22 @@ def overlaid(base: Polygons, others: Sequence[tuple[Polygons, Polygons]]) -> Pol
 
 @dataclass(frozen=True, eq=False)
 class WallCounts:
-    """How many walls a layer has, and the areas in which it has another number; where they overlap the last one wins."""
+    """The number of walls of a layer, and the areas with another number; where they overlap the last one counts."""
 
     usual: int
     others: Sequence[tuple[Polygons, int]] = ()
 
     @property
     def all(self) -> list[int]:
-        """Every number of walls that there is."""
+        """All numbers of walls in the layer."""
         return [self.usual, *(count for _, count in self.others)]
 
     def overlaid(self, of_count: Callable[[int], Polygons]) -> Polygons:
-        """One area made of those that belong to each number."""
+        """One area composed of the areas for each number of walls."""
         return overlaid(of_count(self.usual), [(area, of_count(count)) for area, count in self.others])
 
     def where_more(self, level: int, within: Polygons, short_mm: float) -> Polygons:
-        """The part of an area that has more walls than a level, at a distance from where it has fewer."""
+        """The part of an area with more walls than a level, at a distance from areas with fewer."""
         if all(count > level for count in self.all):
             return within
         fewer = self.overlaid(lambda count: Polygons() if count > level else within)
@@ -145,8 +145,9 @@ class WallCounts:
 
 
 def wall_counts(sections: Sequence[Polygons], walls: Sequence[int], usual: int, places: Sequence[Place]) -> list[WallCounts]:
-    """How many walls every layer has, and in which areas another number, those of places. walls: of each layer; where it has more
-    than usual, places have as many more; where it has fewer, it has them everywhere."""
+    """The number of walls of every layer, with deviating areas from modifiers. walls: of each layer; if it has more than usual,
+    modified areas get as many more; if it has fewer, all of it has them.
+    """
     several, counts = combined(places, ["walls"]), []
     for layer, (section, own) in enumerate(zip(sections, walls, strict=True)):
         others, everywhere = list[tuple[Polygons, int]](), own

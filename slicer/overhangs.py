@@ -1,5 +1,6 @@
-"""Overhangs: what of each layer needs support, what is a ledge that carries itself, and what bridges from anchor to anchor, in
-the direction in which its lines sag least."""
+"""Overhangs of each layer: areas that need support, self-supporting ledges, and bridges from anchor to anchor in the direction of
+least sag.
+"""
 
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -21,19 +22,19 @@ from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, 
 from slicer.heights import SAME_MM
 from slicer.sectioning import RIM_MM, Sections, faces_by_layer
 
-LEAST_MM2 = 1e-3  # places smaller than this are rounding
-TURNS = 18  # directions tried over half a turn, besides those of the place's own sides; the search tries fewer
-SIDES = 8  # of its longest sides are tried, along and across: lines follow a real side, not the mean of several
-LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
+LEAST_MM2 = 1e-3  # smaller areas are rounding
+TURNS = 18  # directions tried over half a turn, besides those of the area's sides; the search tries fewer
+SIDES = 8  # number of longest sides that are tried, along and across: lines follow a real side, not the mean of several
+LEAST = 4.0  # in line widths squared: a smaller area is not a bridge but an edge
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
-ADRIFT = 10.0  # and one held nowhere like this
-LINE_RIM_MM = 0.02  # neighbouring lines overlap by this so that they unite
-GAIN = 0.1  # share by which lines must sag less than in the directions tried before; the place's own sides come first
+ADRIFT = 10.0  # equivalent factor for a line held at no end
+LINE_RIM_MM = 0.02  # overlap by which neighbouring lines unite
+GAIN = 0.1  # least relative reduction of the sag over directions tried before; the area's sides come first
 
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """hanging: what it spans; angle_deg: direction of its lines, 0 to 180.
+    """A bridge. hanging: the bridged area; angle_deg: direction of its lines, 0 to 180.
 
     longest_mm: the longest span; loose: share of the lines' length that is not held at both ends.
     """
@@ -44,7 +45,7 @@ class Bridge:
     loose: float
 
     def carries(self, longest_mm: float) -> bool:
-        """Whether it needs no support: every line from anchor to anchor, none longer than that."""
+        """Whether the bridge needs no support: every line reaches from anchor to anchor and none is longer than the limit."""
         return self.loose <= TOLERATED and self.longest_mm <= longest_mm + ROUNDING_MM
 
 
@@ -52,8 +53,8 @@ class Bridge:
 class Overhang:
     """The overhangs of one layer.
 
-    hanging: needs support; bridges: lines span them; ledges: carry themselves, though no line spans them; unwanted: would need
-    support, but a person wants none there.
+    hanging: area that needs support; bridges: spanned by lines; ledges: self-supporting, too short or wide to bridge; unwanted:
+    would need support, but the user wants none there.
     """
 
     hanging: Polygons = field(default_factory=Polygons)
@@ -63,23 +64,24 @@ class Overhang:
 
 
 def find_overhangs(sections: Sections) -> list[Overhang]:
-    """For every layer the part of its outline above a risky face, and what begins over nothing.
+    """The overhangs of every layer: the part of its outline above a risky face, and floating starts.
 
-    On the platform the first layer may lie. What carries itself by the search's definition (mdp.support_need) does not hang;
-    what bridges layer by layer, as arches do, does not either. Without support whatever has an anchor to hold on to is printed as
-    a bridge, however long. Whatever reaches over the layer below in a place where a person wants support hangs.
+    The first layer on the build plate has none. Areas that support themselves by the search's definition (mdp.support_need) need
+    no support, nor do areas that bridge layer by layer, like arches. With support disabled, every area with an anchor is printed
+    as a bridge, whatever its length. In zones where the user wants support, everything beyond the layer below needs it.
     """
     process, mesh, outlines, cuts_mm = sections.process, sections.mesh, sections.outlines, sections.heights.cut_mm
     level_mm, arch_mm = (inf, inf) if process.support != "auto" else (process.bridge_mm, process.arch_longest_mm)
     enforces = process.support != "none" and len(sections.enforced) > 0
     overhangs = [Overhang()] * len(outlines)
     risky = facing_down(mesh, UP, process.self_supporting_angle_deg)
-    needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_platform))
+    needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, sections.on_plate))
     faces = faces_by_layer(mesh, cuts_mm, risky)
-    for i in range(int(sections.on_platform), len(outlines)):
+    for i in range(int(sections.on_plate), len(outlines)):
         below = outlines[i - 1] if i else offset(sections.plastic_below or Polygons(), RIM_MM)
         beyond, triangles = outlines[i] - below, faces.get(i, [])
-        # What begins over nothing lies beyond it all, however steep it is: a bell's rim that gets thick enough for a line.
+        # A floating start lies entirely beyond the layer below, however steep it is, like a bell's rim that becomes thick enough
+        # for a line.
         small = [piece for piece in islands(outlines[i]) if piece.area() < beyond.area() + LEAST_MM2]
         floating = union([piece for piece in small if (piece ^ below).is_empty()])
         hanging = beyond ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
@@ -89,7 +91,7 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
         if not hanging.is_empty():
             all_need = len(needing.get(i, ())) == len(triangles)
             need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
-            anchors = below + (outlines[i] - hanging)  # also slopes beside it that carry themselves
+            anchors = below + (outlines[i] - hanging)  # including self-supporting slopes beside it
             overhang = _sort_islands(hanging, need, anchors, process, (level_mm, min(level_mm, arch_mm)))
         if not enforced.is_empty():
             bridges = [replace(bridge, hanging=bridge.hanging - enforced) for bridge in overhang.bridges]
@@ -105,9 +107,10 @@ def find_overhangs(sections: Sections) -> list[Overhang]:
 def _sort_islands(
     hanging: Polygons, need: Polygons, anchors: Polygons, process: Process, longest_mm: tuple[float, float]
 ) -> Overhang:
-    """Sorts the connected pieces of a hanging place.
+    """Classify the connected pieces of an overhanging area.
 
-    need: the part of it that needs support by the search's definition; longest_mm: of bridges that do not, and of those that do.
+    need: the part of it that needs support by the search's definition; longest_mm: greatest span of bridges without and with such
+    a part.
     """
     width_mm, places = process.line_width_mm, islands(hanging)
     if all(island.area() < LEAST * width_mm**2 for island in places):
@@ -126,11 +129,11 @@ def _sort_islands(
 
 
 def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> Bridge | None:
-    """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
+    """Bridge lines over one connected overhanging area in the direction of least sag; None if there is no anchor.
 
-    anchors: edges of what may hold lines: the layer below, grown by a quarter of a line. The mean fourth
-    power of the spans is least, as beams sag, a line held at one end counting as 2.63 times its length: where all lines reach
-    over, that is the direction of the shortest spans. angle_deg: the direction where one is asked for, 0: none is.
+    anchors: edges of the area that holds lines: the layer below, grown by a quarter of a line. The mean fourth power of the spans
+    is least, as beams sag, a line held at one end counting as 2.63 times its length: if all lines reach across, that is the
+    direction of the shortest spans. angle_deg: configured direction, 0 for none.
     """
     if hanging.area() < LEAST * width_mm**2 or not len(anchors.edges):
         return None
@@ -140,7 +143,7 @@ def find_bridge(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_de
 
 
 def _angles(sides: Floats, angle_deg: float) -> Floats:
-    """Directions worth trying, radians in 0 .. pi, those of the place's sides first; only the one that is asked for, if any."""
+    """Directions to try, radians in 0 .. pi, those of the area's sides first; only the configured one, if any."""
     if angle_deg:
         return np.array([np.radians(angle_deg % 180.0)])
     steps = sides[:, 2:] - sides[:, :2]
@@ -152,8 +155,9 @@ def _angles(sides: Floats, angle_deg: float) -> Floats:
 
 @kernel
 def _least_sag(sides: Floats, anchors: EdgeIndex, angles: Floats, width_mm: float) -> tuple[float, float, float, float]:
-    """The angle at which lines sag least (nan: none is held), its longest span and the loose share of its lines; and the angle
-    with the greatest length of lines held at both ends."""
+    """The angle of least sag (nan if no line is held), its longest span and the loose share of its lines; and the angle with the
+    greatest length of lines held at both ends.
+    """
     best, least, longest_mm, loose = np.nan, np.inf, 0.0, 0.0
     holding, most_mm = 0.0, -1.0
     for angle in angles:
@@ -174,7 +178,9 @@ def _least_sag(sides: Floats, anchors: EdgeIndex, angles: Floats, width_mm: floa
 
 @kernel
 def _lines_across(sides: Floats, anchors: EdgeIndex, angle: float, width_mm: float) -> Floats:
-    """(n, 4) lines of a width across a place: begin, end and height in the frame turned by the angle; how many ends are held."""
+    """(n, 4) lines across an area, a line width apart: start, end and height in the frame turned by the angle, and the number of
+    held ends.
+    """
     cos, sin, low, high, room = np.cos(angle), np.sin(angle), np.inf, -np.inf, 1
     for e in range(len(sides)):
         y, after = sides[e, 1] * cos - sides[e, 0] * sin, sides[e, 3] * cos - sides[e, 2] * sin
@@ -196,10 +202,11 @@ def _lines_across(sides: Floats, anchors: EdgeIndex, angle: float, width_mm: flo
 def bridges_of_layers(
     sections: Sections, overhangs: Sequence[Overhang], supported: Sequence[Polygons], layers: Sequence[int]
 ) -> list[tuple[Bridge, ...]]:
-    """The bridges of some layers, in rising order: those that carry themselves, and what hangs over no support, as it best can.
+    """The bridges of some layers, given in ascending order: self-supporting ones, and the best possible ones over unsupported
+    overhangs.
 
-    Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
-    supported: where each layer's support is.
+    Such overhangs are ledges, slots without room for support, or areas that support could not reach (reported by
+    Supports.missed). supported: area of support in each layer.
     """
     process, heights, outlines = sections.process, sections.heights, sections.outlines
     width_mm = process.line_width_mm
@@ -225,10 +232,10 @@ def bridges_of_layers(
 
 
 def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float = 0.0) -> list[Bridge]:
-    """Lines over one connected hanging place, each piece of it in the direction in which most of them are held at both ends.
+    """Bridges over one connected overhanging area, each piece in the direction in which most lines are held at both ends.
 
-    Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn. angle_deg: as
-    find_bridge.
+    If no direction holds the whole area, the part held by the best one is bridged that way, and the rest separately. angle_deg:
+    as in find_bridge.
     """
     bridges: list[Bridge] = []
     left = [hanging]
@@ -245,7 +252,7 @@ def find_bridges(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_d
 
 
 def _held_piece(hanging: Polygons, anchors: EdgeIndex, width_mm: float, angle_deg: float) -> Bridge | None:
-    """The part of a place whose lines are held at both ends, in the direction with most such lines; None where it is tiny."""
+    """The part of an area whose lines are held at both ends, in the direction with most such lines; None if it is tiny."""
     sides = edges(hanging)
     *_, angle = _least_sag(sides, anchors, _angles(sides, angle_deg), width_mm)
     lines = _lines_across(sides, anchors, angle, width_mm)

@@ -1,4 +1,4 @@
-"""Paths: what the slicer hands over: a table per layer, one row per stroke, all in the part frame."""
+"""Paths: the slicer's output, a table per layer with one row per stroke, in the part frame."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,11 +13,11 @@ from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from slicer.geometry.polyline import along_mm, length_mm, lengths_mm
 
-ON_PLATE_MM = 0.35  # so high above the plate a bead still sags onto it
+ON_PLATE_MM = 0.35  # height above the plate up to which a bead still sags onto it
 
 
 class Kind(StrEnum):
-    """What a path is for; the values are the names that G-code viewers know from PrusaSlicer."""
+    """The purpose of a path; the values are PrusaSlicer's names, which G-code viewers know."""
 
     OUTER_WALL = "External perimeter"
     INNER_WALL = "Perimeter"
@@ -49,10 +49,10 @@ def bead_area_mm2(width_mm: Width, height_mm: float) -> Width:
 class Path:
     """One continuous bead, a row of a Layer.
 
-    points: (n, 2) mm, n >= 2; a closed path repeats its first point. flow: factor on the bead's volume. approach: (k, 2) mm that
-    the travel to the first point passes. retract: pull the filament back during that travel. fan: part fan 0..1 where it differs
-    from the layer's. below_mm: how far below the layer's z the path begins and ends; it climbs evenly between. wiped: whether the
-    tip may go over it again while the filament is pulled back.
+    points: (n, 2) mm, n >= 2; a closed path repeats its first point. flow: factor on the bead's volume. approach: (k, 2) mm via
+    points of the travel to the first point. retract: pull the filament back during that travel. fan: part fan 0..1 if it differs
+    from the layer's. below_mm: depth below the layer's z at which the path begins and ends; it climbs evenly between. wiped:
+    whether a wipe may pass over it again.
     """
 
     kind: Kind
@@ -68,7 +68,7 @@ class Path:
 
     @property
     def length_mm(self) -> float:
-        """Length of the bead."""
+        """Length of the bead, mm."""
         return length_mm(self.points)
 
 
@@ -76,9 +76,9 @@ class Path:
 class Layer:
     """Strokes printed with the tip at z_mm above the base plane, in order, one row each; every bead is height_mm high.
 
-    fan: of the strokes that have none of their own; nozzle_add_c: how much hotter than the material asks the layer is printed,
-    deg C. points: (n, 2) mm; starts: (k + 1,) where the points of each stroke begin. Columns, (k,) each but for below_mm (k, 2):
-    kind: index in KINDS; own_fan: NaN for the layer's; the others as in Path. approach: (m, 2), approach_starts: (k + 1,).
+    fan: of strokes without their own fan speed; nozzle_add_c: increase over the material's nozzle temperature, deg C. points: (n,
+    2) mm; starts: (k + 1,) start of each stroke's points. Columns, (k,) each but for below_mm (k, 2): kind: index in KINDS;
+    own_fan: NaN for the layer's; the others as in Path. approach: (m, 2), approach_starts: (k + 1,).
     """
 
     z_mm: float
@@ -100,7 +100,7 @@ class Layer:
 
     @classmethod
     def of(cls, z_mm: float, height_mm: float, paths: Sequence[Path], fan: float, nozzle_add_c: float = 0.0) -> "Layer":
-        """The table of some paths."""
+        """The table of a sequence of paths."""
         return cls(
             z_mm=z_mm,
             height_mm=height_mm,
@@ -125,7 +125,7 @@ class Layer:
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The rows one by one."""
+        """The rows as Path objects."""
         points, approaches = np.split(self.points, self.starts[1:-1]), np.split(self.approach, self.approach_starts[1:-1])
         numbers = (self.kind, self.width_mm, self.speed_mm_s, self.flow, self.own_fan, self.below_mm, self.retract, self.wiped)
         rows = zip(*(column.tolist() for column in numbers), points, approaches, strict=True) if len(self) else ()
@@ -136,7 +136,7 @@ class Layer:
 
     @property
     def points_mm(self) -> Floats:
-        """(n, 3) points in the part's frame; a stroke climbs evenly from one below_mm to the other."""
+        """(n, 3) points in the part frame; a stroke climbs evenly from one below_mm to the other."""
         placed = np.empty((len(self.points), 3))
         placed[:, :2], placed[:, 2] = self.points, self.z_mm
         for k in np.flatnonzero(self.below_mm.any(axis=1)).tolist():
@@ -148,16 +148,16 @@ class Layer:
 
     @property
     def volumes_mm3(self) -> Floats:
-        """(k,) plastic that each stroke extrudes."""
+        """(k,) volume of plastic of each stroke, mm3."""
         return lengths_mm(self.points, self.starts) * bead_area_mm2(self.width_mm, self.height_mm) * self.flow
 
     def is_of(self, *kinds: Kind) -> Mask:
-        """(k,) which strokes are of some kinds."""
+        """(k,) whether each stroke is of one of some kinds."""
         return is_of(self.kind, kinds)
 
 
 def is_of(kind: NDArray[np.int8], kinds: Sequence[Kind]) -> Mask:
-    """(k,) which of the strokes with these numbers of kinds are of some kinds."""
+    """(k,) whether each of the strokes, given by numbers of kinds, is of one of some kinds."""
     marks = np.zeros(len(KINDS), np.bool_)
     marks[[NUMBER[one] for one in kinds]] = True
     return marks[kind]
@@ -165,7 +165,7 @@ def is_of(kind: NDArray[np.int8], kinds: Sequence[Kind]) -> Mask:
 
 @dataclass(frozen=True)
 class Unsupported:
-    """A hanging place that could be given no support: its area seen from above, the layer with most of it, and why."""
+    """An overhanging area that support cannot reach: its projected area, the layer with most of it, and the reason."""
 
     mm2: float
     layer: int
@@ -176,11 +176,10 @@ class Unsupported:
 class SlicedPart:
     """A part's layers from its base plane upward; index and pose are those of the Part.
 
-    unsupported: the places of it that no support could be given, reported as findings, the largest first, their layers
-    counted from 1. interface_mm3: plastic that there would not be if the model were not cut, by the index of the part whose
-    base lies there. too_thin: how many layers below its last one hold something, but nothing that a line is narrow enough for,
-    of a vase those above its last one; too_thin_mm: where the first of them lies above the base plane, where a vase ends.
-    pins: how many it fills.
+    unsupported: areas without support, reported as findings, largest first, their layers counted from 1. interface_mm3: plastic
+    that the uncut model would not have, by the index of the part whose base lies there. too_thin: number of layers below its last
+    one that are too thin for any line, for a vase those above its last one; too_thin_mm: height of the first of them above the
+    base plane, where a vase ends. pins: number of pins that it fills.
     """
 
     index: int
@@ -193,11 +192,11 @@ class SlicedPart:
 
     @property
     def points_mm(self) -> Floats:
-        """(n, 3) points of all strokes in the part's frame."""
+        """(n, 3) points of all strokes in the part frame."""
         return np.concatenate([layer.points_mm for layer in self.layers])
 
     def moved(self, x_mm: float, y_mm: float) -> "SlicedPart":
-        """The part with its layers elsewhere in its frame."""
+        """The part with its layers shifted in its frame."""
         by_mm = np.array([x_mm, y_mm])
         if not by_mm.any():
             return self
@@ -206,10 +205,10 @@ class SlicedPart:
 
     @property
     def unsupported_mm2(self) -> float:
-        """Area of all places without support."""
+        """Total area without support, mm2."""
         return sum(area.mm2 for area in self.unsupported)
 
     @property
     def volume_mm3(self) -> float:
-        """All plastic of the part, skirt and support included."""
+        """Total plastic of the part, including skirt and support, mm3."""
         return float(sum(layer.volumes_mm3.sum() for layer in self.layers))

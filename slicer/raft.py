@@ -1,8 +1,8 @@
-"""Raft: layers printed under a model and its support, which make both stick to the plate and are peeled off afterwards.
+"""Raft: layers printed under a model and its support for adhesion, and peeled off afterwards.
 
-Its first layer is sparse enough to come off the plate and reaches farthest, the layers above it are sparse, and the upper half
-of the raft, but never the first layer, is as dense as the interface of support. The model begins a small gap above the raft. Its
-layers are the same as on the plate, except that the first one is printed like any other, neither wider nor squeezed. Support
+Its first layer is sparse enough to come off the plate and has the widest margin, the layers above it are sparse, and the upper
+half of the raft, except for the first layer, is as dense as a support interface. The model begins a small gap above the raft. Its
+layers are those of a print on the plate, except that the first one is printed like any other, neither wider nor squeezed. Support
 begins on the raft itself, with layers that fill the gap.
 """
 
@@ -23,38 +23,38 @@ from slicer.strokes.speed import first_layer_speeds, layer_of, rising_fan, timed
 from slicer.support.beads import beads_around, support_beads
 from slicer.support.support import Supports
 
-THICK = 0.75  # of the nozzle: layers that nobody sees are as high as prints well, as PrusaSlicer's are
+THICK = 0.75  # of the nozzle: layers that are not visible are as high as prints well, as in PrusaSlicer
 
 
 def lift_mm(profile: Profile) -> float:
-    """How far above the plate a model on a raft begins; 0 without one."""
+    """Height of the model's base above the plate on a raft, mm; 0 without one."""
     heights = raft_heights(profile)
     return float(heights.height_mm.sum()) + profile.process.raft_contact_distance_mm if len(heights.tip_mm) else 0.0
 
 
 def reach_mm(process: Process) -> float:
-    """How far a raft reaches beyond what stands on it."""
+    """Margin of a raft around the model and its support, mm."""
     return process.raft_expansion_mm + process.raft_first_layer_expansion_mm if process.raft_layers else 0.0
 
 
 def raft_heights(profile: Profile) -> Heights:
-    """The layers of a raft under the base plane of what stands on it, where z is 0."""
+    """The layers of a raft below the model's base plane at z = 0."""
     process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
-    others_mm = THICK * nozzle_mm  # no setting of a part: all of a print is lifted by the same height
+    others_mm = THICK * nozzle_mm  # not a setting of a part: all of a print is lifted by the same height
     thick_mm = np.array([process.first_layer_height_mm, *[others_mm] * process.raft_layers][: process.raft_layers])
     tips_mm = np.cumsum(thick_mm) - thick_mm.sum() - process.raft_contact_distance_mm
     return Heights(tips_mm, thick_mm, tips_mm - 0.5 * thick_mm)
 
 
 def raft_layers(supports: Supports) -> list[Layer]:
-    """Layers of a part's raft, then the support that fills the gap and the part's first layer; [] where there is no raft."""
+    """The layers of a part's raft, then the support that fills the gap and the part's first layer; [] without a raft."""
     sections = supports.sections
     if not sections.on_raft:
         return []
     process, heights, layers = sections.process, raft_heights(sections.profile), list[Layer]()
     for k, area in enumerate(_raft_areas(supports)):
         own, height_mm = process, float(heights.height_mm[k])
-        if k == 0:  # which has a skirt at most around it
+        if k == 0:  # the first layer has at most a skirt around it
             bare = {"brim_mm": 0.0, "small_base_brim_mm": 0.0, "support_foot_density": process.raft_first_layer_density}
             own = first_layer_process(process).model_copy(update=bare)
         beads = _raft_beads(area, process.raft_layers - 1 - k, own, height_mm, first=k == 0)
@@ -65,7 +65,7 @@ def raft_layers(supports: Supports) -> list[Layer]:
 
 
 def _raft_areas(supports: Supports) -> list[Polygons]:
-    """Area that each layer of the raft covers: the base, outlines so low that they would sag onto the plate, and a margin."""
+    """Area of each layer of the raft: the base, outlines low enough to sag onto the plate, and a margin."""
     sections, process = supports.sections, supports.sections.process
     low = sections.outlines[: int(np.searchsorted(sections.heights.bottom_mm, ON_PLATE_MM))]
     stands, plate = union([*low, supports.areas[0]]), offset(sections.plate, -0.5 * process.line_width_mm)
@@ -74,8 +74,9 @@ def _raft_areas(supports: Supports) -> list[Polygons]:
 
 
 def _raft_beads(area: Polygons, below_top: int, process: Process, height_mm: float, *, first: bool) -> list[Bead]:
-    """Beads of one layer, the number of raft layers below the top one. Dense layers cross each other and the layer below them;
-    sparse layers stack line on line."""
+    """Beads of one layer. below_top: number of raft layers above it. Dense layers cross each other and the layer below them;
+    sparse layers stack line on line.
+    """
     dense = (process.raft_layers + 1) // 2
     quarter_turns = dense + 1 if first else min(below_top, dense)
     is_dense = below_top < dense and not first
@@ -85,7 +86,7 @@ def _raft_beads(area: Polygons, below_top: int, process: Process, height_mm: flo
 
 
 def _support_on_raft(supports: Supports, below: Sequence[Layer]) -> list[Layer]:
-    """The lowest support as layers of its own, which fill the gap to the raft, too."""
+    """The lowest support as separate layers that also fill the gap to the raft."""
     sections, area = supports.sections, supports.areas[0]
     if area.is_empty():
         return []
@@ -100,7 +101,7 @@ def _support_on_raft(supports: Supports, below: Sequence[Layer]) -> list[Layer]:
 
 
 def _layer(beads: list[Bead], area: Polygons, profile: Profile, z_mm: float, height_mm: float, below: Sequence[Layer]) -> Layer:
-    """The beads of a layer in order, with speeds and heat."""
+    """A layer from its beads, in order, with speeds and temperature."""
     process, material, number = profile.process, profile.material, len(below)
     tip: Floats | None = below[-1].points[-1] if below and len(below[-1]) else None
     kind_mm_s = None if number else first_layer_speeds(process)

@@ -1,9 +1,10 @@
-"""Sectioning: a part's mesh becomes the outlines of its layers, as they are printed, and of the model around them.
+"""Sectioning: outlines of a part's layers as printed, and of the model around them, from its mesh.
 
-Outsides and holes may be compensated, larger or smaller, so that the print's sizes are the model's: plastic bulges and shrinks
-where it meets air. A cut face meets plastic: what lies beside it, of a part printed later, stays where it is, or the parts would
-leave a gap or be pressed into each other. Nor does what is added beside the end of a cut reach over the later part's base plane,
-above which the head moves; over that of a limb only beside the limb. What a person marked on a part is known by layers, too.
+Outer contours and holes may be compensated, larger or smaller, for the bulging and shrinking of plastic at free surfaces, so that
+the print has the model's dimensions. A cut face meets plastic: the border to a later part is not compensated, otherwise the parts
+would leave a gap or be pressed into each other. Nor does the addition beside the end of a cut extend over the later part's base
+plane, above which the head moves; over that of a limb only beside the limb. Zones that the user marked on a part are also
+converted to layers.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Indices, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
+from mdp.overhang import PLATE_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NARROW
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Marked, Zone, touched
@@ -56,28 +57,34 @@ from slicer.interface.interface import (
 from slicer.modifiers import Place, combined, modified_places, most_shell_layers, volume_sections
 from slicer.walls.skeleton import FEATURE
 
-ABOVE_MM = 1e-3  # off the height of a pedestal itself, at which level faces lie
+ABOVE_MM = 1e-3  # off the height of a pedestal, at which level faces lie
 BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base plane
-HAIR_MM = 0.04  # nobody can tell whether a piece only so much thicker than the thinnest gets a line all along
-RIM_MM = 0.04  # the shadows of faces in neighbouring layers overlap by this so that they unite
+THICKNESS_MARGIN_MM = 0.04  # of a piece only this much thicker than the thinnest, lines may not cover the whole length
+RIM_MM = 0.04  # overlap by which the projections of faces in neighbouring layers unite
 
 
 @dataclass(frozen=True, eq=False)
 class Sections:
-    """A part's layers, one entry each, before anything is laid, and all that is known of the model's other parts around them.
+    """A part's layers, one entry each, before beads are planned, and the parts around them.
 
-    Part: printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame.
-    Layers: `outlines` are all of each, as they are once printed; `own` what is drawn of each, without the pedestal and what the
-    first layer is squeezed out by; `ungrooved` those before the grooves for later parts.
-    Model around: later parts have `beside` of each layer and `above` of those over the last one, as many as shells reach; the
-    model has `beneath` of those under the base plane, the nearest first, () where earlier parts are not known; earlier parts
-    have `standing` of each layer of a limb. `plastic_below` lies just under the base plane, None on the platform; `plate` is the
-    plate's outline, of use to parts that stand on it. `joints`, (k, 6) segments, are where the part meets others on the surface.
+    Part: printed after `earlier` and before `later` parts, with `profile`, its own; mesh: in its frame.
+
+    Layers: `outlines` are complete, as printed; `own` is the area to draw, without the pedestal and less the elephant foot of the
+    first layer; `ungrooved` is `own` before grooves for later parts.
+
+    Model around: `beside` is the area of later parts in each layer and `above` in the layers over the last one, as many as shells
+    need; `beneath` holds the model's sections under the base plane, nearest first, () if earlier parts are unknown; `standing` is
+    the area of earlier parts in each layer of a limb. `plastic_below` lies just under the base plane, None on the build plate;
+    `plate` is the plate's outline, for parts that stand on it. `joints`, (k, 6) segments, are the lines on the surface where the
+    part meets others.
+
     Interlock: `pins`, (k, 3) x, y and mm3, and the area of `grooves` that the part fills.
-    Zones: no wall of a layer is to begin at its `no_seam`, (k, 6) segments; its `no_support` gets none, and what overhangs in its
-    `enforced` does, () for nowhere. In `places` other settings hold, those of a later one over those of an earlier one.
-    pedestal_layers: how many of the lowest ones the pedestal takes; too_thin: layers that hold something, but nothing that gets a
-    line.
+
+    Zones: walls should not begin at a layer's `no_seam`, (k, 6) segments; its `no_support` area gets no support, and all
+    overhangs in its `enforced` area get it, () for none. `places` are areas with modified settings, where later ones override
+    earlier ones.
+
+    pedestal_layers: number of lowest layers of the pedestal; too_thin: layers whose material is too thin for any line.
     """
 
     part: Part
@@ -106,14 +113,14 @@ class Sections:
     too_thin: frozenset[int] = frozenset()
 
     @property
-    def on_platform(self) -> bool:
-        """Whether the part stands on the platform, or on a raft there."""
-        return self.part.on_platform
+    def on_plate(self) -> bool:
+        """Whether the part stands on the build plate, or on a raft there."""
+        return self.part.on_plate
 
     @property
     def on_raft(self) -> bool:
         """Whether the part stands on a raft."""
-        return self.on_platform and self.process.raft_layers > 0
+        return self.on_plate and self.process.raft_layers > 0
 
     @property
     def process(self) -> Process:
@@ -122,21 +129,21 @@ class Sections:
 
     @cached_property
     def speed_places(self) -> list[Place]:
-        """Where other speeds hold, as slicer.modifiers.combined."""
+        """The areas with modified speeds, as from slicer.modifiers.combined."""
         return combined(self.places, SPEEDS_OF_A_PLACE)
 
     @cached_property
     def support_process(self) -> Process:
-        """The settings of its support, with the width of its lines."""
+        """The settings of the part's support, with its line width."""
         return with_line_width(self.process, self.process.support_line_width_mm)
 
     def below(self, layer: int) -> Polygons | None:
-        """The plastic that a layer lies on; None for the platform."""
+        """The plastic below a layer; None for the build plate."""
         return self.outlines[layer - 1] if layer else self.plastic_below
 
 
 def section_parts(parts: Sequence[Part], profile: Profile) -> list[Sections]:
-    """The sections of all parts of a print, in print order. Raises SliceError as section_part."""
+    """The sections of all parts of a print, in print order. Raises SliceError like section_part."""
     pins = plan_pins(parts, profile)
     return [section_part(part, profile, parts[:k], parts[k + 1 :], pins) for k, part in enumerate(parts)]
 
@@ -146,21 +153,21 @@ def section_part(
 ) -> Sections:
     """The sections of a part that is printed after `earlier` and before `later` parts.
 
-    profile: of the whole print; pins: of all its parts, planned here if they are not given. Raises SliceError when the part's
-    mesh is not closed, or too high to be meant.
+    profile: of the whole print; pins: of all its parts, planned here if they are not given. Raises SliceError if the part's mesh
+    is not closed, or implausibly high.
     """
     of_print, profile = profile, profile.of_part(part.index)
-    if profile.process.spiral_vase:  # its bottom and what is above it know of one wall and of no inside
+    if profile.process.spiral_vase:  # its bottom and the layers above it have one wall and no inside
         hollow = {"walls": 1, "infill_density": 0.0, "top_layers": 0, "overhang_extra_walls": 0, "ironing": False}
         profile = profile.model_copy(update={"process": profile.process.model_copy(update=hollow)})
-    process, mesh, on_platform = profile.process, part.in_part_frame(), part.on_platform
+    process, mesh, on_plate = profile.process, part.in_part_frame(), part.on_plate
     heights = part_heights(part, later, profile)
-    pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
+    pedestal_mm = profile.search.pedestal_mm if on_plate else 0.0
     cuts_mm, pedestal = heights.cut_mm, int(np.searchsorted(heights.tip_mm, pedestal_mm + 1e-6))
     whole = [clean(loops, process.slit_closing_mm) for loops in cross_sections(mesh, cuts_mm)]
-    outlines = [without_hairs(section, process, profile.machine.head.nozzle_mm) for section in whole]
+    outlines = [drop_thin_pieces(section, process, profile.machine.head.nozzle_mm) for section in whole]
     too_thin = frozenset(i for i, outline in enumerate(outlines) if outline.is_empty() and not whole[i].is_empty())
-    if on_platform and not pedestal:
+    if on_plate and not pedestal:
         outlines = lay_on_plate(outlines, mesh, cuts_mm, process)
     places = modified_places(part, mesh, process, cuts_mm)
     beside, above, beneath, standing = _model_around(part, earlier, later, heights, process, places)
@@ -171,7 +178,7 @@ def section_part(
     if pedestal:
         ungrooved = _without_pedestal(ungrooved, mesh, cuts_mm, pedestal_mm, pedestal)
         own = cut_grooves(ungrooved, part, later, cuts_mm, of_print)
-    elif on_platform and not process.raft_layers and process.elephant_foot_mm > 0.0:
+    elif on_plate and not process.raft_layers and process.elephant_foot_mm > 0.0:
         width_mm = first_layer_process(process).line_width_mm
         first = compensate_elephant_foot(own[0], process.elephant_foot_mm, width_mm)
         ungrooved, own = [first, *ungrooved[1:]], [first, *own[1:]]
@@ -194,7 +201,7 @@ def section_part(
         standing=standing,
         joints=joints(part, later, outlines[0], below),
         pins=pins.get(part.index, np.zeros((0, 3))),
-        grooves=grooves(part, process) if process.interlock == "grooves" and not on_platform else Polygons(),
+        grooves=grooves(part, process) if process.interlock == "grooves" and not on_plate else Polygons(),
         no_seam=no_seam_segments(part, mesh, cuts_mm),
         no_support=marked_areas(part.no_support, part, mesh, cuts_mm),
         enforced=marked_areas(part.support, part, mesh, cuts_mm),
@@ -204,9 +211,9 @@ def section_part(
     )
 
 
-def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Polygons:
-    """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
-    least_mm = FEATURE * least_width_mm(nozzle_mm, process.layer_height_mm) + HAIR_MM
+def drop_thin_pieces(section: Polygons, process: Process, nozzle_mm: float) -> Polygons:
+    """Drop slivers: remove the pieces of a section that are nowhere wide enough for a line; the pieces above them begin there."""
+    least_mm = FEATURE * least_width_mm(nozzle_mm, process.layer_height_mm) + THICKNESS_MARGIN_MM
     pieces, solid = [] if section.is_empty() else islands(section), list[Polygons]()
     for piece in pieces:
         if 2.0 * piece.area() >= least_mm * perimeter_mm(piece) or not offset(piece, -0.5 * least_mm).is_empty():
@@ -215,32 +222,34 @@ def without_hairs(section: Polygons, process: Process, nozzle_mm: float) -> Poly
 
 
 def lay_on_plate(outlines: list[Polygons], mesh: Mesh, cuts_mm: Floats, process: Process) -> list[Polygons]:
-    """The sections of a part on the platform, the lowest ones with all that stands there: the section at PLATFORM_TOLERANCE_MM,
-    below which surfaces stand by the search's definition (mdp.overhang.standing). Without it the rest of a base that is not quite
-    level would lie in the second layer, in the air. What reaches no farther than a ledge carries itself and stays as it is:
-    fillets and chamfers keep their form."""
-    base = clean(cross_sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
+    """The sections of a part on the build plate, with the section at PLATE_TOLERANCE_MM added to the lowest ones: below it,
+    surfaces stand on the plate by the search's definition (mdp.overhang.standing). Otherwise the rest of a base that is not quite
+    level would float in the second layer. Areas no wider than a ledge support themselves and stay unchanged: fillets and chamfers
+    keep their shape.
+    """
+    base = clean(cross_sections(mesh, np.array([PLATE_TOLERANCE_MM]))[0], process.slit_closing_mm)
     width_mm, ledge_mm = process.line_width_mm, NARROW * process.line_width_mm
     wide = opening(base - offset(outlines[0], ledge_mm), 0.5 * width_mm)
     if wide.is_empty():
         return outlines
-    lowest, laid = int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM)), offset(wide, ledge_mm + 0.5 * width_mm) ^ base
+    lowest, laid = int(np.searchsorted(cuts_mm, PLATE_TOLERANCE_MM)), offset(wide, ledge_mm + 0.5 * width_mm) ^ base
     return [*(outline + laid for outline in outlines[:lowest]), *outlines[lowest:]]
 
 
 def _model_around(
     part: Part, earlier: Sequence[Part], later: Sequence[Part], heights: Heights, process: Process, places: Sequence[Place]
 ) -> tuple[list[Polygons], list[Polygons], list[Polygons], Sequence[Polygons]]:
-    """What later parts have of a part's layers and of those over them, what the model has of those under its base plane, the
-    nearest first, as many layers as its shells reach, and what earlier parts have of the layers of a limb, as far as its support
-    reaches; () without support."""
+    """Areas of later parts in a part's layers and in those over them; sections of the model under its base plane, nearest first,
+    as many layers as its shells need; and areas of earlier parts in the layers of a limb, within the reach of its support, ()
+    without support.
+    """
     (top, bottom), step = most_shell_layers(process, places), process.layer_height_mm
     over = float(heights.tip_mm[-1]) + step * (np.arange(max(top, process.interface_top_layers)) + 0.5)
     far_mm = max(step * max(top, bottom, process.interface_top_layers), reach_mm(process))
     before, after = (near_parts(part, others, far_mm) for others in (earlier, later))
     others, count = sections_of(after, part, np.concatenate([heights.cut_mm, over])), len(heights.cut_mm)
     deep = np.asarray(-step * (np.arange(bottom)[::-1] + 0.5), dtype=np.float64)
-    known = bool(earlier) and not part.on_platform
+    known = bool(earlier) and not part.on_plate
     under = sections_of([*before, *after], part, deep)[::-1] if known else []
     standing: Sequence[Polygons] = ()
     if part.base.limbs_mm is not None and earlier and process.support != "none":
@@ -249,16 +258,16 @@ def _model_around(
 
 
 def reach_mm(process: Process) -> float:
-    """How far a layer may lie outside the model's section."""
+    """Greatest distance of a layer's outline outside the model's section, mm."""
     return max(process.outline_compensation_mm, -process.hole_compensation_mm, 0.0)
 
 
 def compensate(
     outlines: Sequence[Polygons], part: Part, later: Sequence[Part], beside: Sequence[Polygons], cuts_mm: Floats, process: Process
 ) -> list[Polygons]:
-    """The outlines of a part's layers with outsides and holes compensated, but for its cut faces.
+    """The outlines of a part's layers with outer contours and holes compensated, except at cut faces.
 
-    beside: what later parts have of each layer; cuts_mm: heights of the layers' sections.
+    beside: area of later parts in each layer; cuts_mm: heights of the layers' sections.
     """
     if process.outline_compensation_mm == 0.0 and process.hole_compensation_mm == 0.0:
         return list(outlines)
@@ -273,7 +282,7 @@ def compensate(
 def compensated(
     own: Polygons, others: Polygons, below: Sequence[Sequence[float]], over: Polygons | None = None, *, process: Process
 ) -> Polygons:
-    """A part's section, which others of its model touch, with the sides compensated that no other touches.
+    """A part's section, compensated on the sides that touch no other part of the model.
 
     below: a, b, c of the base plane of each later part that is not a limb; material is added only where a x + b y + c > 0, and
     not within `over`.
@@ -291,7 +300,7 @@ def compensated(
 
 
 def _resized(whole: Polygons, process: Process) -> Polygons:
-    """A section of the model with larger or smaller outsides and holes."""
+    """A section of the model with outer contours and holes compensated."""
     resized = []
     for island in islands(whole):
         filled = Polygons([loop for loop in contours(island) if area_mm2(loop) > 0])
@@ -301,7 +310,7 @@ def _resized(whole: Polygons, process: Process) -> Polygons:
 
 
 def compensate_elephant_foot(outline: Polygons, elephant_foot_mm: float, width_mm: float) -> Polygons:
-    """The outline less what the first layer is squeezed out by; places that would shrink below a line keep their width."""
+    """The outline less the elephant foot of the first layer; areas that would become narrower than a line keep their width."""
     deep = elephant_foot_mm + 0.5 * width_mm
     narrow = outline - offset(offset(outline, -deep), deep + 0.01)
     return offset(outline, -elephant_foot_mm) + narrow
@@ -311,7 +320,7 @@ def _without_pedestal(
     outlines: Sequence[Polygons], mesh: Mesh, cuts_mm: Floats, pedestal_mm: float, layers: int
 ) -> list[Polygons]:
     """Outlines of the model alone: empty in the pedestal, and its own foot where it is sunk into the pedestal's top."""
-    sunk_mm = pedestal_mm + PLATFORM_TOLERANCE_MM
+    sunk_mm = pedestal_mm + PLATE_TOLERANCE_MM
     foot = clean(cross_sections(mesh, np.array([sunk_mm + ABOVE_MM]))[0])
     if foot.is_empty():
         foot = outlines[-1]
@@ -320,8 +329,9 @@ def _without_pedestal(
 
 
 def no_seam_segments(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Floats]:
-    """(k, 6) for each layer segments of the part's frame at its middle, one of cuts_mm: what that cuts of the faces that the
-    part's zones name, and of all faces within their boxes. mesh: the part's, in its frame."""
+    """(k, 6) segments for each layer, in the part frame at its mid-height (cuts_mm): the sections of all faces that the part's
+    no_seam zones name or that lie within their boxes. mesh: the part's, in its frame.
+    """
     marked = part.no_seam
     chords = [_chords(mesh, np.zeros(len(mesh.faces), dtype=np.bool_) if marked.faces is None else marked.faces, cuts_mm)]
     for volume in marked.volumes:
@@ -339,7 +349,7 @@ def no_seam_segments(part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Floats]:
 
 
 def _chords(mesh: Mesh, chosen: Mask, cuts_mm: Floats) -> tuple[Floats, Indices]:
-    """(k, 2, 3) what level planes cut of the chosen faces, and (k,) which plane each is of."""
+    """(k, 2, 3) sections of the chosen faces with level planes, and (k,) the plane of each."""
     corners = mesh.vertices[mesh.faces[chosen]]
     heights = corners[:, :, 2]
     first, last = np.searchsorted(cuts_mm, heights.min(axis=1)), np.searchsorted(cuts_mm, heights.max(axis=1))
@@ -356,7 +366,7 @@ def _chords(mesh: Mesh, chosen: Mask, cuts_mm: Floats) -> tuple[Floats, Indices]
 
 
 def _within(segments: Floats, box: Zone) -> tuple[Floats, Floats]:
-    """Shares along (k, 2, 3) segments between which each lies in a box; the first is the greater where none of it does."""
+    """Range of (k, 2, 3) segments inside a box, as shares along each; the first is the greater if none of it is inside."""
     segments = box.along(segments)
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -369,10 +379,10 @@ def _within(segments: Floats, box: Zone) -> tuple[Floats, Floats]:
 
 
 def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> list[Polygons]:
-    """For each layer the sections of the volumes and the shadows of the faces, as they belong to it, that are marked on a part;
-    [] where nothing is.
+    """The area marked on a part in each layer: sections of volumes, and projections of the faces that belong to the layer; [] if
+    nothing is marked.
 
-    mesh: the part's, in its frame; cuts_mm: the middles of the layers.
+    mesh: the part's, in its frame; cuts_mm: mid-heights of the layers.
     """
     if not marked.anywhere:
         return []
@@ -389,10 +399,12 @@ def marked_areas(marked: Marked, part: Part, mesh: Mesh, cuts_mm: Floats) -> lis
 
 
 def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
-    """Chosen faces seen from above, (3, 2) counter-clockwise where they look down, by the layers whose strip of the surface they
-    belong to."""
+    """Chosen faces projected to the plane, (3, 2), counter-clockwise if they face down, by the layers to whose strip of the
+    surface they belong.
+    """
     corners = mesh.vertices[mesh.faces[chosen]]
-    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1), side="right")  # a section is what lies just below its plane
+    # a section contains what lies just below its plane
+    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1), side="right")
     last = np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1))
     last = np.minimum(np.maximum(last, first), len(cuts_mm) - 1)
     faces: dict[int, list[Floats]] = {}

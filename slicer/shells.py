@@ -1,6 +1,6 @@
-"""Shells: the walls, skins and sparse places of every layer of a part, and then its beads, whose order is not known yet.
+"""Shells: the walls, skins and sparse areas of every layer of a part, and then its beads, not yet ordered.
 
-A part that is cut from a model has all walls and skins along the model's surface, few along the face of a cut.
+A part that is cut from a model has full walls and skins along the model's surface, and fewer along the face of a cut.
 """
 
 from collections.abc import Sequence
@@ -55,25 +55,25 @@ from slicer.support.support import Supports
 from slicer.walls.variable import Wall
 from slicer.walls.walls import Walls, gaps, layer_walls, uncovered_area, walls, walls_under_tops
 
-FEWEST_LAYERS = 60  # from which on a part's layers are worked out by several processes
+FEWEST_LAYERS = 60  # number of layers from which several processes compute them
 
-# Loops and walls of varying width, inner walls that end on a cut, and the contours of what walls enclose, of its narrow places
-# and, where it differs, of what the walls of the uncut model enclose: Polygons cannot go from one process to another.
+# Loops and walls of varying width, inner walls that end on a cut, and the contours of the area inside the walls, of its narrow
+# parts and, if different, of the area inside the uncut model's walls: Polygons cannot be sent between processes.
 Contours: TypeAlias = tuple[tuple[tuple[Floats, ...], ...], tuple[Wall, ...], tuple[Bead, ...], list[list[Floats]]]
-REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cut overlaps it by this
-TOUCHING_MM2 = 1e-3  # a section that gains less by its neighbours has none
-NEAR_MM = 3.0  # how far beside a limb's base the solid shell of its cut face reaches
+REACH = 0.1  # of the line width: overlap of an inner wall that ends on the wall along a cut
+TOUCHING_MM2 = 1e-3  # a section that gains less from its neighbours has none
+NEAR_MM = 3.0  # width of the solid shell of a limb's cut face beside its base
 THREADS_APART_MM = 0.05  # between the threads of a thick bridge, as in PrusaSlicer (BRIDGE_EXTRA_SPACING)
-IRONED = 100  # after all else of an island
+IRONED = 100  # after everything else of an island
 
 
 @dataclass(frozen=True, eq=False)
 class Shell:
     """One layer of the part itself.
 
-    process: the settings, with the extra walls of interfaces, overhangs and modifiers and the widths of the plate's first layer;
-    ending: inner walls that end on the face of a cut or of a modifier, and what fills between them; leaning: as
-    leaning_walls; ironed: smoothed tops; infill: of the region's sparse places, None where it is not drawn yet.
+    process: the settings, including extra walls of interfaces, overhangs and modifiers, and the widths of the plate's first
+    layer; ending: inner walls that end on the face of a cut or of a modifier, and the fill between them; leaning: from
+    leaning_walls; ironed: ironed tops; infill: of the region's sparse area, None if not drawn yet.
     """
 
     process: Process
@@ -88,7 +88,7 @@ class Shell:
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """A part's layers with the support planned for it, and its sparse infills."""
+    """A part's layers with their planned support and sparse infills."""
 
     supports: Supports
     layers: Sequence[Shell]
@@ -96,21 +96,21 @@ class Shells:
 
     @property
     def sections(self) -> Sections:
-        """The layers as outlines."""
+        """The part's sections."""
         return self.supports.sections
 
 
 def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequence[int] | None = None) -> Shells:
-    """The shells of a part with the support that was planned for it.
+    """The shells of a part with its planned support.
 
-    layers: those that are asked for, all where None; of the others there is what these need, or nothing.
+    layers: the requested ones, None for all; others are computed only as far as these need them.
     """
     sections = supports.sections
     process, places, processes = sections.process, sections.places, layer_processes(sections)
     own, above, (top, bottom), count = sections.own, sections.above, most_shell_layers(process, places), len(processes)
     model = [joined(*three) for three in zip(sections.ungrooved, own, sections.beside, strict=True)]
     counts = wall_counts(own, [layer.walls for layer in processes], process.walls, places)
-    # What holds a layer is planned from the top where branches do.
+    # Lightning branches are planned from the top down over all layers.
     runs = [range(count)] if layers is None or has_lightning(process, places) else _with_those_below(layers)
     needed = [layer for run in runs for layer in run]
     # Walls above make infill solid.
@@ -118,11 +118,11 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
     walled = _walled(sections, model, processes, counts, sorted(with_those_above))
     insides = [walls.inside for walls, _, _ in walled]
     later = [whole - mine if whole is not mine else Polygons() for whole, mine in zip(model, own, strict=True)] + list(above)
-    # Earlier parts that are not known are taken to fill the first section; under the platform is nothing.
-    below = sections.beneath or [Polygons() if sections.on_platform else own[0]] * bottom
+    # Unknown earlier parts are assumed to fill the first section; under the build plate is nothing.
+    below = sections.beneath or [Polygons() if sections.on_plate else own[0]] * bottom
     known = later if any(not area.is_empty() for area in later) else ()
     cover = Cover(model, [model_inside for _, _, model_inside in walled], below, above[:top], known)
-    filled = regions(insides, cover, not sections.on_platform, process, runs, places)
+    filled = regions(insides, cover, not sections.on_plate, process, runs, places)
     ironed = ironed_areas(filled, [*sections.beside, *above[:1]], process, places)
     bridges = bridges_of_layers(sections, overhangs, supports.areas, needed)
     sparse = [region.sparse for region in filled]
@@ -137,7 +137,7 @@ def build_shells(supports: Supports, overhangs: Sequence[Overhang], layers: Sequ
 
 
 def _with_those_below(layers: Sequence[int]) -> list[range]:
-    """Runs of layers that hold some layers and each one's lower neighbour, whose infill tells of bridges."""
+    """Ranges of layers that contain some layers and the layer below each, whose infill determines bridges."""
     needed = np.unique([layer for k in layers for layer in (max(k - 1, 0), k)])
     return [range(int(run[0]), int(run[-1]) + 1) for run in np.split(needed, np.flatnonzero(np.diff(needed) > 1) + 1)]
 
@@ -149,7 +149,7 @@ def _walled(
     counts: Sequence[WallCounts],
     needed: Sequence[int],
 ) -> list[tuple[Walls, tuple[Bead, ...], Polygons]]:
-    """The walls of every layer as cut_walls has them; none in layers that are not needed."""
+    """The walls of every layer, as from cut_walls; empty for layers that are not needed."""
     process, nozzle_mm = sections.process, sections.profile.machine.head.nozzle_mm
     heights_mm = sections.heights.height_mm.tolist()
     above = [*model[1:], *(sections.above[:1] or [Polygons()])] if process.only_one_wall_top else [None] * len(model)
@@ -166,19 +166,20 @@ def _walled(
     walled: list[tuple[Walls, tuple[Bead, ...], Polygons]] = [(Walls((), Polygons(), Polygons()), (), Polygons())] * len(model)
     results = parallel_map(contours_of, len(needed), FEWEST_LAYERS)
     for layer, (loops, variable, ending, areas) in zip(needed, results, strict=True):
-        # Polygons are built anew, which can round, whichever process has found them.
+        # Polygons are rebuilt, which can round, in the same way for all processes.
         inside, narrow, *model_inside = map(of_contours, areas)
         walled[layer] = Walls(loops, inside, narrow, variable), ending, model_inside[0] if model_inside else inside
     return walled
 
 
 def layer_processes(sections: Sections) -> list[Process]:
-    """The settings of every layer: the first has widths of its own, but for one on a raft, and on plastic more walls, if it has
-    any; where any of a layer overhangs it has overhang_extra_walls more."""
+    """The settings of every layer: the first has its own line widths, unless on a raft, and on plastic more walls, if it has any;
+    a layer with an overhang gets overhang_extra_walls more.
+    """
     process, lying = sections.process, sections.own if sections.pedestal_layers else sections.outlines
     processes = [process] * len(lying)
     if not sections.on_raft:
-        processes[0] = first_layer_process(process) if sections.on_platform else interface_process(process)
+        processes[0] = first_layer_process(process) if sections.on_plate else interface_process(process)
     if process.overhang_extra_walls:
         for k, (own, below) in enumerate(zip(processes, [sections.plastic_below, *lying[:-1]], strict=True)):
             width = own.line_width_mm
@@ -189,7 +190,7 @@ def layer_processes(sections: Sections) -> list[Process]:
 
 
 def joined(ungrooved: Polygons, own: Polygons, beside: Polygons) -> Polygons:
-    """The islands of the model that hold some of a section; `own` itself where these are it. beside: what other parts have."""
+    """The islands of the model that contain some of a section; `own` itself if these are equal. beside: area of other parts."""
     alone = own if own is ungrooved or ungrooved.area() < own.area() + TOUCHING_MM2 else ungrooved
     if own.is_empty() or beside.is_empty() or not _boxes_meet(own, beside):
         return alone
@@ -215,10 +216,10 @@ def cut_walls(
     more: int,
     above: Polygons | None,
 ) -> tuple[Walls, tuple[Bead, ...], Polygons]:
-    """The walls of a part's section in its island of the model, as joined. Those that run round; inner walls along the surface
-    that end on a cut face's, or where a modifier has fewer, all of one width, and what fills between them; what the walls would
-    enclose if the model were not cut and had `more` walls fewer. above: the model in the next layer, if the tops that it leaves
-    bare have one wall."""
+    """The walls of a part's section in its island of the model, see joined: walls all around; inner walls along the surface that
+    end on a cut face, or where a modifier has fewer, all of one width, and the fill between them; and the area that the uncut
+    model's walls would enclose with `more` walls fewer. above: the model in the next layer, if uncovered tops have one wall.
+    """
     alone, least, most = model is section, min(counts.all), max(counts.all)
     if alone and least == most:
 
@@ -255,7 +256,9 @@ def cut_walls(
 
 
 def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
-    """What a layer prints of the part itself, and for it; walls that run round come as loops, without their seams."""
+    """The beads of the part itself in one layer, and those of its support, skirt and brim; walls all around are loops without
+    seams.
+    """
     shell, heights = shells.layers[layer], shells.sections.heights
     process, region, height_mm = shell.process, shell.region, float(heights.height_mm[layer])
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
@@ -264,8 +267,8 @@ def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
     for bridge in shell.bridges:
         wide = opening(bridge.hanging ^ shell.walls.inside, 0.5 * width)
         if not wide.is_empty():
-            area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # and onto the anchors as far as the inside reaches
-            # where infill beside it would be narrower than a cell it goes on to the walls
+            area = offset(wide, ANCHORED * width) ^ shell.walls.inside  # overlapping the anchors as far as the inside extends
+            # where infill beside it would be narrower than a cell it extends to the walls
             area += union(strips_beside(area, region.sparse, widest_cell_mm(shells.fillings, process, layer)))
             across = replace(lines, angle_deg=bridge.angle_deg)
             if process.thick_bridges:
@@ -278,14 +281,14 @@ def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
         area = infill_bridges(region, open_area(below.region.sparse, shells.fillings, below.process, layer - 1), width)
         if not area.is_empty():
             held = area
-            if process.walls:  # lines end over them, not beside them
+            if process.walls:  # lines end over the walls, not beside them
                 onto_mm = 0.5 * lines.spacing_mm - (overlap - REACH) * width
                 held += offset(area, onto_mm) - shell.walls.inside
             above = replace(lines, seen=not (offset(area, width) ^ region.bare).is_empty())
             beads += bridge_beads(held, above, process.infill_bridge_flow, over_infill=True)
             region = replace(_without(region, area, width), sparse=region.sparse)
     skins = lines if process.skin_angle_deg is None else replace(lines, angle_deg=process.skin_angle_deg + 90.0 * (layer % 2))
-    skins = replace(skins, seen=layer == 0 and shells.sections.on_platform)
+    skins = replace(skins, seen=layer == 0 and shells.sections.on_plate)
     top = replace(skins, width_mm=process.top_skin_line_width_mm or width, pattern=process.top_skin_pattern, seen=True)
     bottom = replace(skins, pattern=process.bottom_skin_pattern)
     solid, under = region.solid, Polygons()
@@ -293,7 +296,7 @@ def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
         bare = shells.sections.below(layer)
         under = solid if bare is None else opening(solid - bare, 0.5 * width)
         solid = solid - under
-    places = {width: [shell.walls.narrow]}  # by the width of the lines around: all of a layer are filled at once
+    places = {width: [shell.walls.narrow]}  # by the width of the lines around: all gaps of a layer are filled at once
     for area, kind, laid in ((solid, Kind.SKIN, skins), (under, Kind.SKIN, bottom), (region.top, Kind.TOP_SKIN, top)):
         skin, rests = skin_lines(area, kind, laid)
         beads += skin
@@ -309,16 +312,16 @@ def lay_beads(shells: Shells, layer: int) -> tuple[list[Bead], list[Bead]]:
 
 
 def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
-    """The walls as beads; all ranks are at most 0, so that walls come before gaps, skin and infill.
+    """The walls as beads; all ranks are at most 0, so that walls come before gap fill, skin and infill.
 
-    Outer beads make up for what their outer round side leaves out of the section.
+    The flow of outer beads compensates for the round side, which would leave the section unfilled.
     """
     outer, beads = outer_wall_width_mm(process), []
     outer_flow = bulge_flow(outer, height_mm, 1, process.outer_bulge * outer)
     for level, loops in enumerate(walled.loops):
         kind, width, flow = (Kind.INNER_WALL, process.line_width_mm, 1.0) if level else (Kind.OUTER_WALL, outer, outer_flow)
         beads += [Bead(kind, loop, width, wall_rank(level, process), flow) for loop in loops]
-    for wall in walled.varying:  # one that fills a place from side to side bulges on both
+    for wall in walled.varying:  # one that fills an area from side to side bulges on both
         kind, width = Kind.INNER_WALL if wall.level else Kind.OUTER_WALL, mean_width_mm(wall.course)
         flow = bulge_flow(width, height_mm, wall.free, process.outer_bulge * process.line_width_mm)
         rank, course = wall_rank(wall.level, process), varying(wall.course)
@@ -327,7 +330,7 @@ def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
 
 
 def _without(region: Region, area: Polygons, width_mm: float) -> Region:
-    """The region without the place of a bridge."""
+    """The region without the area of a bridge."""
 
     def rest(polygons: Polygons) -> Polygons:
         left = polygons - area
@@ -337,15 +340,16 @@ def _without(region: Region, area: Polygons, width_mm: float) -> Region:
 
 
 def bridge_beads(area: Polygons, lines: SolidLines, flow: float, over_infill: bool = False) -> list[Bead]:
-    """The lines of a bridge with its own flow. over_infill: the first solid ones over sparse infill, across the lines below
-    wherever those have one direction; gaps beside them stay empty: whatever filled them would lie on nothing."""
+    """The lines of a bridge with its own flow. over_infill: the first solid lines over sparse infill, across the infill lines
+    where those have one direction; gaps beside them stay open, since gap fill would lie on nothing.
+    """
     beads, rests = skin_lines(area, Kind.BRIDGE, lines)
     beads += [] if over_infill else gaps(rests, lines.width_mm, lines.height_mm)
     return [replace(bead, flow=bead.flow * flow, over_infill=over_infill) for bead in beads]
 
 
 def thread_beads(area: Polygons, lines: SolidLines, diameter_mm: float) -> list[Bead]:
-    """The lines of a bridge as round threads, which hang below the layer, so far apart that they do not touch."""
+    """The lines of a bridge as round threads that hang below the layer, far enough apart not to touch."""
     height_mm = lines.height_mm
     apart = replace(lines, width_mm=diameter_mm + THREADS_APART_MM + height_mm * ROUND_SIDES)
     flow = 0.25 * pi * diameter_mm**2 / bead_area_mm2(diameter_mm, height_mm)
@@ -353,7 +357,7 @@ def thread_beads(area: Polygons, lines: SolidLines, diameter_mm: float) -> list[
 
 
 def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:
-    """Lines across those of the skin; their flow is counted on a bead of the line's width."""
+    """Ironing lines across those of the skin; their flow refers to a bead of the line width."""
     if area.is_empty():
         return []
     spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
@@ -364,12 +368,13 @@ def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Be
 
 
 def interface_mm3(shells: Shells) -> dict[int, float]:
-    """Plastic, mm3, that a part has more of than the uncut model in its place, by the part whose base plane is nearest: walls and
-    skins on the faces of cuts in place of sparse infill, and what the flow of its first layer on plastic adds to its room."""
+    """Additional plastic of a part compared with the uncut model, mm3, by the part with the nearest base plane: walls and skins
+    on cut faces instead of sparse infill, and the extra flow of its first layer on plastic.
+    """
     sections, regions = shells.sections, [shell.region for shell in shells.layers]
     part, process, heights = sections.part, sections.process, sections.heights
-    planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
-    upper_parts = [upper for upper in sections.later if not upper.on_platform]
+    planes = {} if sections.on_plate else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
+    upper_parts = [upper for upper in sections.later if not upper.on_plate]
     planes |= {upper.index: plane_in_frame_of(part, upper.base.normal, upper.base.offset_mm) for upper in upper_parts}
     more, near = dict.fromkeys(planes, 0.0), limb_planes(part, sections.later, heights, NEAR_MM)
     for layer, (section, region) in enumerate(zip(sections.own, regions, strict=True)):
@@ -382,16 +387,15 @@ def interface_mm3(shells: Shells) -> dict[int, float]:
             counting = [near[index].band(layer, -np.inf, np.inf) if index in near else None for index in planes]
             for index, area in zip(planes, nearest_areas(closed, distances, counting), strict=True):
                 more[index] += (1.0 - process.infill_density) * float(height_mm) * area
-    if not sections.on_platform:
+    if not sections.on_plate:
         filled = sections.own[0].area() - (1.0 - process.infill_density) * regions[0].sparse.area()
         more[part.index] += filled * (process.interface_flow - 1.0) * float(heights.height_mm[0])
     return more
 
 
 def nearest_areas(whole: Polygons, distances: Sequence[Floats], near: Sequence[Polygons | None]) -> list[float]:
-    """mm2 of an area where each of several linear functions a x + b y + c is the least of those that count there.
-
-    near: where each counts, None: everywhere.
+    """The areas, mm2, in which each of several linear functions a x + b y + c is the least of those that count there. near: the
+    area in which each counts, None for everywhere.
     """
     areas = []
     for k, (mine, own) in enumerate(zip(distances, near, strict=True)):

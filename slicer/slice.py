@@ -1,12 +1,12 @@
-"""Slicing: the parts of a decomposition become layers of paths, each in its own frame.
+"""Slicing: from the parts of a decomposition to layers of paths, in the part frames.
 
-Each value is made from the one before: a part's sections (slicer.sectioning), what of them overhangs (slicer.overhangs), the
-support that this needs (slicer.support), the shells of every layer and its beads (slicer.shells), and these in order, with speed
-and flow (slicer.strokes).
+A straight chain of values: a part's sections (slicer.sectioning), their overhangs (slicer.overhangs), their support
+(slicer.support), the shells of every layer and its beads (slicer.shells), and the ordered strokes with speed and flow
+(slicer.strokes).
 
-First the support of all parts is planned together, for what one part's support stands on may be printed with another. From
-then on a part's paths depend on nothing but the plan and the profile, so the result is the same bit for bit however many
-processes slice. Where one part is most of the print, its layers are worked out side by side instead.
+First the support of all parts is planned together, since the base of one part's support may be printed with another part. After
+that, a part's paths depend only on the plan and the profile, so the result is identical for any number of processes. If one part
+makes up most of the print, its layers are computed in parallel instead.
 """
 
 import os
@@ -29,7 +29,7 @@ from slicer.fill.ends import CARRYING, Plastic, cut_anchors, hold_ends, plastic_
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import length_mm
 from slicer.heights import shell_layers
-from slicer.interface.interface import pin_width_mm, skin_beside
+from slicer.interface.interface import pin_width_mm, visible_wall_beside
 from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import KINDS, ON_PLATE_MM, SKINS, Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.raft import raft_layers
@@ -41,20 +41,21 @@ from slicer.strokes.seam_plan import plan_seams, rear_of, seam_limits
 from slicer.strokes.speed import first_layer_speeds, kinds_apart, layer_of, rising_fan, timed
 from slicer.strokes.strokes import Strokes, split, split_overhangs
 from slicer.strokes.vase import vase_layers
-from slicer.support.handed_down import plan_supports
+from slicer.support.from_earlier_part import plan_supports
 from slicer.support.support import Supports, explain, own_supports
 from slicer.walls.walls import fuzzy_walls
 
-FEWEST_IN_ALL = 250  # fewer are sliced sooner than processes are forked and their paths brought back
-LARGEST_SHARE = 0.6  # of all layers: where a part has more of them, the other parts end long before it
-PIN_RANK = OUTSIDE - 1  # pins come before all else of a layer
-PIN_CHORDS = 12  # chords of the circle that the tip goes round a pin
-PIN_MOST_AREA = 3.0  # section of its stroke, in squares of the nozzle's diameter: Klipper refuses 4 (max_extrude_cross_section)
+FEWEST_IN_ALL = 250  # layers; fewer are sliced faster than processes can be forked and their paths returned
+LARGEST_SHARE = 0.6  # of all layers: if a part has more of them, the other parts end long before it
+PIN_RANK = OUTSIDE - 1  # pins come before everything else in a layer
+PIN_CHORDS = 12  # of the circle that the tip describes at a pin
+# cross-section of a pin's stroke, in squares of the nozzle diameter: Klipper refuses 4 (max_extrude_cross_section)
+PIN_MOST_AREA = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class SlicingProgress:
-    """How far slicing is, part by part in print order: layers done, how many are expected, and the parts that are sliced."""
+    """Progress of slicing by part, in print order: completed layers, expected layers, and the sliced parts."""
 
     layers: tuple[int, ...]
     expected: tuple[int, ...]
@@ -62,12 +63,12 @@ class SlicingProgress:
 
     @property
     def begun(self) -> int:
-        """How many parts are sliced or being sliced."""
+        """The number of parts that are sliced or being sliced."""
         return sum(count > 0 for count in self.layers)
 
     @property
     def share(self) -> float:
-        """Estimated share of all layers that is done, 0 to 1; it never falls, though a part may have fewer than expected."""
+        """Monotone progress estimate over all layers, 0 to 1; a part may end with fewer layers than expected."""
         pieces = zip(self.layers, self.expected, self.ready, strict=True)
         return sum(of if piece else min(count, of) for count, of, piece in pieces) / max(sum(self.expected), 1)
 
@@ -75,13 +76,13 @@ class SlicingProgress:
 def slice_parts(
     parts: Sequence[Part], profile: Profile, on_progress: Callable[[SlicingProgress], None] | None = None
 ) -> tuple[SlicedPart, ...]:
-    """Every part sliced; on_progress: called now and then.
+    """Slice all parts. on_progress: called periodically.
 
-    Raises SliceError as slice_part does, for the first part in print order that has a reason.
+    Raises SliceError like slice_part, for the first part in print order that fails.
     """
     if not parts:
         return ()
-    models = sum(part.on_platform for part in parts)
+    models = sum(part.on_plate for part in parts)
     if profile.process.spiral_vase and models > 1:
         raise SliceError(f"{key_name('process.spiral_vase')} climbs round one model, {models} are on the plate")
     if profile.process.spiral_vase and len(parts) > 1:
@@ -93,7 +94,7 @@ def slice_parts(
     overhangs = [find_overhangs(layers) for layers in sections]
     supports = plan_supports([own_supports(*pair) for pair in zip(sections, overhangs, strict=True)])
     expected = [len(support.areas) for support in supports]
-    layers = np.frombuffer(mmap(-1, 4 * len(parts)), np.int32)  # those that are done: other processes write them, too
+    layers = np.frombuffer(mmap(-1, 4 * len(parts)), np.int32)  # numbers of completed layers, shared with other processes
     ready: list[SlicedPart | None] = [None] * len(parts)
     errors: dict[int, SliceError] = {}
     largest_first = sorted(range(len(parts)), key=lambda k: (-expected[k], k))  # so that no large one is left for the end
@@ -133,9 +134,9 @@ def slice_parts(
 def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> SlicedPart:
     """The part's layers from its base plane upward.
 
-    earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. Support is
-    the part's own (slice_parts hands it down to earlier parts). The same input gives the same paths. Raises SliceError when the
-    part gives no bead at all.
+    earlier, later: the parts printed before and after this one; the part with index 1 stands on the build plate. Support is the
+    part's own (slice_parts also plans support on earlier parts). Equal input gives equal paths. Raises SliceError if the part
+    gives no bead at all.
 
     >>> from manifold3d import Manifold
     >>> from mdp.cut import mesh_of
@@ -156,7 +157,7 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
 def slice_supported(
     supports: Supports, overhangs: Sequence[Overhang], on_layer: Callable[[int], None] = lambda done: None
 ) -> SlicedPart:
-    """The layers of a part with the support planned for it, as slice_part; on_layer: called with how many are done."""
+    """The layers of a part with its planned support, like slice_part. on_layer: called with the number of completed layers."""
     shells = build_shells(supports, overhangs)
     sections, process = supports.sections, supports.sections.process
     rear, edges = rear_of(sections.mesh.bounds_mm), sections.joints
@@ -166,7 +167,7 @@ def slice_supported(
     planned = plan_seams(sections, limits) if aligned else [NO_SEAMS] * len(limits)
     layers, raft = list[Layer](), [layer for layer in raft_layers(supports) if len(layer)]
     below: list[Plastic | None] = []
-    bare: list[int] = []  # layers that hold something and print none of it
+    bare: list[int] = []  # layers with material of which nothing is printed
     tip, seams, last, count = raft[-1].points[-1] if raft else rear, np.zeros((0, 2)), 0, len(sections.outlines)
     usual = min(max(1, shell_layers(process)[1]), count) if process.spiral_vase else count
     for i, (own, auxiliary) in enumerate(parallel_map(partial(lay_beads, shells), usual, FEWEST_LAYERS)):
@@ -182,7 +183,7 @@ def slice_supported(
         below = [plastic_of([*beads, *shells.layers[i].ending]), *below][:CARRYING]
         if i and process.fuzzy_skin != "none":
             beads = fuzzy_walls(beads, process, _joints_near(sections, i), (sections.part.index, i))
-        skin = skin_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
+        skin = visible_wall_beside(edges, sections.outlines[i], float(sections.heights.cut_mm[i]), shells.layers[i].process)
         layer = _ordered([*beads, *shells.layers[i].ending], shells, i, tip if layers or raft else None, skin)
         if len(layer):
             tip = layer.points[-1]
@@ -207,18 +208,18 @@ def slice_supported(
 
 
 def _joints_near(sections: Sections, layer: int) -> list[Polygons]:
-    """The areas of other parts in a layer and in those next to it."""
+    """The areas of other parts in a layer and in its neighbours."""
     near = [*sections.beside, *sections.above[:1]][max(layer - 1, 0) : layer + 2]
     return [area for area in (*near, *sections.standing[layer : layer + 1]) if not area.is_empty()]
 
 
 def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons) -> Layer:
-    """The beads of a layer in order, with speeds, flow, fan and heat, as order_layer."""
+    """The layer of some beads in order, with speeds, flow, fan and temperature, see order_layer."""
     sections = shells.sections
     profile, process, material, heights = sections.profile, sections.process, sections.profile.material, sections.heights
     strokes, speeds, flow = order_layer(beads, shells, index, tip, skin)
     fan, add_c = 1.0, 0.0
-    if sections.on_platform:
+    if sections.on_plate:
         fan = rising_fan(material, index + process.raft_layers)
         add_c = material.first_layer_nozzle_c - material.nozzle_c if index == 0 and not sections.on_raft else 0.0
     elif index < process.interface_layers:
@@ -231,13 +232,13 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None, 
 def order_layer(
     beads: list[Bead], shells: Shells, index: int, tip: Floats | None, skin: Polygons
 ) -> tuple[Strokes, Floats, float]:
-    """The beads of a layer in order, with their (k,) speeds and the flow of all of them.
+    """The beads of a layer in order, with their (k,) speeds and the common flow.
 
-    tip: where the layer below ends; skin: its outer walls beside the edges of interfaces.
+    tip: end of the layer below; skin: visible wall beside joints.
     """
     sections, own, height_mm = shells.sections, shells.layers[index].process, float(shells.sections.heights.height_mm[index])
     profile, process, outline = sections.profile, sections.process, sections.outlines[index]
-    if index == 0 and not sections.on_platform:
+    if index == 0 and not sections.on_plate:
         beads = [*fill_pins(sections.pins, profile, height_mm), *begin_inside(beads)]
     first_flow, kind_mm_s = (1.0, None) if index else _first_layer(sections)
     strokes = order_beads(beads, outline, own, tip, shells.supports.areas[index], skin, kind_mm_s)
@@ -247,9 +248,9 @@ def order_layer(
     strokes = split_overhangs(strokes, outline, below, own, shells.supports.right_under(index))
     if index == 0 and not sections.grooves.is_empty():
         strokes, within = split(strokes, sections.grooves, strokes.is_of(*SKINS), process.line_width_mm)
-        richer = 1.0 + process.interlock_mm / height_mm  # by what the grooves hold
+        richer = 1.0 + process.interlock_mm / height_mm  # extra flow to fill the grooves
         strokes = replace(strokes, flow=np.where(within, strokes.flow * richer, strokes.flow))
-    places = sections.speed_places if index else []  # first layers have speeds of their own
+    places = sections.speed_places if index else []  # first layers have their own speeds
     of_places = [place.over(process) for place in places]
     kinds = kinds_apart([process, *of_places])
     for number, place in enumerate(places, start=1):
@@ -265,13 +266,15 @@ def _first_layer(sections: Sections) -> tuple[float, Floats]:
     process = sections.process
     if sections.on_raft:
         return 1.0, np.full(len(KINDS), process.first_layer_speed_over_raft_mm_s)
-    if sections.on_platform:
+    if sections.on_plate:
         return process.first_layer_flow, first_layer_speeds(process)
     return process.interface_flow, np.full(len(KINDS), process.interface_speed_mm_s)
 
 
 def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
-    """The strokes that fill a part's pins: rounds in the mouth, as many as keep the plastic to what every firmware takes."""
+    """The strokes that fill a part's pins: circles in the mouth, enough of them to keep the cross-section below the limit of
+    every firmware.
+    """
     process, nozzle_mm = profile.process, profile.machine.head.nozzle_mm
     radius = 0.5 * (pin_width_mm(profile) - nozzle_mm)
     beads = []
@@ -286,9 +289,9 @@ def fill_pins(pins: Floats, profile: Profile, height_mm: float) -> list[Bead]:
 
 
 def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
-    """The beads of a first layer on plastic, what fills its walls before them: outer walls are laid last, against beads that are
-    there. The longest of its infill or skin comes first where it has no support: what oozed while the table turned is made up
-    for there, not where a wall has its seam.
+    """Order the beads of a first layer on plastic with the inside before the walls: outer walls are laid last, against existing
+    beads. The longest bead of its infill or skin comes first if it has no support: it makes up for what oozed while the table
+    turned, away from a wall's seam.
     """
     inside = [replace(bead, rank=BEFORE_WALLS) if FILL <= bead.rank <= LAST else bead for bead in beads]
     if any(bead.rank <= OUTSIDE for bead in inside):
@@ -301,7 +304,7 @@ def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
 
 
 def _check_printed(sections: Sections, layers: Sequence[Layer]) -> None:
-    """Raises SliceError for a part that gives no bead at all, or would begin in air over the plate."""
+    """Raises SliceError for a part without any bead, or one that would begin in air above the plate."""
     part, process = sections.part, sections.process
     if all(layer.is_of(Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE).all() for layer in layers):
         low, high = sections.mesh.bounds_mm
@@ -318,7 +321,7 @@ def _check_printed(sections: Sections, layers: Sequence[Layer]) -> None:
             f"a larger {key_name('process.scale')} or a finer nozzle prints it"
         )
     first = next(layer for layer in layers if not layer.is_of(Kind.SKIRT).all())
-    if sections.on_platform and process.walls and first.z_mm - first.height_mm > ON_PLATE_MM:
+    if sections.on_plate and process.walls and first.z_mm - first.height_mm > ON_PLATE_MM:
         support = "" if process.support == "auto" else f", or {key_name('process.support')} = auto"
         raise SliceError(
             f"part {part.index} would begin in air, {first.z_mm - first.height_mm:.2f} mm above the plate: what lies below is "

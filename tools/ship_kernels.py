@@ -90,10 +90,10 @@ def _limb() -> None:
     """Cut off while others stand beside it, which travels pass over."""
     import numpy as np
 
-    from mdp.clearance import Standing
+    from mdp.clearance import StandingColumns
     from profiles.profile import load
 
-    Standing.of(np.ones((2, 3)), 0.0, load().machine).least_tip_mm(np.zeros((1, 2)))
+    StandingColumns.of(np.ones((2, 3)), 0.0, load().machine).least_tip_mm(np.zeros((1, 2)))
 
 
 def _ship() -> None:

@@ -15,7 +15,7 @@ from machine.program import Alternative, Program, joints_of_print
 from machine.quantities import filament_g
 from mdp.cost.cost import needing_upright, weight_of_stairs
 from mdp.decomposition import Decomposition, Part
-from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
+from mdp.directions.orientation import Orientation, best_orientation, in_words, set_on_plate
 from mdp.mesh import Mesh
 from mdp.overhang import step_shares
 from mdp.save import joint_values
@@ -92,7 +92,7 @@ def _best(mesh: Mesh, profile: Profile) -> Orientation:
 
 def _laid_down(part: Part, best: Orientation) -> Part:
     """A model in one part turned, with its marks."""
-    mesh, rotation = standing_still(part.mesh, best.rotation), best.rotation
+    mesh, rotation = set_on_plate(part.mesh, best.rotation), best.rotation
     shift = mesh.vertices[0] - rotation @ part.mesh.vertices[0]
     turned = replace(part, mesh=mesh)
     return turned.with_marks(lambda mark: mark.transform(rotation, shift), lambda modifier: modifier.transform(rotation, shift))

@@ -34,7 +34,7 @@ from machine.planning.plan import has_purge, plan
 from machine.planning.stops import Stop
 from machine.program import Program
 from mdp.decomposition import Decomposition, FrontRow, Part
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import set_on_plate
 from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.ranking.ranker import ranker_named
@@ -109,7 +109,7 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     compilers.wait_for(compilers.JUDGE)
     orientation = None if given is None or given.orientation is None else np.array(given.orientation)
     if orientation is not None:
-        mesh = standing_still(mesh, orientation)
+        mesh = set_on_plate(mesh, orientation)
     laying = lays_down(request, given, profile)
     if to_build and not laying:
         check_standing(mesh, profile)  # a search may take minutes
@@ -246,7 +246,7 @@ def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: 
     """Which parts were to have pins and have no room for any."""
     for part, piece in zip(parts, sliced, strict=True):
         own = profile.of_part(part.index)
-        if not part.on_platform and own.process.interlock == "pins" and not piece.pins:
+        if not part.on_plate and own.process.interlock == "pins" and not piece.pins:
             room_mm = pin_width_mm(own) + 2.0 * room_around_mm(own.process)
             deep = f"{own.process.pin_depth_mm:g} mm deep into the part below"
             yield f"no pins under part {part.index}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"

@@ -21,7 +21,7 @@ from mdp.clearance import find_obstacle, passes_clear
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.plane import Plane
 from mdp.pose import Pose, least_rotation, level, poses
 from profiles.errors import MoveError
@@ -53,7 +53,7 @@ def check_parts(parts: Sequence[Part], profile: Profile) -> None:
     """
     for part in parts:
         _check_reach(part, profile)
-        if part.on_platform:
+        if part.on_plate:
             check_standing(part.mesh, profile)
 
 
@@ -78,7 +78,7 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
     Brims and supports are not known yet: the dry run looks at them.
     """
     machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
-    standing = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM, :2] + _shift(profile)[:2]
+    standing = mesh.vertices[mesh.vertices[:, 2] <= PLATE_TOLERANCE_MM, :2] + _shift(profile)[:2]
     over, edge = over_edge_mm(np.maximum(np.abs(standing) - inset_mm, 0.0), machine.table)
     over_mm = float(over.max(initial=-np.inf))
     if over_mm > ROUNDING:
@@ -129,7 +129,7 @@ def mesh_at_place(mesh: Mesh, profile: Profile) -> Mesh:
 
 
 def _part_moved(part: Part, shift: Floats) -> Part:
-    lifted_mm = part.lifted_mm + float(shift[2]) if part.on_platform else 0.0
+    lifted_mm = part.lifted_mm + float(shift[2]) if part.on_plate else 0.0
     moved = replace(part, mesh=part.mesh.transform(STILL, shift), base=_plane_moved(part.base, shift), lifted_mm=lifted_mm)
     return moved.with_marks(lambda mark: mark.transform(STILL, shift), lambda modifier: modifier.transform(STILL, shift))
 
@@ -285,7 +285,7 @@ class Plate:
         """(m, 3, 3) corners of the faces of a part's hull; on the plate with its brim, raft or support."""
         hull = convex_hull(part.mesh.vertices)
         if self._around_mm.get(part, 0.0) > 0.0:
-            low = hull.vertices[hull.vertices[:, 2] <= part.lifted_mm + PLATFORM_TOLERANCE_MM]
+            low = hull.vertices[hull.vertices[:, 2] <= part.lifted_mm + PLATE_TOLERANCE_MM]
             brims = (low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND).reshape(-1, 3)
             plate = brims - [0.0, 0.0, part.lifted_mm]  # where a raft is as high as the part is lifted
             hull = convex_hull(np.vstack([hull.vertices, brims, plate]))

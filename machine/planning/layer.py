@@ -18,7 +18,7 @@ import numpy as np
 from machine.kinematics.collision import Printed
 from machine.planning.limits import path_speed, path_speeds, stroke_filament_mm_s, wipe_filament_mm_s
 from machine.planning.moves import MARK, POINTS, REORIENT, RETRACT, SPEED, TRAVEL, WIPE, Mark, Moves, Reorient, add_point, add_row
-from mdp.clearance import Standing, highest_in_cells
+from mdp.clearance import StandingColumns, highest_in_cells
 from mdp.decomposition import Part
 from mdp.kernels.arrays import longs, table
 from mdp.kernels.kernel import helper, kernel, no_nrt
@@ -62,7 +62,7 @@ class Tip:
     prime_extra_mm: float = 0.0
     run_in_mm: float = 0.0
     trail: Floats = field(default_factory=lambda: NOWHERE)
-    limb: tuple[int, Standing] | None = None
+    limb: tuple[int, StandingColumns] | None = None
     moves: list[Moves] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
 
@@ -254,7 +254,7 @@ def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
     return trail[:count]
 
 
-def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> Standing:
+def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> StandingColumns:
     """The printed beads that stand above the base plane of a limb, in its frame.
 
     Beads less than their width above the plane are left out: they are the steps of the cut face on which the limb stands.
@@ -271,10 +271,10 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
             tops.append(points[points[:, 2] > width_mm[before]])
             widest_mm = max(widest_mm, float(width_mm[high].max()))
     slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of way and of bead, half a cell's diagonal
-    return Standing.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
+    return StandingColumns.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
 
 
-def clear_height_mm(standing: Standing, way_mm: Floats, height_mm: float) -> float:
+def clear_height_mm(standing: StandingColumns, way_mm: Floats, height_mm: float) -> float:
     """The least height of at least height_mm at which the tip may go along a way (n, 2) in the limb's frame."""
     return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm)[0], height_mm).max()))
 

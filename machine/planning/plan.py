@@ -81,7 +81,7 @@ def _print_layers(tip: Tip, part: Part, piece: SlicedPart, shift: Floats, stoppe
         if len(layer):
             z_mm = layer.z_mm + part.lifted_mm
             tip.mark(BeginLayer(part.index, number, z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c))
-            print_layer(tip, layer, layer.points_mm + shift, shift, on_plate=part.on_platform and number == 1)
+            print_layer(tip, layer, layer.points_mm + shift, shift, on_plate=part.on_plate and number == 1)
 
 
 def _outline(part: Part, piece: SlicedPart, shift: Floats, machine: Machine) -> Printed:

@@ -36,7 +36,7 @@ def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
     if part.needing is not None:
         return part.needing
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
-    return risky_upright(part.in_part_frame(), angle, counted) if part.on_platform else risky_above(part.mesh, part.base, angle)
+    return risky_upright(part.in_part_frame(), angle, counted) if part.on_plate else risky_above(part.mesh, part.base, angle)
 
 
 def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> NDArray[np.bool_]:
@@ -45,7 +45,7 @@ def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> ND
         return part.needing_upright
     down = risky_upright(part.mesh, angle_deg, count_platform_faces)
     cut = np.all(np.abs(part.base.heights_mm(part.mesh.vertices))[part.mesh.faces] <= ORDER_TOLERANCE_MM, axis=1)
-    return down if part.on_platform else down & ~cut
+    return down if part.on_plate else down & ~cut
 
 
 def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> float:

@@ -19,7 +19,7 @@ from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, Layers, page_kinds
 from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
-from mdp.directions.orientation import best_orientation, in_words, standing_still
+from mdp.directions.orientation import best_orientation, in_words, set_on_plate
 from mdp.joint import Joint, weakest_of
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
@@ -191,7 +191,7 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
 def _areas(decomposition: Decomposition, profile: Profile) -> Table:
     """Risky area straight up, in the best single orientation, in parts."""
     best = best_orientation(decomposition.mesh, profile.process.self_supporting_angle_deg)
-    turned = standing_still(decomposition.mesh, best.rotation)
+    turned = set_on_plate(decomposition.mesh, best.rotation)
     single = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
     risky_mm2 = [
         ("straight up", decomposition.risky_area_mm2),

@@ -1,1 +1,1 @@
-"""Batch: many calls on many cores, here or on the workers of a dask scheduler, and the table of what came of each."""
+"""Batch: many calls on many cores, here or on the workers of a dask scheduler, and the table of their results."""

@@ -1,7 +1,7 @@
-"""Pool: many calls worked off at a time, in processes of this machine or on the workers of a dask scheduler.
+"""Pool of processes that run many calls in parallel, on this machine or on the workers of a dask scheduler.
 
-Either way a call runs in a process of its own, so that one that kills its process or takes too long harms no other. A dask worker
-that is lost loses nothing: the scheduler hands what it had to others, and gives up what several were lost over.
+Each call runs in its own process, so a call that crashes or takes too long affects no other. A lost dask worker loses no work:
+the scheduler passes its calls to other workers, and gives up a call after several workers were lost while they ran it.
 """
 
 import logging
@@ -17,19 +17,20 @@ from typing import Any, TypeVar
 from mdp.kernels.workers import CallError, KilledError, Worker
 from profiles.errors import UserError
 
-REACHED_WITHIN_S = 10.0  # a scheduler that is there, also by a slow network
-POLL_S = 0.1  # Ctrl-C is answered within that
-IDLE_S = 60.0  # then a process gives its memory back
-CLOSED_WITHIN_S = 1.0  # a scheduler that is gone does not answer the goodbye either
+REACHED_WITHIN_S = 10.0  # long enough for a running scheduler on a slow network
+POLL_S = 0.1  # longest delay before Ctrl-C takes effect
+IDLE_S = 60.0  # after that an idle process is stopped to free its memory
+CLOSED_WITHIN_S = 1.0  # a scheduler that has stopped does not answer the close request either
 
 Key = TypeVar("Key")
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Where calls run. scheduler: address of one that is there, None for this machine; count: processes on this machine;
-    retries: how often a call whose process was killed is tried again; limit_s: how long a call may take; folders: that workers
-    must see."""
+    """Where calls run. scheduler: address of a running dask scheduler, None for this machine; count: processes on this machine;
+    retries: how often a call is repeated after its process was killed; limit_s: timeout of a call; folders: folders that every
+    worker must be able to see.
+    """
 
     scheduler: str | None
     count: int
@@ -40,8 +41,9 @@ class Workers:
 
 @dataclass(frozen=True)
 class Pool:
-    """Processes that work calls off. submit: gives the future of a task with its arguments, as concurrent.futures and dask have
-    it, lower numbers first; is_there: whether there will be more results; lost: why not, where there will be none."""
+    """Processes that run calls. submit: returns the future of a task with its arguments, as in concurrent.futures and dask; calls
+    with lower numbers start first; is_there: whether more results can arrive; lost: error message when they cannot.
+    """
 
     submit: Callable[[Callable[..., Any], tuple[Any, ...], int], Any]
     is_there: Callable[[], bool]
@@ -50,9 +52,10 @@ class Pool:
     def completed(
         self, task: Callable[..., Any], calls: Mapping[Key, tuple[Any, ...]], on_wait: Callable[[], None]
     ) -> Iterator[tuple[Key, Any]]:
-        """The key and the result of every call as it is done, the first calls first; a CallError where a call failed for good.
+        """Yields the key and the result of every call as it completes; calls start in the given order. The result is a CallError
+        where a call finally failed.
 
-        on_wait: called some times a second. Raises UserError when the scheduler is lost.
+        on_wait: called several times a second. Raises UserError when the connection to the scheduler is lost.
         """
         done: SimpleQueue[Any] = SimpleQueue()
         futures: dict[Any, Key] = {}
@@ -71,31 +74,31 @@ class Pool:
             yield futures.pop(future), self._outcome(future)
 
     def _outcome(self, future: Any) -> Any:
-        """What a call returned, or the CallError that it came to."""
+        """The result of a call, or the CallError with which it failed."""
         if future.cancelled():
             raise UserError(self.lost)
         try:
             return future.result()
         except CallError as error:
             return error
-        except Exception as error:  # noqa: BLE001 - whatever a cluster says of what it could not do
+        except Exception as error:  # noqa: BLE001 - any exception with which a cluster reports a failure
             if not self.is_there():
                 raise UserError(self.lost) from None
             return CallError(f"its workers were lost ({type(error).__name__})")
 
 
 class Isolation:
-    """For every thread that calls a process of its own on one core, which stays for the next call; all end together."""
+    """One worker process on one core for each calling thread, reused by the thread's next call; all of them end together."""
 
     def __init__(self) -> None:
         self._of_threads: dict[int, Worker] = {}
         self._ended = False
 
     def call(self, task: Callable[..., Any], arguments: tuple[Any, ...], retries: int = 0, limit_s: float | None = None) -> Any:
-        """What the task returns. task: of a module; retries: how often a call whose process was killed is tried again; limit_s:
-        seconds after which a call is given up.
+        """The task's return value. task: a module-level function; retries: how often a call is repeated after its process was
+        killed; limit_s: timeout of the call, s.
 
-        Raises CallError for what the task raises, too.
+        Raises CallError, also for exceptions of the task.
         """
         attempts = 0
         while not self._ended:
@@ -108,9 +111,9 @@ class Isolation:
         raise KilledError("it was ended with all others")
 
     def end(self) -> None:
-        """Kill all processes, whatever they do."""
+        """Kill all processes, whatever they are doing."""
         self._ended = True
-        for worker in list(self._of_threads.values()):  # who adds one meanwhile looks then whether all have ended
+        for worker in list(self._of_threads.values()):  # a thread that adds a worker meanwhile checks `_ended` afterwards
             worker.end()
 
     def _own(self) -> Worker:
@@ -126,9 +129,9 @@ class Isolation:
 
 @contextmanager
 def connected(workers: Workers) -> Iterator[Pool]:
-    """What works calls off; processes of our own are gone at the end, whatever ends it.
+    """Open the pool on which calls run; local processes are ended on exit, also after an exception.
 
-    Raises UserError when the scheduler cannot be reached, or where its workers cannot work.
+    Raises UserError when the scheduler cannot be reached, or its workers cannot run the calls.
     """
     if workers.scheduler is not None:
         with _on_cluster(workers, workers.scheduler) as pool:
@@ -146,11 +149,11 @@ def connected(workers: Workers) -> Iterator[Pool]:
         executor.shutdown(cancel_futures=True)
 
 
-_on_worker = Isolation()  # of all threads of a dask worker
+_on_worker = Isolation()  # of all threads of a dask worker process
 
 
 def call_on_worker(*call: Any) -> Any:
-    """In a dask worker: what a call returns."""
+    """Run a call inside a dask worker and return its result."""
     return _on_worker.call(*call)
 
 
@@ -161,7 +164,7 @@ def _on_cluster(workers: Workers, address: str) -> Iterator[Pool]:
     except ModuleNotFoundError:
         raise UserError("a scheduler needs dask, which is not installed: pip install 'tiltprint[batch]'") from None
     for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
-        if name.startswith(("distributed", "tornado", "asyncio")):  # what goes wrong is told in our own words
+        if name.startswith(("distributed", "tornado", "asyncio")):  # failures are reported by our own messages
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         client = Client(address, timeout=REACHED_WITHIN_S)
@@ -179,12 +182,12 @@ def _on_cluster(workers: Workers, address: str) -> Iterator[Pool]:
                 raise UserError(f"worker {worker} of scheduler {address} cannot work: {_in_words(missing)}")
         yield Pool(submit, lambda: bool(client.status == "running"), lost)
     finally:
-        with suppress(Exception):  # what does not answer any more need not be told
+        with suppress(Exception):  # a scheduler that does not answer needs no goodbye
             client.close(timeout=CLOSED_WITHIN_S)
 
 
 def folders_missing(folders: tuple[Path, ...]) -> list[str]:
-    """The folders that this machine does not see."""
+    """The folders that do not exist on this machine."""
     return [str(folder) for folder in folders if not folder.is_dir()]
 
 

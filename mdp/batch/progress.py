@@ -1,4 +1,4 @@
-"""Progress: how far a batch is, as a bar on a terminal and as a line now and then elsewhere."""
+"""Progress of a batch: a bar on a terminal, an occasional line elsewhere."""
 
 import sys
 import time
@@ -7,11 +7,13 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-EVERY_S = 20.0  # where lines stay, in a log: ten hours are 1,800 of them
+EVERY_S = 20.0  # between lines of a log: 1,800 lines in ten hours
 
 
 class BatchProgress:
-    """Shows the progress of calls: one line, renewed when a call ends and a few times a second. things: their noun."""
+    """Shows the progress of calls on one line, updated when a call ends and several times a second. things: plural noun of the
+    calls.
+    """
 
     def __init__(self, total: int, things: str) -> None:
         self._total, self._things = total, things
@@ -36,14 +38,14 @@ class BatchProgress:
         self._bar.stop()
 
     def show(self, text: str, failed: bool) -> None:
-        """A call has ended. text: its name and what came of it."""
+        """Report that a call has ended. text: its name and its result."""
         self._done += 1
         self._failed += int(failed)
         self._last = text
         self._bar.update(self._task, advance=1, description=text)
 
     def tick(self) -> None:
-        """Say where it stands, where that was not said for a while."""
+        """Print the state unless it was printed within the last EVERY_S seconds."""
         now = time.monotonic()
         if self._live or now - self._said < EVERY_S:
             return

@@ -1,4 +1,4 @@
-"""Rows: the table of a batch, a line of CSV for every call that is done; whatever ends the batch, what stands in it is whole."""
+"""Rows: the table of a batch, a line of CSV for every completed call; its lines stay complete however the batch ends."""
 
 import csv
 import io
@@ -12,16 +12,16 @@ from profiles.errors import UserError
 from profiles.files import SHARED, write_whole
 from profiles.files import lock as locked
 
-NO_TEXT = "surrogateescape"  # names of files may be no text
+NO_TEXT = "surrogateescape"  # file names may not be valid text
 
 Row = TypeVar("Row")  # a dataclass of text and numbers
 
 
 @contextmanager
 def writing_alone(folder: Path, lock: str) -> Iterator[None]:
-    """A folder, made where it is missing, that nobody else writes into meanwhile. lock: name of the file that says so.
+    """Create a folder if it is missing and lock it against other runs. lock: name of the lock file.
 
-    Raises UserError when somebody does, and for what cannot be written.
+    Raises UserError if another run holds the lock or the folder cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -34,7 +34,7 @@ def writing_alone(folder: Path, lock: str) -> Iterator[None]:
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
-    """The rows of a table, in its order; none where there is no table, and none for a last line that was cut off.
+    """The rows of a table in file order; empty if there is no table. A last line that was cut off is skipped.
 
     Raises UserError for a damaged table.
     """
@@ -46,20 +46,20 @@ def read_rows(path: Path, kind: type[Row]) -> list[Row]:
     with path.open(newline="", encoding="utf-8", errors=NO_TEXT) as file:
         lines = csv.DictReader(file)
         if lines.fieldnames != columns:
-            raise UserError(f"{path}: its columns are not {', '.join(columns)}: it is no table of this version")
+            raise UserError(f"{path}: its columns are not {', '.join(columns)}: it is not a table of this version")
         for line in lines:
             number = lines.line_num
             try:
                 rows.append(kind(**{name: types[name](line[name]) for name in columns}))
             except (TypeError, ValueError):
-                if next(lines, None) is None:  # cut off while it was written: that call is done again
+                if next(lines, None) is None:  # cut off while it was written: that call is repeated
                     break
-                raise UserError(f"{path}: line {number} is not of this table: {line}") from None
+                raise UserError(f"{path}: line {number} does not fit the columns of this table: {line}") from None
     return rows
 
 
 def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
-    """A whole table, written beside and renamed."""
+    """Write a whole table: to a temporary file, which then replaces the old one."""
     header = io.StringIO()
     csv.writer(header, lineterminator="\n").writerow(_columns(kind))
     text = header.getvalue() + "".join(map(_line, rows))
@@ -67,7 +67,7 @@ def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
 
 
 def append_row(path: Path, row: Any) -> None:
-    """One more line of a table that exists, written at once."""
+    """Append a line to an existing table and write it at once."""
     with path.open("a", newline="", encoding="utf-8", errors=NO_TEXT) as file:
         file.write(_line(row))
 

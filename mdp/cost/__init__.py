@@ -1,5 +1,4 @@
-"""Cost: what a person pays for a decomposition, in mm2 of blemished surface, whole and by the face.
+"""Cost: the price of a decomposition in mm2 of blemished surface, in total and per face.
 
-`cost.CostTerms` says what counts, `forecast.Forecast` what a sequence of planes would leave and what its parts would be, without
-a cut.
+`cost.CostTerms` holds the terms; `forecast.Forecast` predicts the cost and the parts of a sequence of planes without cutting.
 """

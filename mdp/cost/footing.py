@@ -1,8 +1,8 @@
-"""Footing: how firmly a print holds on the build plate, and how a model stands there in some orientation.
+"""Footing: how firmly a print holds on the build plate, and how a model stands there in a given orientation.
 
 The plate holds the contact like glue holds the end of an upright beam. The nozzle's push at the top of the print and the weight,
 where it acts beside the middle of the contact, bend it: the greatest tension is the bending moment over the least section modulus
-of the contact, less what the weight presses on it.
+of the contact, less the pressure of the weight.
 """
 
 from dataclasses import dataclass
@@ -17,31 +17,32 @@ from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh, dot
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_moments
 from mdp.topology.cross_section import loop_edges, loops_at
 from mdp.topology.edges import opposites
 from profiles.profile import Profile
 
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
-ADHESION_MPA = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give
+ADHESION_MPA = 0.2  # of plastic to a clean warm plate, a fraction of what published peel tests of PLA and PETG give
 NEWTON_PER_G = 9.81e-3
 BRIM_SEGMENTS = 32  # of a full turn around a corner
-# Height above the plate, as a share of the diameter, at which the base of a rounded end is measured: brim and support fill in
-# what is rounded below.
+# Height above the plate, as a share of the diameter, at which the base of a rounded end is measured: brim and support fill the
+# gap below it.
 BLUNT = 0.01
-# Shares of a model's shadow that its base takes up: by which a brim can hold it, where it rests and where it hardly does.
+# Least base area, as a share of the model's shadow, that a brim can hold: where the model rests, and where it nearly tips over.
 SMALL_BASE, LEANING_BASE = 0.015, 0.03
-FACE = 0.05  # share of the shadow that touches the plate where a model stands on a face; three tips touch with less
-BROAD_BASE = 0.2  # a base that is this share of the shadow is as good as any larger one
-STEADY_MPA = 0.25 * ADHESION_MPA  # tension under a base, with its brim, that makes a stance as unsteady as any greater one
+FACE = 0.05  # share of the shadow that touches the plate if the model stands on a face; three tips touch with less
+BROAD_BASE = 0.2  # a base of this share of the shadow is as good as any larger one
+STEADY_MPA = 0.25 * ADHESION_MPA  # tension under a base with its brim; a larger one makes a stance no less steady
 
 
 @dataclass(frozen=True)
 class Footing:
-    """How a model stands on the plate. base_share: the area of its base as a share of its shadow's, touching_share: the area that
-    touches the plate; lean_deg: the least angle by which it can be tilted before it tips over, below 0 where it tips over by
-    itself; tension_mpa: the greatest tension under it, brimmed_mpa: the same with a brim, whether or not it would get one."""
+    """How a model stands on the plate. base_share, touching_share: area of its base and area touching the plate, as shares of its
+    shadow; lean_deg: the least angle by which it can be tilted before it tips over, negative if it tips over by itself;
+    tension_mpa: the greatest tension under it; brimmed_mpa: that tension with a brim, whether or not the model would get one.
+    """
 
     base_share: float
     touching_share: float
@@ -50,8 +51,9 @@ class Footing:
     brimmed_mpa: float
 
     def held(self, of_file: bool = False) -> bool:
-        """Whether the plate holds the model. of_file: as its file has it; then it may tip over by itself, by up to LEAN_DEG, and
-        its brim still holds it, while a turned model must have its centre of mass above its base."""
+        """Whether the plate holds the model. of_file: in the orientation of its file. Such a model may tip over by itself by up
+        to LEAN_DEG, since its brim still holds it; a reoriented model must have its centre of mass above its base.
+        """
         if self.lean_deg >= LEAN_DEG and self.tension_mpa <= ADHESION_MPA:
             return True
         if self.torn_off or self.lean_deg < (-LEAN_DEG if of_file else 0.0):
@@ -61,34 +63,35 @@ class Footing:
 
     @property
     def torn_off(self) -> bool:
-        """Whether the nozzle's push tears it off the plate in spite of its brim."""
+        """Whether the nozzle's push tears the model off the plate in spite of a brim."""
         return self.brimmed_mpa > ADHESION_MPA
 
     @property
     def on_face(self) -> bool:
-        """Whether at least FACE of its shadow touches the plate."""
+        """Whether at least the share FACE of the model's shadow touches the plate."""
         return self.touching_share >= FACE
 
     @property
     def on_tip(self) -> bool:
-        """Whether it stands on a point, an edge or a rounded end."""
+        """Whether the model stands on a point, an edge or a rounded end."""
         return self.touching_share < SMALL_BASE
 
     @property
     def narrow(self) -> float:
-        """How much the base lacks of a broad one: 0 to 1."""
+        """How much the base falls short of a broad one, 0 to 1."""
         return min(1.0, max(0.0, 1.0 - self.base_share / BROAD_BASE))
 
     @property
     def unsteady(self) -> float:
-        """How near the tension under the base, with a brim, comes to STEADY_MPA: 0 to 1."""
+        """How close the tension under the base, with a brim, comes to STEADY_MPA, 0 to 1."""
         return min(1.0, max(0.0, self.brimmed_mpa / STEADY_MPA))
 
 
 @dataclass(frozen=True, eq=False)
 class BuildPlate:
-    """The plate under a model: its mesh, (3 m,) the half-edge across each half-edge, its centre of mass and diameter, the width
-    of the brim that a small base gets, and the density, as if it were printed solid."""
+    """The plate under a model: the model's mesh, (3 m,) the half-edge across each half-edge, its centre of mass and diameter, the
+    width of the brim for a small base, and the density of the solid model.
+    """
 
     mesh: Mesh
     across: Ints
@@ -99,7 +102,9 @@ class BuildPlate:
 
     @classmethod
     def under(cls, mesh: Mesh, profile: Profile) -> "BuildPlate":
-        """The plate under a mesh, by a profile. A pedestal or a raft holds no more than a plate; a brim would go round that."""
+        """The plate under a mesh for a profile. Without a brim on a pedestal or a raft: these hold no better than the plate, and
+        a brim would surround them.
+        """
         process = profile.process
         stands_off = profile.search.pedestal_mm > 0.0 or process.raft_layers > 0
         brim_mm = 0.0 if stands_off else process.brim_mm or process.small_base_brim_mm
@@ -107,15 +112,15 @@ class BuildPlate:
 
     @cached_property
     def weight_n(self) -> float:
-        """The weight of the model."""
+        """Weight of the model, printed solid, N."""
         return 1e-3 * self.density_g_cm3 * self.mesh.volume_mm3 * NEWTON_PER_G
 
     def footing(self, rotation: Floats) -> Footing:
-        """How the model stands when it is turned by a rotation (3, 3)."""
+        """How the model stands after a rotation (3, 3)."""
         turned, centre = np.column_stack([dot(self.mesh.vertices, row) for row in rotation]), rotation @ self.centre
         low, high = float(turned[:, 2].min()), float(turned[:, 2].max())
         half_mm = 0.5 * (high - low)
-        touching_mm, blunt_mm = min(0.5 * PLATFORM_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm)
+        touching_mm, blunt_mm = min(0.5 * PLATE_TOLERANCE_MM, half_mm), min(BLUNT * self.diameter_mm, half_mm)
         cuts_mm = low + np.array(sorted([touching_mm, blunt_mm]))
         areas = [CrossSection(loops, FillRule.Positive) for loops in loops_at(turned, self.mesh.faces, self.across, cuts_mm)]
         touching, base = areas[int(touching_mm > blunt_mm)], max(areas, key=CrossSection.area)
@@ -129,11 +134,11 @@ class BuildPlate:
     def stance_bounds(self, rotations: Floats) -> tuple[Floats, Floats]:
         """(k,) upper bounds of the touching area, mm2, and (k,) of the lean, degrees, of the model turned by (k, 3, 3) rotations.
 
-        The base lies within the hull's sections at the same heights, and these take a tenth of the time. Rounding may lower
-        a bound by 1e-5.
+        The base lies within the hull's sections at the same heights, which take a tenth of the time. Rounding may lower a bound
+        by 1e-5.
         """
         hull, rotations = convex_hull(self.mesh.vertices), np.ascontiguousarray(rotations)
-        corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATFORM_TOLERANCE_MM, BLUNT * self.diameter_mm])
+        corners, above_mm = hull.vertices - self.centre, np.array([0.5 * PLATE_TOLERANCE_MM, BLUNT * self.diameter_mm])
         bounds = np.zeros((len(rotations), 2))
         in_threads(_measure_hull, len(rotations), (corners, hull.faces, above_mm), rotations, bounds)
         return bounds[:, 0], bounds[:, 1]
@@ -141,9 +146,10 @@ class BuildPlate:
 
 @kernel
 def _measure_hull(begin: int, end: int, hull: tuple[Floats, Ints, Floats], rotations: Floats, out: Floats) -> None:
-    """The area of a turned hull's section at the first of two heights above its lowest corner, no higher than its middle, and the
-    angle by which it can be leaned before the origin is over the edge of the section at either. hull: its corners, its faces, and
-    the heights."""
+    """Area of a turned hull's section at the first of two heights above its lowest corner, mm2, and the angle by which it can be
+    leaned before the origin passes the edge of either section, degrees; a section is no higher than the hull's middle. hull: its
+    corners, its faces and the heights.
+    """
     corners, faces, above_mm = hull
     turned, ends, reach = table(len(corners), 3), table(2, 2), floats(SIDES.shape[1], 0.0)
     for k in range(begin, end):
@@ -183,7 +189,7 @@ def _measure_hull(begin: int, end: int, hull: tuple[Floats, Ints, Floats], rotat
 
 
 def tips_over(base: CrossSection, height_mm: float) -> bool:
-    """Whether the nozzle's push at a height would tear a base off the plate."""
+    """Whether the nozzle's push at a height, mm, would tear a base off the plate."""
     return _tension_mpa(section_edges(base), height_mm) > ADHESION_MPA
 
 
@@ -193,7 +199,7 @@ def section_edges(area: CrossSection) -> Floats:
 
 
 def _tension_mpa(edges: Floats, height_mm: float, weight_n: float = 0.0, centre: Floats | None = None) -> float:
-    """The greatest tension in a contact; infinite where it has no area. centre (2,): where the weight acts."""
+    """Greatest tension in a contact, MPa; infinite if it has no area. centre (2,): point where the weight acts."""
     moments = section_moments(edges)
     area_mm2 = float(moments[AREA])
     if area_mm2 <= 0.0:

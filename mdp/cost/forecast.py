@@ -1,15 +1,14 @@
-"""Forecast: the cost of a sequence of planes, the size of its parts and the area of them that needs support.
+"""Forecast: cost of a sequence of planes, and the size and area needing support of the resulting parts.
 
 All are summed over a solid's surface without cutting it.
 
-A piece of the surface belongs to the first part whose plane it lies above, what lies above none to the part on the platform.
-A rim runs over what the planes before its own have left. Faces are convex polygons in space, clipped by one plane after the
-other; normals and corners are columns of (3, n) arrays.
+A piece of the surface belongs to the first part whose plane it lies above, or else to the part on the build plate. A rim runs
+over what the earlier planes have left. Faces are convex polygons in space, clipped by one plane after the other; normals and
+corners are columns of (3, n) arrays.
 
-The cost leaves out the faces that the cuts lay open, though later ones may turn them into overhangs. The parts have them, as
-fans: the chord of every face in a plane makes a triangle with one point of that plane, and the areas of these triangles, with
-their signs, add up to the cut. They are cut by the planes that follow like any other face, which gives volumes by the divergence
-theorem.
+The cost leaves out faces created by the cuts, though later cuts may turn them into overhangs. The parts include them, as fans:
+the chord of every face in a plane makes a triangle with one point of that plane, and the signed areas of these triangles add up
+to the cut face. Later planes cut them like any other face, which gives volumes by the divergence theorem.
 """
 
 from collections.abc import Sequence
@@ -28,20 +27,21 @@ from mdp.plane import Plane, normals_and_offsets
 from mdp.support_need.patches import Classes
 from mdp.sweep.crossing import ROUNDING_MM, weigh_chord
 from mdp.sweep.cylinders import crossed_by
-from mdp.sweep.facets import FaceTable, Scars, times_along
+from mdp.sweep.facets import Blemishes, FaceTable, times_along
 from mdp.sweep.limbs import cylinders_cut, limb_reach
 from mdp.sweep.sweep import Remainder
 
-LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own
-NEEDED, RIM, COSINE, VOLUME, COLUMNS = range(5)  # of the sums over a part; the others are mm2 and mm
-LEAST_EDGE_MM = 1e-3  # of the line in which two cuts meet; fans leave less than nothing
+LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no definite length
+NEEDED, RIM, COSINE, VOLUME, COLUMNS = range(5)  # columns of the sums over a part; NEEDED in mm2, RIM in mm
+LEAST_EDGE_MM = 1e-3  # of the line in which two cuts meet; a shorter sum over fans is rounding
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class PartForecast:
-    """A part cut off: the area that needs support, the length of its rim where it is seen, the smallest angle of an edge that
-    the cut makes, and its volume."""
+    """A forecast part: the area that needs support, the visible length of its rim, the smallest edge angle that the cut makes,
+    and its volume.
+    """
 
     support_mm2: float
     rim_mm: float
@@ -51,17 +51,18 @@ class PartForecast:
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """What remains of a model, (k,) the numbers of its faces that count, and what blemishes them along no direction yet."""
+    """Forecast for the remainder of a model, (k,) the numbers of its faces that count, and their blemishes without directions."""
 
     remainder: Remainder
     terms: CostTerms
     chosen: Indices
-    scars: Scars
+    blemishes: Blemishes
 
     @classmethod
     def of(cls, remainder: Remainder, terms: CostTerms, rim_weights: Floats | None = None) -> "Forecast":
-        """The surface of what remains. rim_weights: (m,) how much a mm of rim counts on each face; None: what seams of the
-        remainder cost. Where they cost nothing, faces that no direction above the horizon finds risky are left out."""
+        """Forecast for the surface of a remainder. rim_weights: (m,) cost of a mm of rim on each face; None: the remainder's own
+        seam weights. If seams cost nothing, faces that no direction above the horizon makes risky are left out.
+        """
         faces, least, count = remainder.faces, threshold(terms.angle_deg), len(remainder.risky)
         if rim_weights is None and remainder.seam_weights is not None:
             rim_weights = terms.seam_mm * remainder.seam_weights
@@ -72,45 +73,48 @@ class Forecast:
         stairs = np.zeros(count) if remainder.stair_weights is None else remainder.stair_weights
         faces = faces._replace(seam_weights=rim_weights, stair_weights=stairs).of_faces(chosen)
         no_classes, none_lost = np.zeros((0, 0), np.uint8), np.zeros(0, np.bool_)
-        scars = Scars(np.zeros((0, 3)), faces, least, no_classes, remainder.weight, terms.feather, none_lost)
-        return cls(remainder, terms, chosen, scars)
+        blemishes = Blemishes(np.zeros((0, 3)), faces, least, no_classes, remainder.weight, terms.feather, none_lost)
+        return cls(remainder, terms, chosen, blemishes)
 
     def classes(self, planes: Sequence[Plane]) -> Classes:
-        """(k, n) what the faces of the model need along the planes' normals."""
+        """(k, n) support class of each of the model's faces along each plane's normal."""
         return self.remainder.classes(normals_and_offsets(planes)[0])
 
     def reach(self, planes: Sequence[Plane]) -> Mask:
-        """(k, m) which of the faces each plane may cut: those of its limbs and below them; (0, 0): all of them."""
+        """(k, m) whether each plane may cut each face: those of its limbs and those below them; (0, 0): all planes cut all
+        faces.
+        """
         if all(plane.limbs_mm is None for plane in planes):
             return np.zeros((0, 0), np.bool_)
         return np.stack([limb_reach(self.remainder, plane)[self.chosen] for plane in planes])
 
     def left_mm2(self, planes: Sequence[Plane], classes: Classes | None = None, reach: Mask | None = None) -> float:
-        """What cuts along the planes, in this order, would cost: the area left that needs support, the seams, the
-        stairs, and each cut.
+        """Cost of cuts along the planes in this order, mm2: the remaining area that needs support, the seams, the stair-stepping,
+        and a charge per cut.
 
-        classes, reach: those of planes that lean a little otherwise; absent: the planes' own.
+        classes, reach: those of slightly tilted planes, to reuse; None: computed for these planes.
         """
         cuts_mm2 = self.terms.cut_mm2 * len(planes) + self._crossed_mm2(planes)
         normals, offsets_mm = normals_and_offsets(planes)
         needs = self.classes(planes) if classes is None else classes
-        scars = self.scars._replace(directions=normals, classes=needs)
-        return _sum_left(scars, offsets_mm, self.reach(planes) if reach is None else reach) + cuts_mm2
+        blemishes = self.blemishes._replace(directions=normals, classes=needs)
+        return _sum_left(blemishes, offsets_mm, self.reach(planes) if reach is None else reach) + cuts_mm2
 
     def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
-        """The parts that planes cut off a whole model, in the order of the cuts, and the area of the rest that needs support
-        when it is printed straight up, mm2. All faces of the model count."""
+        """The parts that planes cut off a whole model, in the order of the cuts, and the area of the first part that needs
+        support when it is printed straight up, mm2. All faces of the model count.
+        """
         middle, (directions, offsets_mm) = self.remainder.mesh.bounds_mm.mean(axis=0), normals_and_offsets(planes)
         apexes = middle - (directions @ middle - offsets_mm)[:, None] * directions
-        scars = self.scars._replace(directions=directions, classes=self.classes(planes))
-        sums = _sum_parts(scars, offsets_mm, self.reach(planes), apexes)
+        blemishes = self.blemishes._replace(directions=directions, classes=self.classes(planes))
+        sums = _sum_parts(blemishes, offsets_mm, self.reach(planes), apexes)
         rows, before = np.nonzero(np.abs(sums[:-1, COLUMNS:]) > LEAST_EDGE_MM)
         np.maximum.at(sums[:, COSINE], rows, np.abs((directions[rows] * directions[before]).sum(axis=1)))
         parts = (PartForecast(s[NEEDED], s[RIM], degrees(acos(min(s[COSINE], 1.0))), s[VOLUME]) for s in sums[:-1].tolist())
         return tuple(parts), float(sums[-1, NEEDED])
 
     def _crossed_mm2(self, planes: Sequence[Plane]) -> float:
-        """What it costs that bores are cut askew, each as long as something of it is left."""
+        """Cost of the bores that planes cut askew; a bore counts until nothing of it is left, mm2."""
         left, crossed = self.remainder.cylinders if self.terms.feature_mm2 > 0.0 else (), 0.0
         for plane in planes:
             cut = cylinders_cut(self.remainder, left, plane)
@@ -120,10 +124,11 @@ class Forecast:
 
 
 @kernel
-def _sum_left(scars: Scars, offsets_mm: Floats, reach: Mask) -> float:
-    """Risky area, seams and stairs of planes along the directions of the scars, cut in their order. reach (k, m): which faces
-    each may cut, (0, 0): all."""
-    faces, normals, directions, cuts = scars.faces, scars.faces.normals, scars.directions, len(offsets_mm)
+def _sum_left(blemishes: Blemishes, offsets_mm: Floats, reach: Mask) -> float:
+    """Risky area, seams and stair-stepping of cuts in order, along the directions of the blemishes, mm2. reach (k, m): whether
+    each cut may touch each face, (0, 0): all.
+    """
+    faces, normals, directions, cuts = blemishes.faces, blemishes.faces.normals, blemishes.directions, len(offsets_mm)
     polygon, spare, heights, ends = table(3, cuts + 4), table(3, cuts + 4), floats(cuts + 4, 0.0), table(3, 2)
     total = 0.0
     for face in range(len(faces.areas_mm2)):
@@ -140,12 +145,12 @@ def _sum_left(scars: Scars, offsets_mm: Floats, reach: Mask) -> float:
                 if faces.seam_weights[face] > 0.0 and highest > ROUNDING_MM and lowest < -ROUNDING_MM:
                     chord_mm = _find_chord(polygon, heights, size, ends)
                     sine = max(np.sqrt(max(1.0 - cosine * cosine, 0.0)), LEAST_SINE)
-                    total += faces.seam_weights[face] * chord_mm * (weigh_chord(cosine, scars.feather) / sine)
+                    total += faces.seam_weights[face] * chord_mm * (weigh_chord(cosine, blemishes.feather) / sine)
                 size = _clip_below(polygon, spare, heights, size)
                 polygon, spare = spare, polygon
                 below = _flat_area_mm2(polygon, size, (normals[0, face], normals[1, face], normals[2, face]))
-            if cosine < scars.risky_below:
-                total += (area - below) * times_along(scars, cut, face) * faces.counts[face]
+            if cosine < blemishes.risky_below:
+                total += (area - below) * times_along(blemishes, cut, face) * faces.counts[face]
             total += (area - below) * faces.stair_weights[face] * step_share(cosine)
             area = below
             if lowest >= 0.0:
@@ -158,7 +163,7 @@ def _sum_left(scars: Scars, offsets_mm: Floats, reach: Mask) -> float:
 
 @no_nrt
 def _put_face(faces: FaceTable, face: int, polygon: Floats) -> None:
-    """Put the corners of a face into the first columns of `polygon`."""
+    """Write the corners of a face into the first columns of `polygon`."""
     for corner in range(3):
         for axis in range(3):
             polygon[axis, corner] = faces.points[axis, faces.corners[corner, face]]
@@ -173,7 +178,7 @@ def _along(vectors: Floats, column: int, d: Floats) -> float:
 
 @no_nrt
 def _find_heights(polygon: Floats, size: int, d: Floats, offset_mm: float, heights: Floats) -> tuple[float, float]:
-    """Put the heights of a polygon's corners above a plane into `heights`; the least and the greatest."""
+    """Write the heights of a polygon's corners above a plane into `heights`; returns the least and the greatest."""
     lowest, highest = np.inf, -np.inf
     for i in range(size):
         heights[i] = _along(polygon, i, d) - offset_mm
@@ -183,7 +188,7 @@ def _find_heights(polygon: Floats, size: int, d: Floats, offset_mm: float, heigh
 
 @no_nrt
 def _clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
-    """Clip a convex polygon at height 0 and put the lower piece into `below`; returns the number of its corners."""
+    """Clip a convex polygon at height 0 and write the lower piece into `below`; returns the number of its corners."""
     count = 0
     for i in range(size):
         j = i + 1 if i + 1 < size else 0
@@ -212,8 +217,9 @@ def _flat_area_mm2(polygon: Floats, size: int, normal: Vector) -> float:
 
 @no_nrt
 def _find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> float:
-    """Put the ends (3, 2) of a convex polygon's chord at height 0 into `ends`, first where its outline rises through it; its
-    length, mm. The polygon reaches to both sides."""
+    """Write the ends (3, 2) of a convex polygon's chord at height 0 into `ends`, first the end where its outline rises; returns
+    the chord's length, mm. The polygon must reach to both sides.
+    """
     for i in range(size):
         j = i + 1 if i + 1 < size else 0
         if (heights[i] > 0.0) != (heights[j] > 0.0):
@@ -224,10 +230,11 @@ def _find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> fl
 
 
 class Division(NamedTuple):
-    """What divides the faces of a model among parts: the cuts' offsets (k,), which faces each may cut (k, m), (0, 0): all, and a
-    point in each (k, 3); the sums, see _sum_parts; triangles that wait to be cut: (3, 3 n) corners, (n,) the cut whose fan each
-    belongs to, below 0: it is a face of the model, and the plane that is next; two polygons, their heights above a plane, and the
-    ends of a chord."""
+    """State of dividing the faces of a model among parts: the cuts' offsets (k,), the faces that each may cut (k, m) or (0, 0)
+    for all, and a point in each cut (k, 3); the sums of _sum_parts; pending triangles: (3, 3 n) corners, (n,) the cut whose fan
+    each belongs to, -1 for a face of the model, and the next plane; two polygons, their heights above a plane, and the ends of a
+    chord.
+    """
 
     offsets_mm: Floats
     reach: Mask
@@ -243,28 +250,29 @@ class Division(NamedTuple):
 
 
 @kernel
-def _sum_parts(scars: Scars, offsets_mm: Floats, reach: Mask, apexes: Floats) -> Floats:
-    """(k + 1, COLUMNS + k) the sums over the parts in the order of the cuts, the last one what remains; behind them the signed
-    length of the line in which a plane (row) meets the cut of one before (column)."""
+def _sum_parts(blemishes: Blemishes, offsets_mm: Floats, reach: Mask, apexes: Floats) -> Floats:
+    """(k + 1, COLUMNS + k) sums over the parts in the order of the cuts, the remainder last; the last k columns hold the signed
+    length of the line in which the plane of a row meets an earlier cut (column).
+    """
     count = len(offsets_mm)
     sums, most = table(count + 1, COLUMNS + count), (count + 1) * (count + 2) // 2
     corners, fans, cuts = table(3, 3 * most), ints(most, 0), ints(most, 0)
     polygon, spare, heights, ends = table(3, count + 4), table(3, count + 4), floats(count + 4, 0.0), table(3, 2)
     division = Division(offsets_mm, reach, apexes, sums, corners, fans, cuts, polygon, spare, heights, ends)
-    for face in range(len(scars.faces.areas_mm2)):
+    for face in range(len(blemishes.faces.areas_mm2)):
         fans[0], cuts[0], waiting = -1, 0, 1
-        _put_face(scars.faces, face, corners)
+        _put_face(blemishes.faces, face, corners)
         while waiting > 0:
-            waiting = _divide(scars, division, face, waiting - 1)
+            waiting = _divide(blemishes, division, face, waiting - 1)
     return sums
 
 
 @no_nrt
-def _divide(scars: Scars, division: Division, face: int, waiting: int) -> int:
-    """Divide the last triangle that waits among the parts; how many wait afterwards."""
-    fan, cut, directions, count = division.fans[waiting], division.cuts[waiting], scars.directions, len(division.offsets_mm)
+def _divide(blemishes: Blemishes, division: Division, face: int, waiting: int) -> int:
+    """Divide the last pending triangle among the parts; returns the number of triangles still pending."""
+    fan, cut, directions, count = division.fans[waiting], division.cuts[waiting], blemishes.directions, len(division.offsets_mm)
     polygon, spare, heights, ends, sums = division.polygon, division.spare, division.heights, division.ends, division.sums
-    x, y, z = scars.faces.normals[0, face], scars.faces.normals[1, face], scars.faces.normals[2, face]
+    x, y, z = blemishes.faces.normals[0, face], blemishes.faces.normals[1, face], blemishes.faces.normals[2, face]
     if fan >= 0:
         x, y, z = directions[fan, 0], directions[fan, 1], directions[fan, 2]
     for corner in range(3):
@@ -286,7 +294,7 @@ def _divide(scars: Scars, division: Division, face: int, waiting: int) -> int:
                     sums[cut, COLUMNS + fan] += _signed(ends, directions[fan], d)
                 elif highest > ROUNDING_MM and lowest < -ROUNDING_MM:
                     sums[cut, COSINE] = max(sums[cut, COSINE], abs(cosine))
-                    sums[cut, RIM] += length if scars.faces.seam_weights[face] > 0.0 else 0.0
+                    sums[cut, RIM] += length if blemishes.faces.seam_weights[face] > 0.0 else 0.0
                 _add_fan(division, waiting, cut)
                 waiting += 1
                 size = _clip_below(polygon, spare, heights, size)
@@ -295,19 +303,19 @@ def _divide(scars: Scars, division: Division, face: int, waiting: int) -> int:
             else:
                 size = 0
             sums[cut, VOLUME] += (area - left) * height / 3.0
-            if cosine < scars.risky_below:
-                needing = fan >= 0 or times_along(scars, cut, face) > 0.0
+            if cosine < blemishes.risky_below:
+                needing = fan >= 0 or times_along(blemishes, cut, face) > 0.0
                 sums[cut, NEEDED] += area - left if needing else 0.0
             area = left
         cut += 1
-    if size > 0 and (scars.faces.risky[face] if fan < 0 else z < scars.risky_below):
+    if size > 0 and (blemishes.faces.risky[face] if fan < 0 else z < blemishes.risky_below):
         sums[count, NEEDED] += area
     return waiting
 
 
 @no_nrt
 def _add_fan(division: Division, waiting: int, cut: int) -> None:
-    """Have the triangle of a chord and a point of its plane wait: it closes what remains below the plane."""
+    """Add the triangle of a chord and a point of its plane to the pending ones: it closes the remainder below the plane."""
     division.fans[waiting], division.cuts[waiting] = cut, cut + 1
     for axis in range(3):
         division.corners[axis, 3 * waiting] = division.apexes[cut, axis]
@@ -317,7 +325,7 @@ def _add_fan(division: Division, waiting: int, cut: int) -> None:
 
 @no_nrt
 def _signed(ends: Floats, first: Floats, second: Floats) -> float:
-    """Length of a chord along the line in which two planes with these normals meet, with the sign of its sense."""
+    """Length of a chord along the line in which two planes with these normals meet, signed by its direction."""
     total = 0.0
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3

@@ -1,9 +1,9 @@
-"""Hidden places: where on a model a seam is seen less, worked out once for every face.
+"""Hidden regions: how inconspicuous a seam is on each face of a model.
 
-A seam in a crease or a neck is taken for a part of the shape, and one in an occluded place is out of sight. How concave the
-surface is comes from the curvature tensor of Cohen-Steiner and Morvan (2003): over a neighbourhood every edge adds its
-dihedral angle times its length along the edge, so single noisy edges cancel out. How occluded a place is comes from
-rays over the hemisphere, spread so that each stands for the same share of the light.
+A seam in a crease or a neck looks like a part of the shape, and one in an occluded region is out of sight. Concavity comes from
+the curvature tensor of Cohen-Steiner and Morvan (2003): over a neighbourhood every edge adds its dihedral angle times its length
+along the edge, so single noisy edges cancel out. Occlusion comes from rays over the hemisphere, spread so that each stands for
+the same share of the light.
 """
 
 from typing import NamedTuple
@@ -20,22 +20,22 @@ from mdp.sweep.rays import blocked_shares, faces_met, frames_about, triangle_tre
 from mdp.topology.edges import opposites
 
 NEIGHBOURHOOD = 0.03  # radius of a face's neighbourhood, as a share of the model's diagonal
-FULL_BEND = 0.6  # radians by which a place bends inward over such a radius where it counts as hidden altogether
+FULL_BEND = 0.6  # inward bend over such a radius, in radians, that counts as fully hidden
 RAYS = 12
-REACH = 0.3  # of a ray that sees nothing, as a share of the model's diagonal
-OPEN = 0.1  # share of the rays that may be blocked where a place still counts as open
+REACH = 0.3  # length of a ray that meets nothing, as a share of the model's diagonal
+OPEN = 0.1  # share of the rays that may be blocked at a face that still counts as open
 MOST_NEIGHBOURS = 512  # faces of a neighbourhood; a finer mesh gets a smaller radius
 LIFT = 1e-6  # of a ray's start above its face, as a share of the model's diagonal
-FINE = 20_000  # faces; a finer mesh is judged on a coarser copy
-COARSER = 1e-3  # how far from its surface that copy may lie, as a share of the model's diagonal
-WORTH = 0.7  # share of the faces above which a copy saves too little
-ALIKE = 0.5  # least cosine between the normals of a face and of what stands for it on the copy
+FINE = 20_000  # faces; a finer mesh is measured on a simplified copy
+COARSER = 1e-3  # deviation of that copy from the surface, as a share of the model's diagonal
+WORTH = 0.7  # of the faces; a copy with more saves too little
+ALIKE = 0.5  # least cosine between the normals of a face and its counterpart on the copy
 
 
 class Surroundings(NamedTuple):
-    """A surface for looking around a face as far as a radius: for each face how occluded it is (m,), its middle (m, 3), its area
-    (m,), and the faces across its edges (m, 3); for every edge its length times its dihedral angle, positive where concave, and
-    its direction (m, 3, 3)."""
+    """Neighbourhood data of a surface: for each face its occlusion (m,), its centre (m, 3), its area (m,), and the faces across
+    its edges (m, 3); for every edge its length times its dihedral angle, positive where concave, and its direction (m, 3, 3).
+    """
 
     radius_mm: float
     occluded: Floats
@@ -47,7 +47,7 @@ class Surroundings(NamedTuple):
 
 
 def hidden_shares(mesh: Mesh) -> Floats:
-    """(m,) how hidden each face of a closed mesh in spatial order is: 0 in plain sight, 1 deep in a crease or out of sight."""
+    """(m,) how hidden each face of a closed mesh in spatial order is: 0 in plain sight, 1 deep in a crease or fully occluded."""
     diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     copy = simplify(mesh, COARSER * diagonal_mm) if len(mesh.faces) > FINE else mesh
     if len(copy.faces) < WORTH * len(mesh.faces):
@@ -56,7 +56,9 @@ def hidden_shares(mesh: Mesh) -> Floats:
 
 
 def _looked_up(mesh: Mesh, copy: Mesh, off_mm: float) -> Floats:
-    """(m,) the shares of the copy's faces that lie within so much above or below each face of a mesh; 0 where none does."""
+    """(m,) hidden shares of a mesh's faces, taken from the faces of a copy within off_mm above or below; 0 where there is
+    none.
+    """
     on_copy, middles, reach_mm = hidden_shares(copy), mesh.vertices[mesh.faces].mean(axis=1), 2.0 * off_mm
     rays = np.stack([middles - reach_mm * mesh.normals, mesh.normals], axis=1)
     found = faces_met(triangle_tree(copy), rays, 2.0 * reach_mm, ALIKE)
@@ -64,7 +66,7 @@ def _looked_up(mesh: Mesh, copy: Mesh, off_mm: float) -> Floats:
 
 
 def _shares(mesh: Mesh, diagonal_mm: float) -> Floats:
-    """(m,) the same, every face looked at."""
+    """(m,) hidden shares of a mesh's faces, measured face by face."""
     places = mesh.vertices[mesh.faces].mean(axis=1) + LIFT * diagonal_mm * mesh.normals
     views = places, frames_about(mesh.normals)
     occluded = blocked_shares(triangle_tree(mesh), views, spread_like_light(RAYS), REACH * diagonal_mm)
@@ -87,7 +89,7 @@ def _surroundings(mesh: Mesh, radius_mm: float, occluded: Floats) -> Surrounding
 
 @kernel
 def _hide(begin: int, end: int, surface: Surroundings, out: Floats) -> None:
-    """How hidden every face is, by what lies around it."""
+    """Compute how hidden every face is from its neighbourhood."""
     radius = surface.radius_mm
     seen, near, tensor = ints(len(surface.areas_mm2), -1), ints(MOST_NEIGHBOURS, 0), floats(6, 0.0)
     for f in range(begin, end):
@@ -100,7 +102,7 @@ def _hide(begin: int, end: int, surface: Surroundings, out: Floats) -> None:
             area += surface.areas_mm2[g]
             dark += surface.areas_mm2[g] * surface.occluded[g]
             for e in range(3):
-                bend = 0.5 * surface.bends[g, e]  # an edge is met from both of its faces
+                bend = 0.5 * surface.bends[g, e]  # both faces of an edge contribute
                 p, q, r = surface.directions[g, e, 0], surface.directions[g, e, 1], surface.directions[g, e, 2]
                 tensor[0] += bend * p * p
                 tensor[1] += bend * q * q
@@ -116,7 +118,9 @@ def _hide(begin: int, end: int, surface: Surroundings, out: Floats) -> None:
 
 @no_nrt
 def _gather(surface: Surroundings, face: int, seen: Ints, near: Ints) -> int:
-    """Put the faces around one into `near`, nearest rings first, as far as their middles lie within the radius; their number."""
+    """Write the faces around a face into `near`, nearest rings first, while their centres lie within the radius; returns their
+    number.
+    """
     middles, radius = surface.middles, surface.radius_mm
     near[0], count, at = face, 1, 0
     seen[face] = face

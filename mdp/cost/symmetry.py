@@ -1,7 +1,7 @@
-"""Symmetry: the upright planes in which a model is its own mirror image, and what planes look like in such a mirror.
+"""Symmetry: the vertical mirror planes of a model, and the mirror images of planes.
 
-A mirror plane holds the centroid of the surface and lies across one of its principal axes, most often x or y. Moments that are
-odd across it vanish; where they do, the surface itself is laid on its mirror image.
+A mirror plane holds the centroid of the surface and is square to one of its principal axes, most often x or y. Moments that are
+odd across it vanish; where they do, the surface itself is compared with its mirror image.
 """
 
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 
-UPRIGHT = 0.02  # most z of a mirror plane's normal: the table is below, so only upright planes are of use
-ODD = 0.02  # odd moments, as shares of the even ones of their order, of a model that may be symmetric
-SAMPLES, TRIED = 10000, 2000  # points on the surface, and how many of them are looked for in the mirror
-CELL = 0.012  # of the diagonal: so far off may a surface be from its mirror image
-ALIKE_SHARE = 0.97  # of the surface that has its mirror image
+UPRIGHT = 0.02  # greatest z of a mirror plane's normal: only vertical planes are useful above a table
+ODD = 0.02  # odd moments of a model that may be symmetric, as shares of the even moments of the same order
+SAMPLES, TRIED = 10000, 2000  # points on the surface, and how many of them are compared with the mirror image
+CELL = 0.012  # of the diagonal: tolerance between a surface and its mirror image
+ALIKE_SHARE = 0.97  # share of the surface that has a mirror image
 DIRECTIONS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.5**0.5, 0.5**0.5, 0.0], [0.5**0.5, -(0.5**0.5), 0.0]])
-OFF_DEG = 15.0  # a plane that leans less across a mirror plane is meant to stand on it
+OFF_DEG = 15.0  # a plane that leans less across a mirror plane is meant to be square to it
 
 
 @dataclass(frozen=True, eq=False)
 class Mirror:
-    """A mirror plane: its unit normal and its place along it."""
+    """A mirror plane: its unit normal and its offset along it."""
 
     normal: Floats
     offset_mm: float
@@ -39,7 +39,9 @@ class Mirror:
         return Plane(plane.normal - 2.0 * across * self.normal, plane.offset_mm - 2.0 * across * self.offset_mm, limbs_mm)
 
     def upright(self, plane: Plane, middle: Floats) -> Plane | None:
-        """The plane next to a given one that is its own image and meets it at a point; None where it leans far across."""
+        """The nearest plane that is its own mirror image and meets the given one near `middle`; None if it would lean by more
+        than OFF_DEG.
+        """
         across = float(plane.normal @ self.normal)
         if not 0.0 < abs(across) < sin(radians(OFF_DEG)):
             return None
@@ -50,7 +52,7 @@ class Mirror:
 
 
 def find_mirrors(mesh: Mesh) -> list[Mirror]:
-    """The upright mirror planes of a model, of a round one some; those across x and y come first."""
+    """The vertical mirror planes of a model, those across x and y first; a round model gets some of its many."""
     points, areas = _quadrature(mesh)
     centre = (points * areas[:, None]).sum(axis=0) / areas.sum()
     around = points - centre
@@ -65,7 +67,8 @@ def find_mirrors(mesh: Mesh) -> list[Mirror]:
 
 def _quadrature(mesh: Mesh) -> tuple[Floats, Floats]:
     """(4 m, 3) points and (4 m,) areas whose sums are the surface's moments up to the third order, four points a face (Strang and
-    Fix 1973)."""
+    Fix 1973).
+    """
     corners = mesh.vertices[mesh.faces]
     shares = np.array([[1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
     points = np.einsum("pk,mki->pmi", shares, corners).reshape(-1, 3)
@@ -83,7 +86,9 @@ def _is_even(around: Floats, areas: Floats, axis: Floats) -> bool:
 
 
 def _is_mirrored(mesh: Mesh, centre: Floats, axis: Floats) -> bool:
-    """Whether nearly every point of the surface has its mirror image in a cell of space that holds surface, or in the next."""
+    """Whether nearly every point of the surface has its mirror image in a cell of space with surface, or in a neighbouring
+    cell.
+    """
     points = _spread(mesh) - centre
     size_mm = CELL * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     image = points[:: SAMPLES // TRIED]
@@ -103,7 +108,7 @@ def _cells(points: Floats, size_mm: float) -> NDArray[np.int64]:
 
 
 def _spread(mesh: Mesh) -> Floats:
-    """(SAMPLES, 3) points spread over the surface, evenly by area and always the same."""
+    """(SAMPLES, 3) points spread evenly over the surface by area, deterministically."""
     along = np.cumsum(mesh.areas_mm2)
     index = np.arange(SAMPLES) + 0.5
     face = np.minimum(np.searchsorted(along, index / SAMPLES * along[-1]), len(along) - 1)

@@ -1,5 +1,8 @@
-"""Flats: directions along the large flat faces of a model. A part printed along their normal, or along a line in two of them,
-shows no stairs on them; a direction half a degree beside shows them as high as any."""
+"""Flats: directions along the large flat faces of a model.
+
+A part printed along the normal of a flat, or along the line in which two flats meet, shows no stair-stepping on them; at half a
+degree beside it the steps are as wide as anywhere.
+"""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -9,24 +12,25 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 
-LEAST_SHARE = 0.02  # of the surface that looks one way: on a ball of 5,000 faces no two have so much together
-MOST_FLATS, MOST_DIRECTIONS = 12, 40  # 12 flats have 66 lines in two of them; few of those lie in more than two
+LEAST_SHARE = 0.02  # of the surface with one normal: on a ball of 5,000 faces no two faces reach it together
+MOST_FLATS, MOST_DIRECTIONS = 12, 40  # 12 flats have 66 pairwise lines; few of those lie in more than two flats
 SAME = cos(radians(0.5))
-COARSE = 0.05  # of the parts of a unit vector, in which areas are added up beforehand: several times what SAME allows
-OFF_DEG = 15.0  # a direction that is less beside one along large flats is meant to be it
-DIGITS = 4  # of the parts of a unit vector: what differs less looks the same way
+# cell size in the coordinates of a unit vector, in which areas are summed beforehand: several times what SAME allows
+COARSE = 0.05
+OFF_DEG = 15.0  # a direction closer to one along large flats is meant to be that one
+DIGITS = 4  # rounding of a unit vector's coordinates, for normals to count as equal
 
 
 @dataclass(frozen=True, eq=False)
 class Flats:
-    """The large flats of a model: (k, 3) normals, both sides of a wall taken as one, and (k,) their shares of the surface."""
+    """The large flats of a model: (k, 3) normals, both sides of a wall counted as one, and (k,) their shares of the surface."""
 
     normals: Floats
     shares: Floats
 
     @classmethod
     def of(cls, mesh: Mesh) -> "Flats":
-        """Those of a mesh, the largest first."""
+        """The flats of a mesh, largest first."""
         normals = np.round(mesh.normals, DIGITS)
         order = np.lexsort(normals.T)
         changed = np.any(np.diff(normals[order], axis=0) != 0.0, axis=1)
@@ -47,8 +51,9 @@ class Flats:
         return cls(flats[largest], shares[largest])
 
     def directions(self, least_z: float) -> Floats:
-        """(k, 3) unit directions with at least that z along which flats are level or walls, those first along which the largest
-        area is."""
+        """(k, 3) unit directions with at least that z along which flats are level or vertical, those with the largest total area
+        first.
+        """
         crossed = [np.cross(first, second) for first, second in combinations(self.normals, 2)]
         found = np.array([*self.normals, *crossed]).reshape(-1, 3)
         lengths = np.linalg.norm(found, axis=1)
@@ -62,14 +67,15 @@ class Flats:
         return directions
 
     def share_along(self, directions: Floats) -> Floats:
-        """(n,) share of the surface that is level or a wall along each of (n, 3) directions."""
+        """(n,) share of the surface that is level or vertical along each of (n, 3) directions."""
         cosines = np.abs(directions @ self.normals.T)
         along: Floats = ((cosines >= SAME) | (cosines <= np.sqrt(1.0 - SAME * SAME))) @ self.shares
         return along
 
     def beside(self, direction: Floats, least_z: float) -> Floats:
-        """(k, 3) directions less than OFF_DEG beside a given one along which more of the surface is level or a wall, those first
-        along which most is."""
+        """(k, 3) directions within OFF_DEG of a given one along which more of the surface is level or vertical, the best
+        first.
+        """
         walls = direction - (self.normals @ direction)[:, None] * self.normals
         lengths = np.linalg.norm(walls, axis=1)
         found = np.concatenate([self.directions(least_z), walls[lengths > 1e-2] / lengths[lengths > 1e-2, None]])
@@ -80,8 +86,9 @@ class Flats:
 
 
 def _areas_near(normals: Floats, areas: Floats) -> Floats:
-    """(n,) area of all that looks about the same way as each of (n, 3) unit normals, or the opposite way; nothing that looks the
-    same way is left out."""
+    """(n,) total area with a normal near each of (n, 3) unit normals or its opposite; an upper bound that misses no equal
+    normal.
+    """
     cells = np.rint((normals + 1.0) / COARSE).astype(np.int64) + 1
     around = np.zeros((round(2.0 / COARSE) + 3,) * 3)
     np.add.at(around, tuple(cells.T), areas)

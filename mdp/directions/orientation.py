@@ -1,11 +1,11 @@
-"""Orientation: how a whole model prints best in one piece, the rival of every decomposition.
+"""Orientation: how a whole model prints best in one piece, the baseline of every decomposition.
 
 A model may rest on a facet of its convex hull (`facet_orientations`), or stand straight on a rounded end, along a side of the
 file's box or a principal axis (`straight_orientations`). In most directions spread over the whole sphere only a raft could hold
-it. A cube balanced on a corner has no risky face at all, so the areas of those are a lower bound rather than an advice:
-`best_orientation` takes what rests unless it is asked for the other.
+it. A cube balanced on a corner has no risky face at all, so such orientations give a lower bound of the area rather than advice:
+by default `best_orientation` chooses an orientation that rests.
 
-`azimuth_rad` is a bearing about z that turns with a model, so that a search finds the same of it however it is turned.
+`azimuth_rad` is a bearing about z that turns with the model, so that a search does not depend on how the model is turned.
 """
 
 from collections.abc import Callable
@@ -23,26 +23,27 @@ from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh, dot
-from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, step_share, threshold
+from mdp.overhang import PLATE_TOLERANCE_MM, UP, step_share, threshold
 
-LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips over
+LEAN_DEG = 5.0  # a model rests if it can be leaned by this much before it tips over
 SAME_FACET_DEG = 0.5
 LYING_DEG = 15.0  # a model that leans less lies on a side
 SPREAD = 1000
-SAME_MOMENT = 0.02  # of the largest second moment: axes whose moments differ by less are not told apart
+SAME_MOMENT = 0.02  # of the largest second moment: axes whose moments differ by less are indistinguishable
 MOST_FACETS = 1000
 MOST_CORNERS = 1000
-EQUAL_MM2 = 1e-6  # areas that differ less are equal but for rounding
-HIGHEST = 6  # the order of the highest moment that is measured
-PLAIN = 1e-3  # of the largest that a moment can be: less is rounding, or a symmetry
+EQUAL_MM2 = 1e-6  # smaller differences of area are rounding
+HIGHEST = 6  # order of the highest moment that is measured
+PLAIN = 1e-3  # of the greatest possible moment: smaller values are rounding or a symmetry
 SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 32)])
 
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """A model turned as a whole: rotation (3, 3), what is risky then, by what angle it may be tilted before it tips over, below 0
-    where it tips over by itself, how high it stands, the area of its stairs: each face times the height of its steps, and of its
-    shadow, overlapping surfaces each counted."""
+    """A model turned as a whole: rotation (3, 3), risky area, the angle by which it can be tilted before it tips over (negative
+    if it tips over by itself), height, stair-stepping (each face's area times the height of its steps), and area of its shadow,
+    in which overlapping surfaces all count.
+    """
 
     rotation: Floats
     risky_mm2: float
@@ -53,7 +54,7 @@ class Orientation:
 
     @property
     def stable(self) -> bool:
-        """Whether it stays upright when it is tilted slightly."""
+        """Whether the model stays upright when it is tilted slightly."""
         return self.lean_deg >= LEAN_DEG
 
     @property
@@ -67,7 +68,7 @@ T = TypeVar("T")
 
 
 def cached_with_mesh(measure: Callable[Concatenate[Mesh, P], T]) -> Callable[Concatenate[Mesh, P], T]:
-    """What is measured of a mesh is measured once, and known as long as the mesh is there."""
+    """Decorator that caches a measurement of a mesh for as long as the mesh exists."""
     known: WeakKeyDictionary[Mesh, dict[object, T]] = WeakKeyDictionary()
 
     def measured(mesh: Mesh, /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -83,10 +84,11 @@ def cached_with_mesh(measure: Callable[Concatenate[Mesh, P], T]) -> Callable[Con
 
 @cached_with_mesh
 def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orientation:
-    """The orientation with the least risky area (mm2); resting=False: also those that only a raft could hold.
+    """The orientation with the least risky area. resting: only orientations that rest, if there are any; False: also those that
+    only a raft could hold.
 
-    As the model stands counts as well, so the result is never worse than printing it straight up. Among equal areas one that
-    rests is taken, then the least turned. A model that rests nowhere (a ball) is taken as it comes.
+    The present orientation is a candidate, so the result is never worse than printing the model straight up. Among equal areas
+    one that rests wins, then the least turned. A model that rests nowhere (a ball) gets the best of all.
     """
     candidates = facet_orientations(mesh, angle_deg)
     resting_ones = [orientation for orientation in candidates if orientation.stable]
@@ -96,14 +98,16 @@ def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orie
 
 
 def resting_orientations(mesh: Mesh, angle_deg: float) -> list[Orientation]:
-    """The orientations in which the model rests on a facet of its hull, least risky first; the present one is among them when it
-    rests."""
+    """The orientations in which the model rests on a facet of its hull, least risky first, including the present one if it
+    rests.
+    """
     return sorted((orientation for orientation in facet_orientations(mesh, angle_deg) if orientation.stable), key=_rank)
 
 
 def resting_facets(mesh: Mesh) -> list[tuple[Floats, Floats]]:
-    """The facets of the hull, its triangles grouped by plane, that the model rests on without tipping over, largest first:
-    outward normal (3,) and the corners of its triangles (k, 3, 3), mm."""
+    """The facets of the hull, its triangles grouped by plane, on which the model rests without tipping over, largest first:
+    outward normal (3,) and the corners of its triangles (k, 3, 3), mm.
+    """
     hull, directions = convex_hull(mesh.vertices), np.concatenate([_facets(mesh), UP[None]])
     directions = directions[_lean_deg(mesh, directions) >= LEAN_DEG]
     if len(directions) == 0:
@@ -114,8 +118,8 @@ def resting_facets(mesh: Mesh) -> list[tuple[Floats, Floats]]:
     return [(normal, corners) for normal, corners in facets if len(corners)]
 
 
-def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
-    """The mesh turned, then set on z = 0 and centred about the turn axis; None: as it stands."""
+def set_on_plate(mesh: Mesh, rotation: Floats | None) -> Mesh:
+    """The mesh turned by a rotation, set on z = 0 and centred about the turn axis; unchanged for None."""
     if rotation is None:
         return mesh
     turned = mesh.transform(rotation)
@@ -125,7 +129,7 @@ def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
 
 
 def motion_between(before: Mesh, after: Mesh) -> tuple[Floats, Floats]:
-    """The rotation (3, 3) and the shift by which a mesh was brought from one place to another (W. Kabsch, 1976)."""
+    """The rotation (3, 3) and the shift that move a mesh from one placement to another (W. Kabsch, 1976)."""
     first, second = before.vertices.mean(axis=0), after.vertices.mean(axis=0)
     left, _, right = np.linalg.svd((after.vertices - second).T @ (before.vertices - first))
     rotation: Floats = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
@@ -137,8 +141,9 @@ Surface = tuple[Floats, Ints, Floats, Floats, float]  # vertices, faces, normals
 
 
 def face_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
-    """(k, 3) areas, mm2, of the model printed along (k, 3) unit directions: the faces that overhang too far and do not stand on
-    the plate; all faces, each times the height of its steps as a share of a layer's; and their shadow."""
+    """(k, 3) areas, mm2, of the model printed along (k, 3) unit directions: overhanging faces that do not stand on the plate; all
+    faces, each times the height of its steps as a share of a layer; and the shadow.
+    """
     areas_mm2 = np.zeros((len(directions), 3))
     surface = mesh.vertices, mesh.faces, mesh.normals, mesh.areas_mm2, threshold(angle_deg)
     in_threads(_sum_faces, len(directions), surface, np.ascontiguousarray(directions), areas_mm2)
@@ -155,7 +160,7 @@ def _sum_faces(begin: int, end: int, surface: Surface, directions: Floats, sums_
         for v in range(len(heights)):
             heights[v] = vertices[v, 0] * x + vertices[v, 1] * y + vertices[v, 2] * z
             lowest = min(lowest, heights[v])
-        level = lowest + PLATFORM_TOLERANCE_MM
+        level = lowest + PLATE_TOLERANCE_MM
         for f in range(len(normals)):
             cosine = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z
             sums_mm2[k, STAIRS] += step_share(cosine) * areas_mm2[f]
@@ -166,21 +171,22 @@ def _sum_faces(begin: int, end: int, surface: Surface, directions: Floats, sums_
 
 @cached_with_mesh
 def facet_orientations(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
-    """As the model stands, and on each facet of its hull, whether it rests there or not."""
+    """The present orientation, and those on each facet of the hull, whether or not the model rests there."""
     return tuple(_measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)])))
 
 
 @cached_with_mesh
 def straight_orientations(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
-    """On each side of the box that the model's file has around it, and along its principal axes, which a model that stands on a
-    rounded end is best turned to; without as it stands."""
+    """The orientations on each side of the bounding box of the model's file and along its principal axes, which suit a model that
+    stands on a rounded end; without the present one.
+    """
     axes = np.concatenate([np.eye(3), _principal_axes(mesh)])
     directions = np.concatenate([axes, -axes])
     return tuple(_measure(mesh, angle_deg, directions[directions @ UP < cos(radians(SAME_FACET_DEG))]))
 
 
 def _principal_axes(mesh: Mesh) -> Floats:
-    """(k, 3) the principal axes of the surface whose moments differ from those of the others."""
+    """(k, 3) principal axes of the surface, those whose moment differs from the others'."""
     corners = mesh.vertices[mesh.faces]
     centres = corners.mean(axis=1)
     middle = np.average(centres, axis=0, weights=mesh.areas_mm2)
@@ -215,7 +221,9 @@ def _rank(orientation: Orientation) -> tuple[float, bool, float, tuple[float, fl
 
 
 def _facets(mesh: Mesh) -> Floats:
-    """(k, 3) printing directions in which the model lies on a facet of its convex hull, each once, largest facets first."""
+    """(k, 3) printing directions in which the model lies on a facet of its convex hull, without duplicates, largest facets
+    first.
+    """
     hull = convex_hull(mesh.vertices)
     order = np.lexsort((*hull.normals.T, -np.round(hull.areas_mm2, 6)))
     same = cos(radians(SAME_FACET_DEG))
@@ -232,7 +240,7 @@ def _lean_deg(mesh: Mesh, directions: Floats) -> Floats:
     """(k,) the least angle by which the model, leaned to any side, has its centre of mass over the edge of its base; below 0
     where it is not over the base to begin with.
 
-    The base reaches as far to each of 64 sides as its vertices within the platform's tolerance do.
+    The base extends to each of 64 sides as far as the vertices within the tolerance of the plate.
     """
     hull = convex_hull(mesh.vertices)
     centre = centre_of_mass(mesh)
@@ -240,27 +248,29 @@ def _lean_deg(mesh: Mesh, directions: Floats) -> Floats:
     for k, direction in enumerate(directions):
         heights = hull.vertices @ direction
         lowest = float(heights.min())
-        base = hull.vertices[heights <= lowest + PLATFORM_TOLERANCE_MM] - centre
+        base = hull.vertices[heights <= lowest + PLATE_TOLERANCE_MM] - centre
         lean_deg[k] = tipping_angle_deg(base @ _rotation(direction)[:2].T, float(centre @ direction) - lowest)
     return lean_deg
 
 
 def tipping_angle_deg(base: Floats, height_mm: float) -> float:
     """The least angle by which a body, leaned to any of 64 sides, has its centre of mass over the edge of its base; below 0 where
-    it is not over the base to begin with. base: (n, 2) points of it from below the centre; height_mm: of the centre above it."""
+    it is not over the base to begin with. base: (n, 2) points of it, measured from below the centre; height_mm: of the centre
+    above it.
+    """
     return degrees(atan2(float((base @ SIDES).max(axis=0).min()), height_mm))
 
 
 @cached_with_mesh
 def diameter_mm(mesh: Mesh) -> float:
-    """The greatest distance between two vertices of the convex hull, of a fine one between some of them."""
+    """The greatest distance between two vertices of the convex hull; of a fine hull only a sample is compared."""
     corners = convex_hull(mesh.vertices).vertices
     corners = corners[:: max(1, len(corners) // MOST_CORNERS)]
     return float(np.sqrt(((corners[:, None] - corners) ** 2).sum(axis=2).max()))
 
 
 def centre_of_mass(mesh: Mesh) -> Floats:
-    """(3,) by the divergence theorem: tetrahedra from the box's centre to every face."""
+    """(3,) centre of mass by the divergence theorem: tetrahedra from the box's centre to every face."""
     middle = 0.5 * (mesh.bounds_mm[0] + mesh.bounds_mm[1])
     a, b, c = (mesh.vertices[mesh.faces[:, k]] - middle for k in range(3))
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
@@ -269,11 +279,11 @@ def centre_of_mass(mesh: Mesh) -> Floats:
 
 
 def azimuth_rad(mesh: Mesh) -> float:
-    """Where the first moment of a mesh points that is not 0: the integral over the surface of (x + i y)^m about the centre of
-    mass points in m directions at once, of which the higher moments choose; 0 where there is none, as of a body of revolution.
+    """Bearing of the first nonzero moment of a mesh, radians. The integral over the surface of (x + i y)^m about the centre of
+    mass points in m directions at once, of which the higher moments choose one; 0 if all vanish, as for a body of revolution.
 
-    Over a triangle with the corners a, b, c as complex numbers it is 2 A m! / (m + 2)! times the sum of all a^i b^j c^k with
-    i + j + k = m, A its area.
+    Over a triangle with the corners a, b, c as complex numbers it is 2 A m! / (m + 2)! times the sum of all a^i b^j c^k with i +
+    j + k = m, A its area.
     """
     moments = _moments(mesh)
     order = next((m for m in range(1, HIGHEST + 1) if abs(moments[m - 1]) > PLAIN), 0)
@@ -286,12 +296,12 @@ def azimuth_rad(mesh: Mesh) -> float:
 
 
 def _moments(mesh: Mesh) -> np.ndarray:
-    """(6,) the moments, each as a share of the largest that it can be."""
+    """(6,) moments, each as a share of its greatest possible value."""
     centre = centre_of_mass(mesh)
     z = (mesh.vertices[:, 0] - centre[0]) + 1j * (mesh.vertices[:, 1] - centre[1])
     z /= np.abs(z).max()
     sums = [np.ones(len(mesh.faces), complex), *np.zeros((HIGHEST, len(mesh.faces)), complex)]
-    for corner in z[mesh.faces].T:  # complete homogeneous polynomials of ever more variables
+    for corner in z[mesh.faces].T:  # complete homogeneous polynomials, one more variable in each pass
         for m in range(1, HIGHEST + 1):
             sums[m] = sums[m] + corner * sums[m - 1]
     total = mesh.areas_mm2.sum()
@@ -308,7 +318,7 @@ def _turns(direction: Floats) -> tuple[float, float]:
 
 
 def _rotation(direction: Floats) -> Floats:
-    """(3, 3) rotation that brings a unit direction upright, made of those turns."""
+    """(3, 3) rotation that brings a unit direction upright by turns about x, then y."""
     x, y = (radians(value) for value in _turns(direction))
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cos(x), -sin(x)], [0.0, sin(x), cos(x)]])
     about_y = np.array([[cos(y), 0.0, sin(y)], [0.0, 1.0, 0.0], [-sin(y), 0.0, cos(y)]])
@@ -317,7 +327,7 @@ def _rotation(direction: Floats) -> Floats:
 
 
 def side_in_words(orientation: Orientation) -> str:
-    """The side that the model lies on then, seen by somebody in front of it as it stands now; "" where it leans."""
+    """The side on which the model lies, named by an observer in front of its present orientation; "" if it leans."""
     faces = {(0, 0, 1): "upside down", (0, 0, -1): "as it stands", (1, 0, 0): "on its right side", (-1, 0, 0): "on its left side"}
     faces |= {(0, 1, 0): "on its back", (0, -1, 0): "on its front"}
     down = -orientation.rotation[2]
@@ -326,7 +336,7 @@ def side_in_words(orientation: Orientation) -> str:
 
 
 def in_words(orientation: Orientation, held: bool = False) -> str:
-    """How the model is turned, in the order process.rotate_deg takes, and whether it needs holding; held: the plate holds it."""
+    """How the model is turned, in the order of process.rotate_deg, and whether it needs a raft. held: the plate holds it."""
     turns = [(f"{round(angle, 1) + 0.0:g}", axis) for angle, axis in zip(orientation.turns_deg, "xy", strict=True)]
     words = ", then ".join(f"{angle} about {axis}" for angle, axis in turns if angle != "0")
     return (f"turned {words}" if words else "as it stands") + (

@@ -1,8 +1,8 @@
-"""Surfaces of revolution: the axis about which most of a model is turned, as a wheel, a vase or a chess piece is.
+"""Surfaces of revolution: the axis of a model that is mostly a turned body, such as a wheel, a vase or a chess piece.
 
-A rotation about an axis c through q moves a point p by c x (p - q). It moves a surface of revolution in itself, so the motion is
+A rotation about an axis c through q moves a point p by c x (p - q). It maps a surface of revolution to itself, so the motion is
 square to the normal n everywhere: n . (m + c x p) = 0 with m = -c x q, which is linear in (c, m). The axis is found by least
-squares (Pottmann and Wallner, Computational Line Geometry, 2001), faces that do not fit counted less and less.
+squares (Pottmann and Wallner, Computational Line Geometry, 2001), with the weight of faces that do not fit reduced in each round.
 """
 
 from dataclasses import dataclass
@@ -17,20 +17,21 @@ from mdp.overhang import Mask
 
 OFF = sin(radians(4.0))  # of the angle between a face and the motion: a thread climbs by 3 degrees
 CAP = cos(radians(4.0))  # of the angle between a face's normal and the axis: level faces fit every rotation
-LEAST_SHARE = 0.5  # of the surface beside the caps that is turned about the axis
-MOSTLY = 0.8  # of the same, where the model is hardly anything else
-LEAST_SIDE = 0.15  # of the whole surface that this is: less is the edge of a plate
+LEAST_SHARE = 0.5  # share of the surface, caps excluded, that is turned about the axis
+MOSTLY = 0.8  # that share in a model that is hardly anything else
+LEAST_SIDE = 0.15  # least share of the whole surface: less is the edge of a plate
 ROUNDS = 12  # of least squares
-SECTORS, MOST_SECTORS, LEAST_SECTOR = 12, 10, 0.01  # around the axis, those that faces look into, with a share of the area
+SECTORS, MOST_SECTORS, LEAST_SECTOR = 12, 10, 0.01  # around the axis; required sectors with faces, each with a share of the area
 BESIDE_HANDLES = 0.95  # of the area: the ends of handles and arms face away from the axis, too
-SAME = cos(radians(10.0))  # of the angle between axes that are one
+SAME = cos(radians(10.0))  # of the angle between axes that count as equal
 LEVEL_DEG = 5.0  # tolerance of an axis: the fit to half a shell is some 2 degrees off
 
 
 @dataclass(frozen=True, eq=False)
 class Revolution:
-    """A turned body that is most of a model: unit axis (3,), the middle of it (3,), radius and half length, mm, (k,) the faces
-    around it, their area, and which share of the surface beside level caps it is."""
+    """A turned body that makes up most of a model: unit axis (3,), its centre (3,), radius and half length, mm, (k,) its faces,
+    their area, and their share of the surface without level caps.
+    """
 
     axis: Floats
     middle: Floats
@@ -46,18 +47,19 @@ class Revolution:
         return self.share >= MOSTLY
 
     def is_square_to(self, direction: Floats) -> bool:
-        """Whether the axis is upright or level along a printing direction."""
+        """Whether the axis is vertical or horizontal for a printing direction."""
         return self.is_upright_along(direction) or abs(float(self.axis @ direction)) <= sin(radians(LEVEL_DEG))
 
     def is_upright_along(self, direction: Floats) -> bool:
-        """Whether the axis is upright along a printing direction."""
+        """Whether the axis is vertical for a printing direction."""
         return abs(float(self.axis @ direction)) >= cos(radians(LEVEL_DEG))
 
 
 @cached_with_mesh
 def find_revolution(mesh: Mesh) -> Revolution | None:
-    """The turned body that makes up most of a closed mesh, searched from the principal axes of its surface; None where there is
-    none, or as on a ball several axes serve."""
+    """The turned body that makes up most of a closed mesh, searched from the principal axes of its surface; None if there is
+    none, or if several axes fit, as on a ball.
+    """
     middles, areas = mesh.vertices[mesh.faces].mean(axis=1), mesh.areas_mm2
     centre = centre_of_mass(mesh)
     points, normals = middles - centre, mesh.normals
@@ -79,8 +81,9 @@ def find_revolution(mesh: Mesh) -> Revolution | None:
 
 
 def _fit(points: Floats, normals: Floats, areas: Floats, axis: Floats) -> tuple[float, Floats, Floats]:
-    """The share of the surface beside its caps that is turned about the axis found from a first one, that axis, and the moment m
-    of its line."""
+    """Fit an axis from an initial one: the share of the surface without caps that is turned about it, the axis, and the moment m
+    of its line.
+    """
     moment = np.zeros(3)
     for _ in range(ROUNDS):
         off = _off(points, normals, axis, moment)
@@ -94,7 +97,7 @@ def _fit(points: Floats, normals: Floats, areas: Floats, axis: Floats) -> tuple[
 
 
 def _surrounds(normals: Floats, areas: Floats, axis: Floats) -> bool:
-    """Whether faces look nearly all ways around an axis."""
+    """Whether faces point in nearly all directions around an axis."""
     across = normals @ frame_across(axis).T
     sectors = np.floor((np.arctan2(across[:, 1], across[:, 0]) / (2.0 * pi) % 1.0) * SECTORS).astype(np.int64) % SECTORS
     shares = np.bincount(sectors, areas, SECTORS) / float(areas.sum())
@@ -102,7 +105,7 @@ def _surrounds(normals: Floats, areas: Floats, axis: Floats) -> bool:
 
 
 def _least_squares(points: Floats, normals: Floats, weights: Floats, axis: Floats) -> tuple[Floats, Floats]:
-    """The axis and moment that the weighted faces fit best; of axes that fit alike the one nearest to the present one."""
+    """The axis and moment that fit the weighted faces best; among equally good axes the one nearest to the present one."""
     rows = np.hstack([np.cross(points, normals), normals])
     matrix = (rows * weights[:, None]).T @ rows
     about, mixed, along = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
@@ -125,5 +128,5 @@ def _off(points: Floats, normals: Floats, axis: Floats, moment: Floats) -> Float
 
 
 def _fits(points: Floats, normals: Floats, axis: Floats, moment: Floats) -> Mask:
-    """(m,) whether each face, no cap, is turned about the axis."""
+    """(m,) whether each face is turned about the axis and is not a cap."""
     return (_off(points, normals, axis, moment) <= OFF) & (np.abs(normals @ axis) < CAP)

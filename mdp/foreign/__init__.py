@@ -1,4 +1,4 @@
-"""Files of other slicers: the volumes that are printed, and the marks and modifiers that the others become.
+"""Other slicers' files: their printed volumes, and their marks and modifiers.
 
-`printed.printed` subtracts negative volumes, `marks.Marks` makes modifiers and marks of `mdp.formats.slicer_file.Build`.
+`printed.printed` subtracts negative volumes, `marks.Marks` turns those of `mdp.formats.slicer_file.Build` into zones of a plan.
 """

@@ -35,18 +35,18 @@ if TYPE_CHECKING:
 
 MARKED = {SUPPORT: "support", NO_SUPPORT: "no_support"}
 PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SEAM: "no_seam"}
-SAME = 1e-6  # cosine of a right angle, and share of a box's volume that a solid within may lack
+SAME = 1e-6  # cosine of a right angle, and share of a box's volume that a solid inside may lack
 PLURAL = {"is": "are", "changes": "change"}
-MOST_TOLD = 8  # settings in a sentence
-THINNEST_MM = 0.001  # of a height range: less is the rounding of its file
-BESIDE_MM = 1.0  # of an object, which is more than its outlines may reach beyond its mesh
+MOST_NAMED = 8  # settings named in a sentence
+THINNEST_MM = 0.001  # of a height range: a smaller difference is rounding of its file
+BESIDE_MM = 1.0  # margin around an object, more than its outlines can reach beyond its mesh
 
 
 class Marks:
-    """The marks of a slicer file, moved as its model is.
+    """The marks of a slicer file, moved with its model.
 
-    mesh: the solid of what the file prints; moved: scale, turn and shift_mm by which each place p of the file lies on it, at
-    turn @ scale p + shift_mm. A volume that is no solid is left out, with a note.
+    mesh: the solid of what the file prints; moved: scale, turn and shift_mm so that a point p of the file becomes turn @ scale p
+    + shift_mm. A volume that is not a solid is left out, with a note.
     """
 
     def __init__(self, build: Build, path: Path, mesh: Mesh, moved: tuple[float, Floats, Floats]) -> None:
@@ -54,11 +54,13 @@ class Marks:
         self._corners_mm = mesh.vertices[mesh.faces]
         self._path, (self._scale, self._turn, self._shift_mm), self._on_plate = path, moved, build.on_plate
         self._notes: list[str] = []
-        self._subjects: dict[tuple[str, str], list[str]] = {}  # of notes, by what is said of each
+        self._subjects: dict[tuple[str, str], list[str]] = {}  # of notes, by predicate
 
     @cached_property
     def _settings(self) -> "SlicerSettings | None":
-        """The settings of the whole print, read once; most models have none. None, with a note: they are damaged."""
+        """The settings of the whole print, read once and only for models that need them; None, with a note, if they are
+        damaged.
+        """
         from profiles.foreign.read import read_slicer_settings
 
         try:
@@ -69,7 +71,7 @@ class Marks:
             return None
 
     def zones(self) -> tuple[Zones, list[str]]:
-        """All marks and a sentence for each."""
+        """All marks, and a sentence about each."""
         modifiers, kinds = list[Modifier](), {kind: list[AnyZone]() for kind in ("no_seam", "no_support", "support")}
         painted = dict[str, list[Floats]]()
         for item in self._objects:
@@ -86,14 +88,14 @@ class Marks:
                     painted.setdefault(role.kind, []).append(self._moved(surface.vertices[surface.faces]))
         for kind, corners_mm in painted.items():
             kinds[PAINTED[kind]] += self._painted(kind, np.concatenate(corners_mm))
-        notes = [_sentence(subjects, *predicate) for predicate, subjects in self._subjects.items()]
+        notes = [_note_text(subjects, *predicate) for predicate, subjects in self._subjects.items()]
         return Zones(**{kind: tuple(zones) for kind, zones in kinds.items()}, modifiers=tuple(modifiers)), [*notes, *self._notes]
 
     def _tell(self, subject: str, verb: str, rest: str) -> None:
         self._subjects.setdefault((verb, rest), []).append(subject)
 
     def _of_object(self, item: BuildObject) -> Iterator[Modifier]:
-        """The settings of an object and those between two heights of it."""
+        """The modifiers for an object's settings and for its height ranges."""
         lowest, highest = _bounds(item)
         low, high = lowest - BESIDE_MM, highest + BESIDE_MM
         if item.settings and (process := self._process(f"object {item.name!r}" if item.name else "the object", item.settings)):
@@ -109,20 +111,20 @@ class Marks:
                 yield Modifier(box, process)
 
     def _process(self, what: str, settings: Mapping[str, str]) -> dict[str, Any]:
-        """The keys of a process that settings become, with a note on them."""
+        """The process keys to which settings convert, with a note about them."""
         if self._settings is None:
             return {}
         from profiles.foreign.read import settings_of_volume
 
         process, left = settings_of_volume(self._settings, settings)
         taken = ", ".join(f"{key} = {value}" for key, value in process.items())
-        values = [f"{name} = {settings[name]}" for name in left[:MOST_TOLD]] + ["..."] * (len(left) > MOST_TOLD)
+        values = [f"{name} = {settings[name]}" for name in left[:MOST_NAMED]] + ["..."] * (len(left) > MOST_NAMED)
         rest = f"; not taken: {', '.join(values)}" if left else ""
         self._tell(what, *(("is", f"taken as [[modifier]]: {taken}{rest}") if taken else ("changes", f"nothing here{rest}")))
         return process
 
     def _painted(self, kind: str, corners_mm: Floats) -> list[Triangles]:
-        """The faces of the solid that lie on (k, 3, 3) painted triangles, with a note on how many of these have any."""
+        """The faces of the solid that lie on (k, 3, 3) painted triangles, with a note on how many triangles have such faces."""
         row = triangle_of(corners_mm, self._corners_mm)
         held, lost = len(np.unique(row[row != NONE])), "not on the surface of what is printed"
         rest = len(corners_mm) - held
@@ -134,7 +136,8 @@ class Marks:
         return [Triangles(self._corners_mm[row != NONE])]
 
     def _place(self, surface: Surface, role: Role, item: BuildObject) -> Volume | None:
-        """Where a volume lies, within the box of its object if there are others; None for one that is no solid, with a note.
+        """The region of a volume, clipped to its object's box if there are several objects; None, with a note, if it is not a
+        solid.
 
         Where an object is nothing but marks, as in Cura, they hold for all.
         """
@@ -152,13 +155,13 @@ class Marks:
 
     @cached_property
     def _axes(self) -> tuple[Vector, Vector, Vector] | None:
-        """The axes of what is level in the file, where it lies now; None: it is level there, too."""
+        """The file's axes in the model's present placement; None if they are still those of the frame."""
         cube = _box_around(corners((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) @ self._turn.T)
-        assert cube is not None  # a rotation leaves it one
+        assert cube is not None  # a rotation keeps it a cube
         return cube.axes
 
     def _box(self, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Zone:
-        """A box of the file where it lies now."""
+        """A box of the file, in the model's present placement."""
         points = np.array([[*low], [*high]])
         return _box_along(self._axes, self._moved(corners(*map(tuple, points.tolist()))))
 
@@ -167,8 +170,8 @@ class Marks:
         return moved
 
 
-def _sentence(subjects: Sequence[str], verb: str, rest: str) -> str:
-    """What is said of one subject, or of the first and how many more."""
+def _note_text(subjects: Sequence[str], verb: str, rest: str) -> str:
+    """A sentence about one subject, or about the first and the number of the others."""
     if len(subjects) == 1:
         return f"{subjects[0]} {verb} {rest}"
     return f"{subjects[0]} and {len(subjects) - 1} more {PLURAL[verb]} {rest}"
@@ -179,14 +182,14 @@ def _named(role: Role) -> str:
 
 
 def _bounds(item: BuildObject) -> Floats:
-    """(2, 3) least and greatest coordinates of what is printed of an object."""
+    """(2, 3) least and greatest coordinates of an object's printed volumes."""
     surface = concatenate(item.surfaces(PART))
     used = surface.vertices[surface.faces.ravel()]
     return np.stack([used.min(axis=0), used.max(axis=0)])
 
 
 def _within(box: Zone, room: Zone | None) -> Zone:
-    """The part of a box within its room, a box of its own where both are level."""
+    """The part of a box within its room; a plain box if both are aligned with the frame."""
     if room is None or box.axes is not None or room.axes is not None:
         return replace(box, room=room)
     low, high = np.maximum(box.min_mm, room.min_mm), np.minimum(box.max_mm, room.max_mm)
@@ -197,8 +200,10 @@ def _within(box: Zone, room: Zone | None) -> Zone:
 
 
 def _box_around(points: Floats) -> Zone | None:
-    """The box whose corners (8, 3) points may be: around them, along the shortest three lines from the first that are at right
-    angles. None: there are none, or there are not eight points. Whether it is one the volume between them tells."""
+    """The box that may have these (8, 3) points as corners: its edges run along the shortest three lines from the first point
+    that are at right angles. None if there are no such lines or not eight points. Only the volume between the points shows
+    whether it is a box.
+    """
     if len(points) != 8:
         return None
     sides = points[1:] - points[0]
@@ -207,7 +212,7 @@ def _box_around(points: Floats) -> Zone | None:
     if lengths[0] == 0.0:
         return None
     directions, edges = sides / lengths[:, None], [0]
-    for k in range(1, 7):  # the shortest is an edge, and so is the next one square to those before it
+    for k in range(1, 7):  # the shortest is an edge, and so is the next one square to the edges before it
         if len(edges) < 3 and np.abs(directions[edges] @ directions[k]).max() < SAME:
             edges.append(k)
     if len(edges) < 3:
@@ -222,7 +227,7 @@ def _box_around(points: Floats) -> Zone | None:
 
 
 def _box_along(axes: tuple[Vector, Vector, Vector] | None, points: Floats) -> Zone:
-    """The smallest box around some points with these axes; None: those of the frame."""
+    """The smallest box with these axes around some points; None: axes of the frame."""
     places = points if axes is None else points @ np.array(axes).T
     (x0, y0, z0), (x1, y1, z1) = places.min(axis=0).tolist(), places.max(axis=0).tolist()
     return Zone((x0, y0, z0), (x1, y1, z1), axes)

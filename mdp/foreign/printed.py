@@ -1,4 +1,4 @@
-"""Printed: the surfaces that a slicer file prints, its negative volumes subtracted."""
+"""Printed volumes: the surfaces that a slicer file prints, with its negative volumes subtracted."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from mdp.repair.repair import repair
 from mdp.repair.shells import above, subtract
 from profiles.errors import MeshError
 
-SINKING_MM = 0.001  # below the plate, by which PrusaSlicer tells an object that sinks from rounding
+SINKING_MM = 0.001  # below the plate; PrusaSlicer takes less for rounding
 
 
 def printed(build: Build) -> tuple[list[Surface], list[str]]:
-    """The surfaces that a slicer file prints, and a note on each object that is cut by negative volumes or by the plate.
+    """The surfaces that a slicer file prints, and a note on each object cut by negative volumes or by the plate.
 
-    Raises MeshError where nothing is left, and for a negative volume that is no solid.
+    Raises MeshError if nothing is left, and for a negative volume that is not a solid.
     """
     surfaces, notes, subtracted = list[Surface](), list[str](), 0
     for item in build.objects:
@@ -42,9 +42,9 @@ def printed(build: Build) -> tuple[list[Surface], list[str]]:
 
 
 def solid_of_volume(surface: Surface, role: Role) -> Surface:
-    """A volume as a closed solid. Raises MeshError, which names it."""
+    """A volume as a closed solid. Raises MeshError with the volume's name."""
     try:
-        with np.errstate(all="ignore"):  # one that lies too far away for its volume to be a number is refused as any other
+        with np.errstate(all="ignore"):  # a volume too far away to have a finite size is refused like any other
             return repair([surface])[0]
     except MeshError as error:
         raise MeshError(f"its {role.kind} {role.name!r} {error}") from None

@@ -1,7 +1,7 @@
-"""CAD library: OpenCASCADE (cascadio, the extra `step`) in a process of its own, for some damaged files crash it.
+"""CAD library: OpenCASCADE (cascadio, the extra `step`) in a separate process, since some damaged files crash it.
 
-The process stays in this one's session, so whatever ends that session ends it too: the library holds Python's lock while it
-works, and the process could not hear that nobody waits for it any more.
+The process belongs to this process's session, so whatever ends the session ends it too: the library holds Python's lock while it
+works, so the process could not notice that its caller is gone.
 """
 
 import signal
@@ -12,17 +12,17 @@ from mdp.kernels.workers import ONE_CORE, Interpreter, frame, read_frames, take_
 from profiles.errors import MeshError
 
 CODE = "from mdp.formats.cad_library import answer; answer()"
-# How far triangles may lie from the surface: a twentieth of a layer, and a circle in 36 corners at least.
+# Greatest distance of a triangle from the surface: a twentieth of a layer, and at least 36 corners in a circle.
 DEFLECTION_MM, DEFLECTION_RAD = 0.01, 0.17
-SIGKILL = getattr(signal, "SIGKILL", 0)  # Linux sends it to a process that exhausts the memory; Windows has none
+SIGKILL = getattr(signal, "SIGKILL", 0)  # Linux sends it to a process that exhausts the memory; Windows has no such signal
 DAMAGED = "is damaged: the CAD library (OpenCASCADE) cannot read it"
 KILLED = "the CAD library (OpenCASCADE) was killed while it read it: there may be too little memory"
 
 
 def to_glb(path: Path, content: bytes, kind: str) -> bytes:
-    """The content of a file ("step" or "iges") as that of a GLB file; nothing where the library finds no such file in it.
+    """The content of a file ("step" or "iges") converted to GLB; empty if the library finds no such file in it.
 
-    Raises MeshError where the library is missing, and where it ends without an answer.
+    Raises MeshError if the library is missing or ends without an answer.
     """
     if find_spec("cascadio") is None:
         raise MeshError(f"{path}: reading CAD files needs cascadio: pip install 'tiltprint[step]'")
@@ -40,9 +40,9 @@ def to_glb(path: Path, content: bytes, kind: str) -> bytes:
 
 
 def answer() -> None:
-    """In the process of the library: read one file and answer with (scene, what has kept it from that)."""
-    asked, answers = take_pipes()
-    content, kind = next(read_frames(asked))
+    """Entry point of the library's process: read a file and answer with (scene, error message)."""
+    requests, answers = take_pipes()
+    content, kind = next(read_frames(requests))
     answers.write(frame(_loaded(content, kind)))
     answers.flush()
 
@@ -50,7 +50,7 @@ def answer() -> None:
 def _loaded(content: bytes, kind: str) -> tuple[bytes, str]:
     try:
         import cascadio
-    except ImportError as error:  # it is there: a library that it needs is not
+    except ImportError as error:  # the package is installed, but a library that it needs is missing
         return b"", f"cascadio, which reads CAD files, does not start here ({error})"
     tolerances = {"tol_linear": DEFLECTION_MM, "tol_angular": DEFLECTION_RAD}
     return cascadio.load(content, kind, use_parallel=False, **tolerances), ""

@@ -1,7 +1,7 @@
 """GLB (binary glTF 2.0): the triangles of the scene and the colours of their materials, coordinates taken as mm with z up.
 
-The specification says metres with y up, but programs that print write their mm and their z unchanged, so nothing is turned
-or scaled here; a model in metres is caught by the check of its size, one that lies on its side can be turned when it is read.
+The specification says metres with y up, but programs for 3D printing write their mm and their z unchanged, so nothing is turned
+or scaled here; the check of the size detects a model in metres, and a model on its side can be turned when it is read.
 """
 
 import json
@@ -19,12 +19,12 @@ from profiles.errors import MeshError
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # "glTF", "JSON" and "BIN" read as little-endian numbers
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-TYPES = {1: "SCALAR", 3: "VEC3"}  # of accessors, by the values that a row has
+TYPES = {1: "SCALAR", 3: "VEC3"}  # of accessors, by the number of values in a row
 LINES_TO, TRIANGLES = 3, 4  # modes of primitives: up to 3 they are points and lines
-UNNAMED = frozenset({"SOLID", "SHELL", "COMPOUND", "COMPSOLID", "FACE"})  # OpenCASCADE's words for shapes without a name
-DEEPEST = 64  # nodes within nodes
-# Extensions that a file may require: positions as whole numbers, which are read, and what is of looks and other data. Any other
-# may change what is placed where.
+UNNAMED = frozenset({"SOLID", "SHELL", "COMPOUND", "COMPSOLID", "FACE"})  # OpenCASCADE's names for unnamed shapes
+DEEPEST = 64  # nesting of nodes
+# Extensions that a file may require: integer positions, which are read, and those of appearance and other data, which are
+# ignored. Any other extension may change the geometry.
 READ_REQUIRED = "KHR_mesh_quantization", "KHR_xmp_json_ld", "KHR_animation_pointer"
 LOOKS_REQUIRED = "KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "EXT_lights_"
 
@@ -38,7 +38,7 @@ def read(path: Path) -> list[Surface]:
 
 
 def read_scene(path: Path, content: bytes) -> list[Surface]:
-    """The same for the content of such a file; path: what messages name."""
+    """The surfaces of a GLB file's content. path: the name for messages. Raises MeshError as `read` does."""
     document, binary = _chunks(path, content)
     try:
         check_extensions(path, document)
@@ -70,30 +70,30 @@ def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
     except RecursionError:
         raise MeshError(f"{path}: is damaged: its glTF document is nested too deep") from None
     except json.JSONDecodeError as error:
-        raise MeshError(f"{path}: is damaged: its glTF document is no JSON from character {error.pos + 1} on") from None
-    except ValueError:  # bytes that are no text, a number of thousands of digits
+        raise MeshError(f"{path}: is damaged: its glTF document is not valid JSON at character {error.pos + 1}") from None
+    except ValueError:  # invalid UTF-8, or a number of thousands of digits
         raise MeshError(f"{path}: is damaged: its glTF document holds text or a number that cannot be read") from None
 
 
 def check_extensions(path: Path, document: Any) -> None:
-    """Raises MeshError for an extension that a document requires and that is not read."""
+    """Raises MeshError for a required extension that is not supported."""
     for name in map(str, document.get("extensionsRequired", ())):
         if name not in READ_REQUIRED and not name.startswith(LOOKS_REQUIRED):
             raise MeshError(f"{path}: requires {name[:60]}, a glTF extension that is not read: export it without")
 
 
 def _entry(path: Path, document: Any, kind: str, number: Any) -> Any:
-    """An entry of one of the document's lists, such as "accessors". Raises MeshError where there is none of that number."""
+    """An entry of one of the document's lists, such as "accessors". Raises MeshError if the list has no such entry."""
     entries = document.get(kind, [])
     if not isinstance(entries, list):
-        raise MeshError(f"{path}: is damaged: {kind} of its glTF document is no list")
+        raise MeshError(f"{path}: is damaged: {kind} of its glTF document is not a list")
     if not isinstance(number, int) or not 0 <= number < len(entries):
         raise MeshError(f"{path}: is damaged: it names {number!r:.40} of its {kind}, there are {len(entries)} (counted from 0)")
     return entries[number]
 
 
 def parts_without_faces(content: bytes) -> list[str]:
-    """The names of the nodes of such a file that place no face, nor does any node in them; where one holds another, its name."""
+    """The names of the topmost nodes of a GLB file's content that place no face, neither directly nor in nested nodes."""
     document, _ = _chunks(Path(), content)
     nodes, meshes = document.get("nodes", []), document.get("meshes", [])
     names: list[str] = []
@@ -121,8 +121,9 @@ def _roots(path: Path, document: Any) -> list[int]:
 
 
 def _scene_meshes(path: Path, document: Any, binary: bytes) -> tuple[list[Surface], int]:
-    """The faces of all nodes of the scene, parents before children, in the order of the file, and how many primitives are
-    points and lines."""
+    """The faces of all nodes of the scene, parents before children, in file order, and the number of primitives that are points
+    and lines.
+    """
     pending = [(number, np.eye(4), 0, "") for number in reversed(_roots(path, document))]
     surfaces: list[Surface] = []
     placed, faces, bare = 0, 0, 0
@@ -150,7 +151,7 @@ def _scene_meshes(path: Path, document: Any, binary: bytes) -> tuple[list[Surfac
 
 
 def _name(element: Any, above: str) -> str:
-    """The name of a node or a mesh, and where it has none that of the node above."""
+    """The name of a node or a mesh, or else the name of the node above."""
     name = str(element.get("name", ""))
     return above if not name or name in UNNAMED or name.startswith("=>[") else name
 
@@ -202,14 +203,16 @@ def _primitive_surface(path: Path, document: Any, binary: bytes, primitive: Any,
 
 
 def _positions(path: Path, primitive: Any) -> Any:
-    """The number of the accessor of a primitive's vertices."""
+    """The accessor number of a primitive's vertices."""
     if "POSITION" not in primitive.get("attributes", {}):
         raise MeshError(f"{path}: is damaged: a mesh has no vertices (POSITION)")
     return primitive["attributes"]["POSITION"]
 
 
 def _colour(path: Path, document: Any, primitive: Any) -> int:
-    """The colour of a primitive's material, which glTF counts linearly (2.0, 3.9.2), as sRGB; NO_COLOUR where it says none."""
+    """The colour of a primitive's material, converted from glTF's linear values (2.0, 3.9.2) to sRGB; NO_COLOUR if it has
+    none.
+    """
     if "material" not in primitive:
         return NO_COLOUR
     factor = _entry(path, document, "materials", primitive["material"]).get("pbrMetallicRoughness", {}).get("baseColorFactor")
@@ -222,7 +225,7 @@ def _colour(path: Path, document: Any, primitive: Any) -> int:
 
 
 def _marks(surfaces: list[Surface]) -> list[Surface]:
-    """The surfaces, without colours where all have the same: it marks nothing."""
+    """The surfaces; without colours if all have the same one, which distinguishes nothing."""
     if len({NO_COLOUR if surface.colours is None else int(surface.colours[0]) for surface in surfaces}) > 1:
         return surfaces
     return [replace(surface, colours=None) for surface in surfaces]
@@ -255,4 +258,4 @@ def _accessor_rows(path: Path, document: Any, binary: bytes, number: int, width:
     rows = np.ndarray((count, width), kind, binary, start, (stride, kind.itemsize))
     if not accessor.get("normalized") or kind.kind == "f":
         return rows
-    return np.maximum(rows / np.iinfo(kind).max, -1.0)  # whole numbers that stand for -1 to 1 (2.0, 3.11)
+    return np.maximum(rows / np.iinfo(kind).max, -1.0)  # integers that represent -1 to 1 (2.0, 3.11)

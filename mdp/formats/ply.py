@@ -1,5 +1,4 @@
-"""PLY, ASCII and binary: the elements `vertex` and `face`, their colours red, green and blue, whatever other properties they
-carry."""
+"""PLY, ASCII and binary: the elements `vertex` and `face`, their colours red, green and blue; other properties are ignored."""
 
 from pathlib import Path
 from typing import Any
@@ -23,18 +22,18 @@ TYPES |= {
     "float64": "f8",
 }
 RGB = ("red", "green", "blue")
-OF_255 = {"f4": 255.0, "f8": 255.0, "u2": 255.0 / 65535.0}  # bytes count as they are
+OF_255 = {"f4": 255.0, "f8": 255.0, "u2": 255.0 / 65535.0}  # bytes need no conversion
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
-Column = tuple[str, str, str]  # its name and type, and the type of a list's count: "" for a plain value
+Column = tuple[str, str, str]  # its name and type, and the type of a list's length: "" for a plain value
 Element = tuple[str, int, list[Column]]  # a table of the file: its name, its rows, its columns
 
 
 def read(path: Path) -> list[Surface]:
     """The polygons of a PLY file as triangles.
 
-    Raises MeshError for a header that is malformed and for tables that the file does not hold.
+    Raises MeshError for a malformed header and for tables that are incomplete.
     """
     content = path.read_bytes()
     order, elements, body = _header(path, content)
@@ -64,7 +63,7 @@ def read(path: Path) -> list[Surface]:
 
 
 def _colours(columns: dict[str, Any], kinds: dict[tuple[str, str], str], table: str) -> Indices | None:
-    """(n,) colours of the rows of a table; None where it has no columns red, green and blue."""
+    """(n,) colours of a table's rows; None if it lacks one of the columns red, green and blue."""
     if not {(table, name) for name in RGB} <= kinds.keys():
         return None
     colours = np.zeros(len(columns[RGB[0]]), dtype=np.int64)
@@ -77,7 +76,7 @@ def _colours(columns: dict[str, Any], kinds: dict[tuple[str, str], str], table: 
 
 
 def _corner_colours(colours: Indices | None, polygons: list[list[int]] | Indices) -> Indices | None:
-    """(m,) colours of the polygons whose corners all have one; indices out of range are reported elsewhere."""
+    """(m,) colours of the polygons whose corners share one colour; indices out of range are reported elsewhere."""
     if colours is None:
         return None
 
@@ -115,7 +114,7 @@ def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
     if order is None:
         raise MeshError(f"{path}: its header names no format; allowed are {', '.join(ORDERS)}")
     for name, count, properties in elements:
-        # One row with empty lists: an absurd count is refused before anything is allocated.
+        # A row with empty lists is the least: an absurd count is refused before anything is allocated.
         least_bytes = sum(np.dtype(length or kind).itemsize for _, kind, length in properties)
         if count < 0 or count * (least_bytes if order else 2 * len(properties) - 1) > len(content) - body + 1:
             raise MeshError(f"{path}: announces {count} rows of `{name}`, more than the file can hold")
@@ -123,7 +122,7 @@ def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
 
 
 def _binary_rows(content: bytes, offset: int, count: int, properties: list[Column], order: str) -> tuple[dict[str, Any], int]:
-    """Rows read in one piece when all lists are as long as the first row's, else one by one."""
+    """The columns of a binary table: read at once if every list is as long as the first row's, else row by row."""
     lengths = _first_lengths(content, offset, properties, order) if count else {}
     fields: list[Any] = []
     for name, kind, length in properties:
@@ -148,7 +147,9 @@ def _binary_rows(content: bytes, offset: int, count: int, properties: list[Colum
 
 
 def _count(content: bytes, offset: int, length: str, order: str) -> tuple[int, int]:
-    """How many values a column has in a row, and where they begin. length: the type of a list's count, "" for a plain value."""
+    """The number of values that a column has in a row, and their offset. length: the type of a list's length, "" for a plain
+    value.
+    """
     if not length:
         return 1, offset
     return int(np.frombuffer(content, order + length, 1, offset)[0]), offset + np.dtype(length).itemsize

@@ -1,7 +1,7 @@
-"""Polygons: those of an OBJ or OFF file, and of any other, as triangles that do not cross the polygon's outline.
+"""Polygon files (OBJ and OFF), and the triangulation of polygons along their outline.
 
-OBJ has `v` and `f` lines, whose texture, normals, groups and materials are left alone; OFF has counts, then one vertex and one
-polygon a line.
+OBJ files have `v` and `f` lines, whose texture coordinates, normals, groups and materials are ignored; OFF files have counts,
+then one vertex and one polygon per line.
 """
 
 from itertools import islice
@@ -15,8 +15,8 @@ from mdp.formats.surface import Surface, check_surface, check_vertices, parse_fl
 from mdp.mesh import Floats, Indices
 from profiles.errors import MeshError, counted
 
-MOST_INDEX = 2**62  # no file has that many vertices, and more would not fit into an array
-OFF_KINDS = ("OFF", "COFF", "NOFF", "CNOFF", "STOFF")  # the letters name columns behind the position, which are left alone
+MOST_INDEX = 2**62  # no file has that many vertices; larger numbers would not fit into an array
+OFF_KINDS = ("OFF", "COFF", "NOFF", "CNOFF", "STOFF")  # the letters name columns after the position, which are ignored
 
 
 def read(path: Path) -> list[Surface]:
@@ -27,7 +27,7 @@ def read(path: Path) -> list[Surface]:
 def _read_obj(path: Path) -> Surface:
     """The polygons of an OBJ file as triangles; all objects and groups come as one surface, since they share their vertices.
 
-    Raises MeshError for a vertex without three coordinates and a face without three corners or with a bad index.
+    Raises MeshError for a vertex without three coordinates, and for a face without three corners or with a bad index.
     """
     positions: list[list[str]] = []
     polygons: list[list[int]] = []
@@ -58,9 +58,9 @@ def _corners(path: Path, number: int, words: list[str], vertices: int) -> list[i
 
 
 def _read_off(path: Path) -> Surface:
-    """The polygons of an OFF file as triangles; colours and normals are left alone.
+    """The polygons of an OFF file as triangles; colours and normals are ignored.
 
-    Raises MeshError for another kind of file, counts that the file does not hold and malformed lines.
+    Raises MeshError for another kind of file, for missing rows and for malformed lines.
     """
     stripped = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(text_lines(path), 1))
     lines = [(number, words) for number, words in stripped if words]
@@ -95,11 +95,11 @@ def _polygons(path: Path, rows: list[tuple[int, list[str]]]) -> list[list[int]] 
 
 
 def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | Indices, colours: Indices | None = None) -> Surface:
-    """The surface of (n, 3) vertices and polygons, given as lists of corners or as (m, 3) triangles; triangles in their order.
+    """The surface of (n, 3) vertices and polygons, given as lists of corners or as (m, 3) triangles; triangles keep their order.
 
-    colours: (m,) of the polygons, None: not known.
+    colours: (m,) colours of the polygons; None if unknown.
 
-    Raises MeshError for a coordinate that is not finite, too few corners and an index out of range.
+    Raises MeshError for a coordinate that is not finite, a polygon with too few corners, or an index out of range.
     """
     if isinstance(polygons, np.ndarray):
         return check_surface(path, vertices, polygons, colours)
@@ -123,10 +123,11 @@ def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | In
 
 
 def triangulate(points: Floats) -> Indices:
-    """(n - 2, 3) triangles over the (n, 3) corners of a polygon in space, wound like it.
+    """(n - 2, 3) triangles over the (n, 3) corners of a polygon in space, wound like the polygon.
 
-    A fan about the first corner where it turns the same way everywhere, as that of a convex polygon does. Else the triangles of
-    the polygon's projection along its normal; they keep every edge of the outline even where it touches or crosses itself.
+    A fan about the first corner if all its triangles face the same way, as those of a convex polygon do. Otherwise a
+    triangulation of the polygon's projection along its normal, which keeps every edge of the outline even if it touches or
+    crosses itself.
     """
     spokes = points[1:] - points[0]
     crosses = np.cross(spokes[:-1], spokes[1:])

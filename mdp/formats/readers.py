@@ -1,9 +1,8 @@
-"""Readers: what a file of a format prints, as its build; READERS is the family, each of which is loaded when it reads.
+"""Readers: one per file format, in READERS; a reader's module is imported when it is first used.
 
-One module a format has `read(path) -> list[Surface]`, the one of 3MF, which slicers save, `read_build(path, plate) -> Build`.
-
-The six that printers know are read by our own: trimesh reads some valid files of them as other solids (tools/RESULTS.md,
-"Which files are read?") and takes longer to import than these readers take for a model. What else it knows it reads.
+Each module has `read(path) -> list[Surface]`; the 3MF module, for files saved by slicers, has `read_build(path, plate) -> Build`.
+The six common formats have our own readers: trimesh reads some valid files as different solids (tools/RESULTS.md), and
+importing it takes longer than these readers take for a model. trimesh reads the remaining formats.
 """
 
 from collections.abc import Callable
@@ -22,7 +21,7 @@ Reader = Callable[[Path, int | None], "Build"]
 
 
 def _read(module: str, path: Path, plate: int | None) -> "Build":
-    """One object of a file that no slicer has saved, or what a plate of a slicer file prints."""
+    """A file's content as one object, or the objects on a plate of a slicer file."""
     if module == "threemf":
         from mdp.formats.threemf import read_build
 

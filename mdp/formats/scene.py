@@ -1,4 +1,4 @@
-"""Scenes: formats beyond our own readers, glTF with its buffers outside and COLLADA, by trimesh."""
+"""Scenes read by trimesh: glTF with external buffers, and COLLADA."""
 
 import json
 from pathlib import Path
@@ -15,22 +15,22 @@ from profiles.errors import MeshError
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-# Right, inwards and up of COLLADA's <up_axis>, as rows; Y_UP where none is told (COLLADA 1.4.1, 5-8).
+# Right, inwards and up for each COLLADA <up_axis>, as rows; Y_UP is the default (COLLADA 1.4.1, 5-8).
 Z_UP_OF = {
     "X_UP": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
     "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
     "Z_UP": np.eye(3),
 }
-COLLADA = "pycollada"  # which trimesh misses without a word of its name
-MM = 1000.0  # in a metre, which the <unit> of COLLADA counts in
+COLLADA = "pycollada"  # trimesh does not name it when it is missing
+MM = 1000.0  # per metre, the unit of COLLADA's <unit>
 
 
 def read(path: Path) -> list[Surface]:
-    """One surface for every mesh that the scene of a .gltf or .dae file places.
+    """One surface for every mesh in the scene of a .gltf or .dae file.
 
-    Coordinates of glTF are taken as mm with z up, as those of GLB are (mdp.formats.glb). COLLADA tells its unit and its upward
-    axis; where its unit is the metre, which it is where nothing is told, its numbers are taken as mm, and one of another size
-    is refused by name (mdp.read). Raises MeshError.
+    glTF coordinates are taken as mm with z up, like those of GLB files (mdp.formats.glb). COLLADA states its unit and up axis; if
+    its unit is the metre, which is the default, its numbers are taken as mm, and mdp.read refuses a model of implausible size.
+    Raises MeshError.
     """
     import trimesh
 
@@ -41,7 +41,7 @@ def read(path: Path) -> list[Surface]:
         raise MeshError(
             f"{path}: reading {path.suffix} files needs {error.name or COLLADA}: pip install 'tiltprint[dae]'"
         ) from None
-    except Exception as error:  # noqa: BLE001 - trimesh names no errors of its own: whatever it meets, the file is not what it says
+    except Exception as error:  # noqa: BLE001 - trimesh has no exception types of its own: any exception means an unreadable file
         raise MeshError(f"{path}: cannot be read as {path.suffix} ({type(error).__name__}: {str(error)[:200]})") from None
     if path.suffix.lower() == ".gltf":
         check_extensions(path, json.loads(path.read_bytes()))
@@ -54,13 +54,13 @@ def read(path: Path) -> list[Surface]:
 
 
 def _surface(path: Path, mesh: "Trimesh", matrix: Floats, turn: Floats) -> Surface:
-    """A mesh where its node places it, (4, 4), and then turned."""
+    """A mesh transformed by its node's matrix (4, 4), and then turned."""
     vertices = (np.asarray(mesh.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]) @ turn.T
     return check_surface(path, vertices, mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0.0 else mesh.faces)
 
 
 def _to_mm_with_z_up(path: Path) -> Floats:
-    """(3, 3) that takes the coordinates of a COLLADA document to mm with z up (its <asset>: <unit>, <up_axis>)."""
+    """(3, 3) matrix from the coordinates of a COLLADA document to mm with z up, from its <asset>: <unit>, <up_axis>."""
     asset = ElementTree.parse(path).find("{*}asset")
     unit = None if asset is None else asset.find("{*}unit")
     axis = "Y_UP" if asset is None else asset.findtext("{*}up_axis", "Y_UP").strip()

@@ -1,7 +1,7 @@
-"""Slicer file: a 3MF that a slicer has saved, and the role of each volume in it: printed, subtracted from others, or only a mark.
+"""Slicer file: a 3MF saved by a slicer, and the role of each volume in it: printed, subtracted from others, or only a mark.
 
-PrusaSlicer keeps all volumes of an object in one mesh and names their triangles in Slic3r_PE_model.config; Bambu Studio and
-OrcaSlicer have a component for each and say in model_settings.config what it is; Cura says it in the metadata of objects.
+PrusaSlicer keeps all volumes of an object in one mesh and lists their triangles in Slic3r_PE_model.config; Bambu Studio and
+OrcaSlicer have one component per volume and its role in model_settings.config; Cura puts the role into the metadata of objects.
 (PrusaSlicer, src/libslic3r/Format/3mf.cpp; BambuStudio, src/libslic3r/Format/bbs_3mf.cpp; libSavitar, SceneNode.cpp.)
 """
 
@@ -12,12 +12,14 @@ from math import isfinite, nan
 from xml.etree.ElementTree import Element
 
 from mdp.formats.surface import Surface
+from profiles.errors import counted
 
 PART, NEGATIVE, MODIFIER, SUPPORT, NO_SUPPORT = "part", "negative volume", "modifier", "support enforcer", "support blocker"
-FOR, AGAINST = 1, 2  # paints; 0: none
-CHILDREN = ((), (0.5, 0.5), (0.25, 0.25, 0.5), (0.25, 0.25, 0.25, 0.25))  # shares of the area, by how many sides are halved
-LONG = 3  # as a paint: the next digit tells which
-# Kinds that are triangles of a part, by what they are painted for and with which paint.
+FOR, AGAINST = 1, 2  # paint values; 0: unpainted
+# shares of the area, by the number of sides that are halved
+CHILDREN = ((), (0.5, 0.5), (0.25, 0.25, 0.5), (0.25, 0.25, 0.25, 0.25))
+LONG = 3  # as a paint: its value is in the next digit
+# Kinds of volume that are painted triangles of a part, by the purpose and value of the paint.
 PAINT_SUPPORT, PAINT_NO_SUPPORT, PAINT_NO_SEAM = "paint for support", "paint against support", "paint against seams"
 PAINTS = {("support", FOR): PAINT_SUPPORT, ("support", AGAINST): PAINT_NO_SUPPORT, ("seams", AGAINST): PAINT_NO_SEAM}
 VOLUME_TYPES = {  # PrusaSlicer's, then those of Bambu Studio and OrcaSlicer
@@ -32,7 +34,7 @@ VOLUME_TYPES = {  # PrusaSlicer's, then those of Bambu Studio and OrcaSlicer
     "support_enforcer": SUPPORT,
     "support_blocker": NO_SUPPORT,
 }
-CURA = "cura:"  # how the names of its settings begin in metadata
+CURA = "cura:"  # prefix of its settings in metadata
 CURA_MESHES = {
     "anti_overhang_mesh": NO_SUPPORT,
     "support_mesh": SUPPORT,
@@ -40,19 +42,19 @@ CURA_MESHES = {
     "cutting_mesh": MODIFIER,
 }
 ON = ("1", "true", "yes")
-# Keys beside the settings of an object or a volume, which say where it came from.
+# Keys among an object's or a volume's settings that only say where it came from.
 ABOUT = frozenset({"name", "matrix", "modifier", "volume_type", "part_type", "extruder_nr", "print_order", "drop_to_buildplate"})
 ABOUT_PREFIXES = ("source_", "thumbnail_", "cut_", "text_")
-# A build plate: its number, its name, and objects by their numbers, each with the number of its instance.
+# A build plate: its number, its name, and the IDs of its objects, each with an instance number.
 Plate = tuple[int, str, frozenset[tuple[str, int]]]
-# Settings between two heights above an object's lowest point, mm.
+# Settings for ranges of height above an object's lowest point, mm.
 Heights = Sequence[tuple[float, float, Mapping[str, str]]]
-ONE_EXTRUDER = {"extruder": ("0", "1")}  # which say nothing where there is one
+ONE_EXTRUDER = {"extruder": ("0", "1")}  # settings without meaning for a printer with one extruder
 
 
 @dataclass(frozen=True)
 class Role:
-    """What a volume of an object is, and its own settings under its program's names."""
+    """The kind of an object's volume, and its own settings under the names of the file's program."""
 
     kind: str = PART
     name: str = ""
@@ -61,7 +63,7 @@ class Role:
 
 @dataclass(frozen=True, eq=False)
 class BuildObject:
-    """An object on the plate: its volumes where the file has them, in mm, and the settings of them all."""
+    """An object on the plate: its volumes, mm, in the file's placement, and the settings for all of them."""
 
     volumes: Sequence[tuple[Surface, Role]]
     settings: Mapping[str, str] = field(default_factory=dict)
@@ -75,8 +77,9 @@ class BuildObject:
 
 @dataclass(frozen=True, eq=False)
 class Build:
-    """The objects that a file prints, and notes on what it holds and is left out. on_plate: its z = 0 is the build plate, below
-    which nothing is printed; plates: the names of all that hold something, by their numbers."""
+    """The objects that a file prints, and notes on what is left out. on_plate: z = 0 is the build plate, below which nothing is
+    printed; plates: the names of all plates with objects, by number.
+    """
 
     objects: Sequence[BuildObject]
     notes: Sequence[str] = ()
@@ -85,23 +88,23 @@ class Build:
 
 
 def read_prusaslicer(config: Element) -> tuple[dict[str, Role], dict[str, list[tuple[int, int, Role]]]]:
-    """The objects by their numbers, and the volumes of each: the first and the last of their triangles in the object's mesh.
+    """PrusaSlicer's objects by ID, and the volumes of each: their first and last triangle in the object's mesh.
 
-    Raises ValueError where the number of a triangle is no number.
+    Raises ValueError if a triangle number is not a number.
     """
     objects, triangles = dict[str, Role](), dict[str, list[tuple[int, int, Role]]]()
     for element in config.iter("object"):
         number = element.get("id", "")
         objects[number] = _role(element)
         triangles[number] = [
-            (_whole("firstid", volume.get("firstid")), _whole("lastid", volume.get("lastid")), _role(volume))
+            (_integer("firstid", volume.get("firstid")), _integer("lastid", volume.get("lastid")), _role(volume))
             for volume in element.findall("volume")
         ]
     return objects, triangles
 
 
 def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], Role], list[Plate]]:
-    """The objects by their numbers, parts by the numbers of an object and its component, and the plates.
+    """Bambu Studio's objects by ID, its parts by the IDs of object and component, and its plates.
 
     Raises ValueError for text that is not a number.
     """
@@ -116,14 +119,14 @@ def read_bambu(config: Element) -> tuple[dict[str, Role], dict[tuple[str, str], 
         values = _values(element)
         instances = [_values(instance) for instance in element.findall("model_instance")]
         standing = frozenset(
-            (instance.get("object_id", ""), _whole("instance_id", instance.get("instance_id", "0"))) for instance in instances
+            (instance.get("object_id", ""), _integer("instance_id", instance.get("instance_id", "0"))) for instance in instances
         )
-        plates.append((_whole("plater_id", values.get("plater_id", str(place))), values.get("plater_name", ""), standing))
+        plates.append((_integer("plater_id", values.get("plater_id", str(place))), values.get("plater_name", ""), standing))
     return objects, parts, plates
 
 
 def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[str, str]]]]:
-    """Settings by heights, by the place of the object among all (PrusaSlicer: that have a mesh themselves), from 1.
+    """Settings of height ranges, by the object's position among all objects (PrusaSlicer: among those with a mesh), from 1.
 
     Raises ValueError for a height that is not a finite number.
     """
@@ -136,7 +139,7 @@ def read_heights(config: Element) -> dict[str, list[tuple[float, float, Mapping[
     return heights
 
 
-def _whole(name: str, text: str | None) -> int:
+def _integer(name: str, text: str | None) -> int:
     if text is None or not text.strip().isascii() or not text.strip().removeprefix("-").isdigit():
         raise ValueError(f"{name} is {text!r}: a whole number is expected")
     return int(text)
@@ -154,7 +157,7 @@ def _height_mm(between: Element, name: str) -> float:
 
 
 def read_cura(element: Element) -> Role:
-    """What Cura says of an object of the model, by its metadata or, in older files, its settings."""
+    """The role that Cura gives an object, from its metadata or, in older files, from its settings."""
     values = {child.get("setting_key", ""): child.text or "" for child in element.findall("{*}settings/{*}setting")}
     for child in element.findall("{*}metadatagroup/{*}metadata"):
         name = child.get("name", "")
@@ -171,7 +174,7 @@ def _values(element: Element) -> dict[str, str]:
 
 
 def _role(element: Element) -> Role:
-    """What an object, a volume or a part of a config is."""
+    """The role of an object, a volume or a part, from its element in a config."""
     values = _values(element)
     kind_name = element.get("subtype") or values.get("volume_type") or values.get("part_type", "")
     if kind_name and kind_name not in VOLUME_TYPES:
@@ -190,14 +193,14 @@ def _settings(values: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-@lru_cache(maxsize=4096)  # most triangles are painted whole
+@lru_cache(maxsize=4096)  # most triangles have one paint
 def painted_shares(digits: str) -> Mapping[int, float]:
-    """The share of a triangle's area by its paint, where a brush covers it in part.
+    """Shares of a triangle's area by paint value, for a triangle that a brush covers in part.
 
-    Hexadecimal digits, read from the last, walk a tree of triangles. A digit's lower two bits tell how many sides are halved.
-    Where none is, its upper two bits are the paint, and 3 there adds 3 to the next digit. Children follow, the last one first
-    (PrusaSlicer, src/libslic3r/TriangleSelector.cpp, Model.cpp: FacetsAnnotation). Raises ValueError for digits that are no such
-    tree.
+    Hexadecimal digits, read from the last, walk a tree of triangles. A digit's lower two bits give the number of halved sides. If
+    none is halved, the upper two bits are the paint, where 3 means 3 plus the next digit. Children follow, last one first
+    (PrusaSlicer, src/libslic3r/TriangleSelector.cpp, Model.cpp: FacetsAnnotation). Raises ValueError for digits that do not form
+    such a tree.
     """
     shares, pending, codes = dict[int, float](), [1.0], [int(digit, 16) for digit in digits]
     while pending:
@@ -209,12 +212,12 @@ def painted_shares(digits: str) -> Mapping[int, float]:
             paint = LONG + _next(codes) if paint == LONG else paint
             shares[paint] = shares.get(paint, 0.0) + share
     if codes:
-        raise ValueError(f"{len(codes)} of the digits belong to nothing")
+        raise ValueError(f"{counted(len(codes), 'digit')} left over")
     return shares
 
 
 def _next(codes: list[int]) -> int:
-    """The last of the digits that are left."""
+    """Remove and return the last remaining digit."""
     if not codes:
         raise ValueError("digits are missing")
     return codes.pop()

@@ -1,4 +1,4 @@
-"""Surface: triangles as a file gives them, with indices and coordinates checked and nothing else promised."""
+"""Surface: triangles as read from a file, with indices and coordinates checked and no other guarantees."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,18 +11,19 @@ import numpy as np
 from mdp.mesh import NO_COLOUR, Floats, Indices
 from profiles.errors import MeshError
 
-# What a file may place by reference: doubled at every level, a small file would place more than any memory holds.
+# Limits of what a file may place by reference: a small file whose references double at every level would exceed any memory.
 MOST_PLACED = 20_000  # objects, components and nodes
-MOST_PLACED_MESHES = 2_000  # those of them that are meshes, which are united where they touch
-MOST_PLACED_FACES = 20_000_000  # as many as the largest file of facets holds (mdp.read.MOST_BYTES)
+MOST_PLACED_MESHES = 2_000  # of them, which are united where they touch
+MOST_PLACED_FACES = 20_000_000  # as many as the largest STL file holds (mdp.read.MOST_BYTES)
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """vertices: (n, 3) float64 in the file's coordinates; faces: (m, 3) int64, as wound in the file, maybe open or crossing;
-    colours: (m,) what the file paints each face with, NO_COLOUR: nothing; None: it paints none, or they are not known; name:
-    of the part that it is or begins, "": none; gap: how far two faces may lie apart along an edge that they share; notes: what
-    the reader has left out, in sentences."""
+    """Triangles as read from a file. vertices: (n, 3) float64 in the file's coordinates; faces: (m, 3) int64, wound as in the
+    file, possibly open or intersecting; colours: (m,) colour of each face, NO_COLOUR if unpainted, None if there are no colours
+    or they are unknown; name: of the part that this surface is or begins, "" if unnamed; gap: greatest distance between the edges
+    of adjoining faces; notes: sentences on what the reader has left out.
+    """
 
     vertices: Floats
     faces: Indices
@@ -33,8 +34,9 @@ class Surface:
 
 
 def text_lines(path: Path, continued: str = "") -> list[str]:
-    """The lines of a text file, whatever ends them; one that ends with `continued` goes on in the next. Its bytes stand for
-    themselves: 0x85, which str.splitlines takes for an end of line, is an ellipsis or half of a letter in a comment."""
+    """The lines of a text file with any line endings; a line that ends with `continued` continues in the next. Bytes map to
+    themselves: 0x85, a line end for str.splitlines, may be an ellipsis or half a letter in a comment.
+    """
     text = path.read_text("latin-1")
     return (text.replace(f"{continued}\n", " ") if continued else text).split("\n")
 
@@ -42,7 +44,7 @@ def text_lines(path: Path, continued: str = "") -> list[str]:
 def check_surface(path: Path, vertices: Any, faces: Any, colours: Indices | None = None) -> Surface:
     """A surface with finite coordinates and indices in range.
 
-    Raises MeshError for no faces, a coordinate that is not a number and an index out of range.
+    Raises MeshError if there are no faces, if a coordinate is not finite, or if an index is out of range.
     """
     with np.errstate(invalid="ignore"):  # a signalling NaN of the file is reported below
         positions = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
@@ -61,7 +63,7 @@ def check_surface(path: Path, vertices: Any, faces: Any, colours: Indices | None
 
 
 def check_vertices(path: Path, vertices: Floats) -> None:
-    """Raises MeshError when a coordinate of (n, 3) vertices is not a finite number."""
+    """Raises MeshError if a coordinate of (n, 3) vertices is not a finite number."""
     finite = np.atleast_1d(np.isfinite(vertices).all(axis=1))
     if not finite.all():
         worst = int(np.flatnonzero(~finite)[0])
@@ -69,7 +71,7 @@ def check_vertices(path: Path, vertices: Floats) -> None:
 
 
 def parse_floats(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) -> Floats:
-    """The words of all rows as flat float64; raises MeshError when one is not a number."""
+    """The words of all rows as flat float64; raises MeshError if one is not a number."""
     try:
         return np.fromiter(map(float, chain.from_iterable(rows)), np.float64)
     except ValueError as error:
@@ -77,7 +79,7 @@ def parse_floats(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) -
 
 
 def parse_integers(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) -> Indices:
-    """The words of all rows as flat int64; raises MeshError when one is not a whole number."""
+    """The words of all rows as flat int64; raises MeshError if one is not a whole number."""
     try:
         return np.fromiter(map(int, chain.from_iterable(rows)), np.int64)
     except (ValueError, OverflowError) as error:
@@ -85,7 +87,7 @@ def parse_integers(path: Path, rows: Iterable[Iterable[str | bytes]], what: str)
 
 
 def concatenate(pieces: list[Surface]) -> Surface:
-    """The surfaces as one, each with its own vertices."""
+    """Several surfaces as one, each with its own vertices."""
     if len(pieces) == 1:
         return pieces[0]
     shifts = np.cumsum([0] + [len(piece.vertices) for piece in pieces[:-1]])
@@ -99,12 +101,12 @@ def concatenate(pieces: list[Surface]) -> Surface:
 
 
 def check_placed(path: Path, placed: int) -> None:
-    """Raises MeshError when a file places more objects than a program can follow."""
+    """Raises MeshError if a file places too many objects by reference."""
     if placed > MOST_PLACED:
         raise MeshError(f"{path}: places more than {MOST_PLACED} objects by reference")
 
 
 def check_meshes(path: Path, meshes: int, faces: int) -> None:
-    """Raises MeshError when a file places more meshes, or more faces with them, than a program can hold."""
+    """Raises MeshError if a file places too many meshes or faces by reference."""
     if meshes > MOST_PLACED_MESHES or faces > MOST_PLACED_FACES:
         raise MeshError(f"{path}: places more than {MOST_PLACED_MESHES} meshes or {MOST_PLACED_FACES} faces by reference")

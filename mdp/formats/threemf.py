@@ -1,5 +1,6 @@
 """3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3), the colours
-of their triangles (Materials and Properties Extension 1.2), and the roles that a slicer gives to volumes."""
+of their triangles (Materials and Properties Extension 1.2), and the roles of volumes in slicer files.
+"""
 
 import re
 from collections import Counter
@@ -39,15 +40,15 @@ PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
 PRODUCTION_PATH = f"{{{PRODUCTION}}}path"
 RELATION = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
-EXTENSION = re.compile(r"3dmanufacturing/([a-z]+)/\d{4}")  # its name in its namespace
-EXTENSIONS = {"core", "production", "material", "trianglesets"}  # that change no shape beyond what is read here
+EXTENSION = re.compile(r"3dmanufacturing/([a-z]+)/\d{4}")  # an extension's name in its namespace
+EXTENSIONS = {"core", "production", "material", "trianglesets"}  # those that do not change the geometry beyond what is read here
 PLAIN = "the program that made the file can export plain triangles"
 GCODE_ONLY = "nothing but G-code of a sliced plate: save the project in its slicer (File, Save Project) instead"
 NOT_PRINTED = ("support", "solidsupport", "other")  # types of objects
 PRUSASLICER = ("metadata/slic3r_pe_model.config", "metadata/slic3r_model.config", "metadata/superslicer_model.config")
 BAMBU = "metadata/model_settings.config"
 HEIGHTS = ("metadata/prusa_slicer_layer_config_ranges.xml", "metadata/layer_config_ranges.xml")
-NOT_TAKEN = {  # parts of a package, and what they would change
+NOT_TAKEN = {  # parts of a package that are ignored, and what they would change
     **dict.fromkeys(
         ("metadata/slic3r_pe_layer_heights_profile.txt", "metadata/layer_heights_profile.txt"),
         f"its variable layer heights are not taken: {key_name('process.adaptive_cusp_mm')}",
@@ -58,22 +59,23 @@ NOT_TAKEN = {  # parts of a package, and what they would change
     ),
 }
 TAKEN_PAINT = "paints for and against support and against seams"
-PAINTED = {  # attributes of triangles, and what they would change
+PAINTED = {  # attributes of painted triangles, by what they would change
     "support": ("paint_supports", "slic3rpe:custom_supports"),
     "seams": ("paint_seam", "slic3rpe:custom_seam"),
     "filaments": ("paint_color", "slic3rpe:mmu_segmentation"),
     "fuzzy skin": ("paint_fuzzy_skin", "slic3rpe:fuzzy_skin"),
 }
-LARGEST_MODEL_BYTES = 2**30  # a zip of a few kB can unpack to more than any memory
-MOST_ELEMENTS = 12_000_000  # each element takes 80 bytes of memory and more; eight million triangles are below
-DEEPEST = 32  # components within components; a ring of them would never end
+LARGEST_MODEL_BYTES = 2**30  # a zip of a few kB can unpack to more than any memory holds
+MOST_ELEMENTS = 12_000_000  # an element takes 80 bytes of memory or more; eight million triangles stay below this
+DEEPEST = 32  # nesting of components; a ring of them would never end
 _IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
 _Read = TypeVar("_Read")
 
 
 class Model(NamedTuple):
-    """A model part of the package: its root element, its objects by their numbers, the colours of its groups of colours or of
-    materials, what its triangles are painted for, and the surfaces made of them so far."""
+    """A model part of the package: its root element, its objects by ID, the colours of its colour groups or base materials, the
+    purposes of its paint, and the surfaces parsed so far.
+    """
 
     root: ElementTree.Element
     objects: dict[str, ElementTree.Element]
@@ -83,8 +85,9 @@ class Model(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """An object of a model part that a build item or a component places; a point p lies at [p 1] @ transform. within: the numbers
-    of the objects that it is a component of, the item's own first; role: what these say that it is; None: nothing."""
+    """An object placed by a build item or a component; a point p lies at [p 1] @ transform. within: IDs of the enclosing objects,
+    outermost first; role: role given by them, None if none is given.
+    """
 
     part: str
     identity: str
@@ -94,10 +97,10 @@ class Placement(NamedTuple):
 
 
 def read_build(path: Path, plate: int | None = None) -> Build:
-    """The objects that the build prints on one plate; None: the first that holds something.
+    """The objects that the build prints on one plate; None: the first plate with objects.
 
-    Raises MeshError for a damaged package, an unknown unit, an object or a plate that does not exist, indices out of range and
-    extensions that are needed and not read.
+    Raises MeshError for a damaged package, an unknown unit, a missing object or plate, an index out of range, and a required
+    extension that is not supported.
     """
     try:
         archive = ZipFile(path)
@@ -108,7 +111,7 @@ def read_build(path: Path, plate: int | None = None) -> Build:
 
 
 class _Builder:
-    """The build of a package."""
+    """Builder: reads the build of an open package."""
 
     def __init__(self, path: Path, archive: ZipFile) -> None:
         self._path, self._archive = path, archive
@@ -130,7 +133,7 @@ class _Builder:
         self._rank = {element.get("id", ""): str(place) for place, element in enumerate(objects, start=1)}
 
     def build(self, plate: int | None) -> Build:
-        """What is printed on a plate."""
+        """The objects printed on a plate, with notes."""
         notes = self._notes
         items = self._model(self._start).root.findall("{*}build/{*}item")
         counts: Counter[str] = Counter()
@@ -163,7 +166,7 @@ class _Builder:
     def _items(
         self, items: list[ElementTree.Element], instances: list[tuple[str, int]], chosen: Plate | None
     ) -> Iterator[ElementTree.Element]:
-        """The items that are printed on a plate; None: there are no plates."""
+        """The items printed on a plate; None for a file without plates."""
         for item, instance in zip(items, instances, strict=True):
             if not _is_printed(item):
                 self._leave_out(item.get("objectid", ""), "which is switched off in its slicer")
@@ -173,7 +176,7 @@ class _Builder:
                 self._leave_out(item.get("objectid", ""), "which stands on none of its plates")
 
     def _plate(self, plates: list[Plate], wanted: int | None) -> Plate | None:
-        """The plate with a number, or the first one, among plates that hold something to print; None without plates."""
+        """The plate with a number, or else the first one, among plates with printed objects; None for a file without plates."""
         if wanted is None:
             if len(plates) > 1:
                 first, name, _ = plates[0]
@@ -197,14 +200,14 @@ class _Builder:
         )
 
     def _model(self, name: str) -> Model:
-        """A model part, parsed once. Raises MeshError."""
+        """A model part of the package, parsed once. Raises MeshError."""
         name = name.lstrip("/")
         if name not in self._models:
             self._models[name] = _model(self._archive, name)
         return self._models[name]
 
     def _object(self, item: ElementTree.Element) -> BuildObject | None:
-        """What an item places; None: nothing."""
+        """The object that an item places; None if nothing of it is printed."""
         volumes: list[tuple[Surface, Role]] = []
         settings: Mapping[str, str] = {}
         heights: Heights = ()
@@ -237,7 +240,7 @@ class _Builder:
         return BuildObject(volumes, settings, heights, name) if volumes else None
 
     def _with_role(self, placement: Placement, element: ElementTree.Element) -> Placement:
-        """The placement with the role that the slicer gives its object."""
+        """The placement with the role that the slicer gives to its object."""
         within, parts = placement.within, self._parts
         role = parts.get(((*within, placement.identity)[0], placement.identity))
         cura = read_cura(element)
@@ -248,7 +251,7 @@ class _Builder:
         return placement if role is None else placement._replace(role=role)
 
     def _volumes(self, placement: Placement, model: Model, mesh: ElementTree.Element, pid: str) -> Iterator[tuple[Surface, Role]]:
-        """The volumes of an object's mesh where a placement has them."""
+        """The volumes of an object's mesh, at a placement."""
         if placement.identity not in model.surfaces:
             model.surfaces[placement.identity] = _mesh_surface(self._path, mesh, pid, model.palettes)
         surface = model.surfaces[placement.identity]
@@ -273,7 +276,7 @@ class _Builder:
             yield _piece(surface, np.flatnonzero(rest)), Role()
 
     def _painted(self, surface: Surface, mesh: ElementTree.Element, painted: Sequence[str]) -> Iterator[tuple[Surface, Role]]:
-        """The triangles of a mesh that are painted on more than half for something that is known here; others are counted."""
+        """The painted triangles of a mesh: those with a supported paint on more than half of their area; others are counted."""
         triangles = mesh.findall("{*}triangles/{*}triangle") if painted else []
         for what in painted:
             chosen: dict[str, list[int]] = {}
@@ -288,14 +291,14 @@ class _Builder:
                     yield _piece(surface, np.array(numbers)), Role(kind)
 
     def _check_understood(self, element: ElementTree.Element, has_components: bool) -> None:
-        """Raise MeshError for an object whose shape is told in a way that is not read."""
+        """Raise MeshError for an object whose shape is given in an unsupported form."""
         names = [child.tag.rpartition("}")[2] for child in element]
         others = [name for name in names if name not in ("components", "metadatagroup", "settings")]
         if others and not has_components:
             raise MeshError(f"{self._path}: object {element.get('id')!r} is a {others[0][:40]}, which is not read: {PLAIN}")
 
     def _placement(self, element: ElementTree.Element, outer: Placement) -> Placement:
-        """What an item or a component of a placed object places."""
+        """The placement of the object that an item or a component of a placed object refers to."""
         transform = np.column_stack([_transform(self._path, element), [0, 0, 0, 1]]) @ outer.transform
         within = (*outer.within, outer.identity) if outer.identity else ()
         return Placement(element.get(PRODUCTION_PATH, outer.part), element.get("objectid", ""), transform, within, outer.role)
@@ -307,7 +310,7 @@ class _Builder:
 
 
 def _paint(what: str, digits: str) -> str:
-    """The kind of paint on more than half of a triangle; empty where there is none that is known here."""
+    """The kind of paint on more than half of a triangle; empty if there is no supported kind."""
     try:
         shares = painted_shares(digits) if what in ("support", "seams") else {}
     except ValueError:
@@ -328,13 +331,13 @@ def _is_printed(item: ElementTree.Element) -> bool:
 
 
 def _entry(archive: ZipFile, name: str) -> str | None:
-    """The entry that holds a part, whose names know no case (Open Packaging Conventions, 6.2.2.3); None: there is none."""
+    """The zip entry of a part, whose name is case-insensitive (Open Packaging Conventions, 6.2.2.3); None if there is none."""
     wanted, entries = unquote(name).lstrip("/"), archive.namelist()
     return wanted if wanted in entries else next((name for name in entries if name.lower() == wanted.lower()), None)
 
 
 def _content(archive: ZipFile, name: str) -> bytes:
-    """The bytes of a part; raises MeshError when it is missing or too large."""
+    """The bytes of a part; raises MeshError if it is missing or too large."""
     try:
         entry = _entry(archive, name)
         if entry is None:
@@ -350,7 +353,7 @@ def _content(archive: ZipFile, name: str) -> bytes:
 
 
 def _parse(archive: ZipFile, name: str, content: bytes) -> ElementTree.Element:
-    """The root element of a part; raises MeshError when it is malformed."""
+    """The root element of a part; raises MeshError if it is malformed."""
     try:
         return _tree(content)
     except (LookupError, ValueError, ElementTree.ParseError) as error:
@@ -362,7 +365,9 @@ def _damaged(archive: ZipFile, name: str, error: Exception) -> MeshError:
 
 
 def _config(archive: ZipFile, names: tuple[str, ...], read: Callable[[ElementTree.Element], _Read]) -> _Read | None:
-    """What the first of some parts holds that the package has; None: it has none. Raises MeshError."""
+    """The content of the first of some parts that the package has, as `read` returns it; None if it has none. Raises
+    MeshError.
+    """
     name = next((name for name in names if _entry(archive, name) is not None), None)
     if name is None:
         return None
@@ -374,11 +379,11 @@ def _config(archive: ZipFile, names: tuple[str, ...], read: Callable[[ElementTre
 
 
 def _model(archive: ZipFile, name: str) -> Model:
-    """A model part. Raises MeshError, also for what it needs and is not read."""
+    """A parsed model part. Raises MeshError, also for a required extension that is not supported."""
     content = _content(archive, name)
     root = _parse(archive, name, content)
     if root.tag.rpartition("}")[2] != "model":
-        raise MeshError(f"{archive.filename}: its part {name} is no 3MF model: its first element is {root.tag[:60]!r}")
+        raise MeshError(f"{archive.filename}: its part {name} is not a 3MF model: its first element is {root.tag[:60]!r}")
     for prefix in root.get("requiredextensions", "").split():
         declared = re.search(rb"xmlns:%s\s*=\s*[\"']([^\"']*)" % re.escape(prefix.encode()), content)
         namespace = declared[1].decode(errors="replace") if declared else prefix
@@ -394,7 +399,7 @@ def _model(archive: ZipFile, name: str) -> Model:
 
 
 def _tree(content: bytes) -> ElementTree.Element:
-    """The root element of a document, prefixes that it forgets to declare included."""
+    """The root element of a document, tolerating undeclared prefixes."""
     try:
         return ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
@@ -409,7 +414,7 @@ def _tree(content: bytes) -> ElementTree.Element:
 
 
 def _start_part(archive: ZipFile) -> str:
-    """Name of the part that the package's relationships call the 3D model."""
+    """Name of the package's 3D model part, by its relationships."""
     name = "_rels/.rels"
     for relation in _parse(archive, name, _content(archive, name)).iter(RELATION):
         if relation.get("Type") == MODEL_TYPE:
@@ -418,7 +423,7 @@ def _start_part(archive: ZipFile) -> str:
 
 
 def _piece(surface: Surface, chosen: slice | Indices) -> Surface:
-    """Some faces of a surface, with the vertices that they use."""
+    """A subset of a surface's faces, with the vertices that they use."""
     vertices, faces = np.unique(surface.faces[chosen], return_inverse=True)
     colours = None if surface.colours is None else surface.colours[chosen]
     return Surface(surface.vertices[vertices], faces.reshape(-1, 3), colours)
@@ -432,7 +437,7 @@ def _unit_mm(path: Path, root: ElementTree.Element) -> float:
 
 
 def _palettes(root: ElementTree.Element) -> dict[str, list[int]]:
-    """The colours of every group of colours or of materials, by its number; NO_COLOUR for one that is not understood."""
+    """The colours of every colour group or base material, by ID; NO_COLOUR for an invalid colour."""
     palettes = {}
     for kind, entry, attribute in (("{*}basematerials", "{*}base", "displaycolor"), (*COLOUR_GROUP, "color")):
         for group in root.findall(f"{{*}}resources/{kind}"):
@@ -442,8 +447,9 @@ def _palettes(root: ElementTree.Element) -> dict[str, list[int]]:
 
 
 def _triangle_colours(triangles: list[ElementTree.Element], pid: str, palettes: dict[str, list[int]]) -> Indices | None:
-    """(m,) colours of the triangles that name one for themselves, the same at all corners; None where none does. pid: the
-    object's group, which a triangle may leave out; the object's own colour marks nothing."""
+    """(m,) colours of the triangles that have one of their own, equal at all corners; None if there are none. pid: the object's
+    colour group, which triangles inherit; the object's own colour marks nothing.
+    """
 
     def colour_of(triangle: ElementTree.Element) -> int:
         first = triangle.get("p1", "")
@@ -458,7 +464,7 @@ def _triangle_colours(triangles: list[ElementTree.Element], pid: str, palettes: 
 
 
 def _mesh_surface(path: Path, mesh: ElementTree.Element, pid: str, palettes: dict[str, list[int]]) -> Surface:
-    """The surface of an object's mesh. pid: the object's group of colours, palettes: all groups."""
+    """The surface of an object's mesh. pid: the object's colour group; palettes: all colour groups."""
     if mesh.find("{*}beamlattice") is not None:
         raise MeshError(f"{path}: its mesh is a lattice of beams, which is not read: {PLAIN}")
     points = [(v.get("x", ""), v.get("y", ""), v.get("z", "")) for v in mesh.findall("{*}vertices/{*}vertex")]
@@ -478,7 +484,7 @@ def _transformed(path: Path, surface: Surface, transform: Floats, unit_mm: float
 
 
 def _transform(path: Path, element: ElementTree.Element) -> Floats:
-    """(4, 3): rows of the 3 x 3 part, then the shift, as the specification writes them."""
+    """(4, 3) transform of an element: the rows of its 3 x 3 part, then the shift, as the specification writes them."""
     text = element.get("transform")
     if text is None:
         return _IDENTITY

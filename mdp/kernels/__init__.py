@@ -1,1 +1,1 @@
-"""Kernels: functions compiled by numba, the arrays they need, where they are cached; threads and processes that run them."""
+"""Kernels: functions compiled by numba, their arrays and cache, and the threads and processes that run them."""

@@ -1,4 +1,4 @@
-"""Arrays: new arrays inside kernels, each kind compiled once, and products of many vectors with one."""
+"""Arrays: new arrays inside kernels, each kind compiled once, and products of many vectors with one vector."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 
 @helper
 def ints(size: int, value: int) -> NDArray[np.int32]:
-    """(size,) whole numbers, all of one value."""
+    """(size,) int32 array filled with one value."""
     array = np.empty(size, np.int32)
     for k in range(size):
         array[k] = value
@@ -19,7 +19,7 @@ def ints(size: int, value: int) -> NDArray[np.int32]:
 
 @helper
 def floats(size: int, value: float) -> Floats:
-    """(size,) numbers, all of one value."""
+    """(size,) float64 array filled with one value."""
     array = np.empty(size, np.float64)
     for k in range(size):
         array[k] = value
@@ -38,7 +38,7 @@ def table(rows: int, columns: int) -> Floats:
 
 @helper
 def int_table(rows: int, columns: int) -> NDArray[np.int32]:
-    """(rows, columns) whole numbers, zeros."""
+    """(rows, columns) int32 zeros."""
     array = np.empty((rows, columns), np.int32)
     for row in range(rows):
         for column in range(columns):
@@ -48,7 +48,7 @@ def int_table(rows: int, columns: int) -> NDArray[np.int32]:
 
 @helper
 def longs(size: int, value: int) -> NDArray[np.int64]:
-    """(size,) whole numbers of 64 bits, all of one value."""
+    """(size,) int64 array filled with one value."""
     array = np.empty(size, np.int64)
     for k in range(size):
         array[k] = value
@@ -66,7 +66,7 @@ def flags(size: int) -> NDArray[np.bool_]:
 
 @no_nrt
 def dot(x: Floats, y: Floats, z: Floats, d: Floats, out: Floats) -> None:
-    """Products of (n,) vectors given by their coordinates with one vector."""
+    """Dot products of (n,) vectors, given by their coordinates, with one vector, written into `out`."""
     d0, d1, d2 = d[0], d[1], d[2]
     for k in range(len(out)):
         out[k] = x[k] * d0 + y[k] * d1 + z[k] * d2

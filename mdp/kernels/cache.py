@@ -1,14 +1,16 @@
-"""Cache: where compiled kernels are kept, in a folder a source file: those shipped with the program and those compiled here.
+"""Cache of compiled kernels, one folder per source file: those shipped with the program and those compiled here.
 
-A folder's name tells all that its kernels depend on, so a match is always valid: the text of the file and of those that its
-helpers and constants come from (numba looks at the file alone), and the target. Where the program is installed does not matter.
+A folder's name is a hash of everything that its kernels depend on, so a match is always valid: the text of the file and of the
+files that its helpers and constants come from (numba checks the file alone), and the target. Where the program is installed does
+not matter.
 
-The target is one processor for all machines of a kind, so that compiled kernels can be shipped. x86-64-v3 is what processors of
-PCs have since 2013 (Intel) and 2015 (AMD); older ones and other kinds compile for themselves. NUMBA_CPU_NAME names another one.
+The target is one processor model for all machines of a kind, so that compiled kernels can be shipped. x86-64-v3 is what
+processors of PCs have since 2013 (Intel) and 2015 (AMD); older ones and other kinds compile for themselves. NUMBA_CPU_NAME names
+another one.
 
-Machine code is loaded without what numba prepares for compiling. Whenever numba loads it, it imports everything that it can
-compile, compiles its runtime, parses the kernel's LLVM code and lists its symbols: .4 s for the 58 kernels of an export, and
-28 MB of LLVM. That waits until a kernel is compiled, which most runs never do.
+Machine code is loaded without numba's preparations for compiling. Whenever numba loads it, it imports everything that it can
+compile, compiles its runtime, parses the kernel's LLVM code and lists its symbols: .4 s for the 58 kernels of an export, and 28
+MB of LLVM. That waits until a kernel is compiled, which most runs never do.
 """
 
 import os
@@ -39,8 +41,8 @@ PACKAGES = Path(__file__).resolve().parents[2]
 SHIPPED = Path(__file__).resolve().parent / "compiled"  # made by tools/ship_kernels.py; not there in a checkout
 IMPORTED = re.compile(rb"^from ((?:profiles|mdp|slicer|machine)(?:\.\w+)+) import", re.MULTILINE)
 HAS_KERNELS = b"from mdp.kernels.kernel import"
-UNREADABLE = (OSError, EOFError, ValueError, UnpicklingError)  # what a file raises that may not be read or is cut short
-UNUSED_S = 60 * 86400.0  # folders of older versions go after this time: a program that still runs may be using them
+UNREADABLE = (OSError, EOFError, ValueError, UnpicklingError)  # raised for a file that is unreadable or cut short
+UNUSED_S = 60 * 86400.0  # folders of older versions are removed after this time: a running program may still use them
 
 COMMON = "x86-64-v3"
 INSTRUCTIONS = {
@@ -53,20 +55,21 @@ _troubles: list[str] = []
 
 
 def _choose() -> None:
-    """Have numba compile for the common target where this processor can run it, unless the environment names another."""
+    """Make numba compile for the common target if this processor can run it, unless the environment names another."""
     try:
         known = binding.get_host_cpu_features()
-    except RuntimeError:  # a kind of processor that LLVM cannot tell anything of
+    except RuntimeError:  # a kind of processor unknown to LLVM
         return
     named = {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"} & os.environ.keys()
-    in_use = "_toplevel_target_context" in vars(cpu_target)  # somebody else has kernels in this process
+    in_use = "_toplevel_target_context" in vars(cpu_target)  # other code has kernels in this process
     if not named and not in_use and all(known.get(name) for name in INSTRUCTIONS):
-        os.environ.update(NUMBA_CPU_NAME=COMMON, NUMBA_CPU_FEATURES="")  # numba reads them again whenever one has changed
+        # numba reads the variables again when one of them changes
+        os.environ.update(NUMBA_CPU_NAME=COMMON, NUMBA_CPU_FEATURES="")
         config.reload_config()
 
 
 _choose()
-# What machine code depends on beside its sources.
+# Everything that machine code depends on besides its sources.
 TARGET = " ".join(
     [
         f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')} numba {numba.__version__} llvmlite {llvmlite.__version__}",
@@ -76,7 +79,7 @@ TARGET = " ".join(
 
 
 def home() -> Path:
-    """The folder of the kernels compiled here: what NUMBA_CACHE_DIR names, else the user's cache folder."""
+    """The folder of the kernels compiled here: NUMBA_CACHE_DIR if set, else the user's cache folder."""
     named = os.environ.get("NUMBA_CACHE_DIR")
     if named:
         return Path(named)
@@ -87,13 +90,13 @@ def home() -> Path:
 
 
 def trouble() -> str:
-    """Why what was compiled is lost, "" where it is not."""
+    """Why compiled kernels will be lost at the end of the process; "" if they are cached."""
     return _troubles[0] if _troubles else ""
 
 
 @contextmanager
 def _writing() -> Iterator[None]:
-    """Write to the folder of the kernels compiled here; note why what is written is not there for the next run."""
+    """Context for writing to the folder of the kernels compiled here; records why the next run will not find what is written."""
     try:
         yield
     except OSError as error:
@@ -108,7 +111,9 @@ def _text(file: Path) -> bytes:
 
 
 def sources(file: Path) -> list[Path]:
-    """The files that make a file's kernels: it, those it imports from, and those that kernels among these import from."""
+    """The files from which a file's kernels are compiled: the file, the files it imports from, and the files that kernels among
+    these import from.
+    """
     files, unread = {file}, [file]
     while unread:
         for module in IMPORTED.findall(_text(unread.pop())):
@@ -122,7 +127,7 @@ def sources(file: Path) -> list[Path]:
 
 @cache
 def folder_name(file: Path) -> str:
-    """The name of the folder of a file's kernels; another one whenever they would be compiled to something else."""
+    """The name of the folder of a file's kernels; a different one whenever they would compile to something else."""
     whole = sha256(TARGET.encode())
     for source in sources(file):
         whole.update(f"{os.path.relpath(source, PACKAGES)}\n".replace(os.sep, "/").encode() + sha256(_text(source)).digest())
@@ -130,10 +135,10 @@ def folder_name(file: Path) -> str:
 
 
 class _Entries(CompileResultCacheImpl):
-    """numba's entries of a kernel, and the locator that says where they are: in our folder and no other.
+    """numba's cache entries of a kernel, with a locator for our folder alone.
 
-    Where NUMBA_CACHE_LOCATOR_CLASSES points it knows no sources; the stamp of a source needs to tell nothing that the folder's
-    name does not.
+    NUMBA_CACHE_LOCATOR_CLASSES would point to places without our source hashes; the stamp of a source needs no more than the
+    folder's name.
     """
 
     def __init__(self, function: Any) -> None:
@@ -151,14 +156,16 @@ class _Entries(CompileResultCacheImpl):
         return self._path.name
 
     def ensure_cache_path(self) -> None:
-        """Make the folder; those of older versions go when they are old."""
+        """Create the folder, and remove those of older versions when they are old."""
         if not self._path.exists():
             _clear(self._path.parent, f"{self._path.name.rpartition('-')[0]}-*")
         self._path.mkdir(parents=True, exist_ok=True)
 
 
 class LoadedLibrary(JITCodeLibrary):
-    """A library of machine code; one that comes from the cache parses its LLVM code when another kernel is compiled with it."""
+    """A library of machine code; one that comes from the cache parses its LLVM code only when another kernel is compiled with
+    it.
+    """
 
     _bitcode = b""
     _shared_module: Any
@@ -189,7 +196,7 @@ class LoadedLibrary(JITCodeLibrary):
 
 
 def prepare_loading(context: Any) -> None:
-    """What numba's target context needs before it loads machine code, which calls the functions of numba's runtime by name."""
+    """Prepare numba's target context for loading machine code, which calls the functions of numba's runtime by name."""
     if context.codegen()._library_class is not LoadedLibrary:
         for name, address in _nrt_python.c_helpers.items():
             binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
@@ -197,7 +204,9 @@ def prepare_loading(context: Any) -> None:
 
 
 class KernelCache(FunctionCache):
-    """The cache of one kernel: what was shipped, else what was compiled here; what cannot be kept is used all the same."""
+    """The cache of one kernel: first the shipped code, then code compiled here; a kernel that cannot be cached is used all the
+    same.
+    """
 
     _impl_class = _Entries
 
@@ -224,17 +233,17 @@ class KernelCache(FunctionCache):
 
 
 def mark(purpose: str) -> Path:
-    """The file that, where it exists, says that the loaded modules' kernels for a purpose are all cached."""
+    """Marker file: it exists if the loaded modules' kernels for a purpose are all cached."""
     return home() / f"{purpose}-{sha256(' '.join(sorted(_loaded)).encode()).hexdigest()[:16]}"
 
 
 def is_cached(purpose: str) -> bool:
-    """Whether the loaded modules' kernels for a purpose are all cached, as those that were shipped are."""
+    """Whether the loaded modules' kernels for a purpose are all cached; shipped ones are."""
     return not _loaded or mark(purpose).exists()
 
 
 def keep(purpose: str) -> None:
-    """Note for later runs that the kernels for a purpose are all cached, where they are."""
+    """Note for later runs that the kernels for a purpose are all cached, unless they could not be written."""
     if not trouble():
         with _writing():
             home().mkdir(parents=True, exist_ok=True)
@@ -242,7 +251,7 @@ def keep(purpose: str) -> None:
 
 
 def _clear(parent: Path, names: str) -> None:
-    """Remove what has not been changed for long."""
+    """Remove folders that have not changed for UNUSED_S."""
     for old in parent.glob(names):
         try:
             if old.stat().st_mtime < time() - UNUSED_S:

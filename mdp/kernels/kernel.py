@@ -1,10 +1,10 @@
-"""Kernel: how a kernel and its helpers are compiled: numba's own ways cost seconds of the first run.
+"""Kernel decorators: how a kernel and its helpers are compiled; numba's defaults cost seconds in the first run.
 
-A kernel is called from Python and cached on disk. Helpers are called by kernels only, so they need no entry from Python and no
-place on disk of their own. numba compiles an allocation again at every place and every function again for every literal
-argument: arrays come from mdp.kernels.arrays, flags from variables. Its sorts, searches and assignments of whole rows bring
-their own Python along, a second or more for the first of each: numbers are moved one by one and sorted by mdp.kernels.sorting.
-Arguments that would be more than six go together in a NamedTuple.
+A kernel is called from Python and cached on disk. Helpers are called by kernels only, so they need no entry point for Python and
+no cache on disk. numba compiles every allocation again, and every function again for each literal argument: so arrays come from
+mdp.kernels.arrays, flags from variables. Its sorts, searches and row assignments compile library code, which takes a second or
+more for the first of each: so numbers are moved one by one and sorted by mdp.kernels.sorting. More than six arguments are grouped
+in a NamedTuple.
 """
 
 from collections.abc import Callable
@@ -20,33 +20,37 @@ R = TypeVar("R")
 
 
 def helper(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function that kernels alone call. With entries from Python and C all bundles would take 130 core-s, not 115."""
+    """Compile a function that only kernels call. With entry points for Python and C all bundles would take 130 core-s instead of
+    115.
+    """
     return cast(Callable[P, R], njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function))
 
 
 def no_nrt(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a helper that makes no array, gives none back and calls only its like.
+    """Compile a helper that neither creates nor returns arrays and calls only functions of its kind.
 
-    numba's runtime (NRT) does not count who holds the arrays it works on, which would take a lock on all cores each time. It
+    numba's runtime (NRT) then does not count references to the arrays it works on, which would lock all cores each time. This
     saves 6 % of an export and 3 of the 115 core-s.
     """
     return cast(Callable[P, R], njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)(function))
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function for calls from Python, outside Python's lock, and cache it; no entry from C saves 3 of 115 core-s."""
+    """Compile and cache a function for calls from Python; it runs without Python's lock. Omitting the C entry point saves 3 of
+    115 core-s.
+    """
     compiled: Any = njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
     compiled._cache = KernelCache(function)
     return cast(Callable[P, R], compiled)
 
 
 def on_compiled(call: Callable[[], None]) -> None:
-    """Have a function called whenever a kernel has been compiled, with its helpers; those that are cached do not count."""
+    """Have a function called whenever a kernel and its helpers have been compiled, but not when they come from the cache."""
     event.register("numba:compile", _Compilations(call))
 
 
 class _Compilations(event.Listener):
-    """Compilations as numba tells them, those of helpers inside that of their kernel."""
+    """Listener to numba's compilations; those of helpers are nested in that of their kernel."""
 
     def __init__(self, call: Callable[[], None]) -> None:
         self._call, self._depth = call, 0

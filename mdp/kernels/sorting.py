@@ -11,18 +11,18 @@ from mdp.kernels.kernel import helper, no_nrt
 
 @helper
 def counting_sort(keys: NDArray[Any], bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Items sorted by their keys 0 <= key < bins: bin b holds items[first[b] : first[b + 1]], in rising order.
+    """Counting sort of items by keys 0 <= key < bins: bin b holds items[first[b] : first[b + 1]] in ascending order.
 
-    keys: (n,) whole numbers; first: (bins + 1,); items: (n,).
+    keys: (n,) integers; first: (bins + 1,); items: (n,).
     """
     return sort_into_bins(keys, keys, bins)
 
 
 @helper
 def sort_into_bins(low: NDArray[Any], high: NDArray[Any], bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Items sorted into all bins low[k] .. high[k] that item k touches, both included, none where high < low (counting sort).
+    """Counting sort of items into all bins low[k] .. high[k] inclusive that item k touches; none if high < low.
 
-    Bin b holds items[first[b] : first[b + 1]], in rising order; first: (bins + 1,).
+    Bin b holds items[first[b] : first[b + 1]], in ascending order; first: (bins + 1,).
     """
     first, next_free = longs(bins + 1, 0), longs(bins + 1, 0)
     for k in range(len(low)):
@@ -41,7 +41,7 @@ def sort_into_bins(low: NDArray[Any], high: NDArray[Any], bins: int) -> tuple[ND
 
 @no_nrt
 def rank(values: NDArray[Any], x: float, equal: bool) -> int:
-    """How many of the rising values lie below x, those equal to it counted or not (binary search)."""
+    """The number of sorted values below x, with or without those equal to it (binary search)."""
     low, high = 0, len(values)
     while low < high:
         middle = (low + high) // 2
@@ -54,7 +54,7 @@ def rank(values: NDArray[Any], x: float, equal: bool) -> int:
 
 @no_nrt
 def sort(values: NDArray[Any], begin: int, end: int) -> None:
-    """Bring values[begin:end] into rising order, in place (Shell 1959)."""
+    """Sort values[begin:end] in place, ascending (Shell 1959)."""
     gap = (end - begin) // 2
     while gap > 0:
         for k in range(begin + gap, end):
@@ -68,7 +68,7 @@ def sort(values: NDArray[Any], begin: int, end: int) -> None:
 
 @helper
 def argsort(keys: NDArray[Any]) -> NDArray[np.int64]:
-    """(n,) numbers of the keys in rising order, equal keys as they come (merge sort from the bottom up)."""
+    """(n,) indices that sort the keys in ascending order, stable (bottom-up merge sort)."""
     order, spare = longs(len(keys), 0), longs(len(keys), 0)
     for k in range(len(keys)):
         order[k] = k

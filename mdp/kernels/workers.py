@@ -1,12 +1,11 @@
-"""Workers: fresh interpreters that do one call after another for this process, and how two processes speak through pipes.
+"""Workers: fresh interpreters that run one call after another for this process, and the pipe protocol between two processes.
 
-What goes through a pipe is a pickle with its length before it. A worker tells what it likes while it works, and answers with what
-the call returns or with what it raised, in words. It leads a session of its own: Ctrl-C at the terminal does not reach it, and
-one signal ends it with all that it has started. It ends by itself when nobody can ask it any more, whatever ended those who
-could, or when it was asked nothing for long.
+Messages are pickles preceded by their length. While it works, a worker can report progress; then it answers with the call's
+return value or error message. It leads a session of its own: Ctrl-C at the terminal does not reach it, and one signal ends it
+with all that it has started. It ends by itself when no process can call it, or when it has been idle too long.
 
 multiprocessing, concurrent.futures and pebble have no such worker: theirs run the main module of this process again, stay in its
-session, tell nothing meanwhile, and go on with what they do when this process is killed.
+session, report no progress, and continue their work when this process is killed.
 """
 
 import os
@@ -25,33 +24,34 @@ from typing import IO, Any, BinaryIO, NoReturn
 
 from mdp.kernels import threads
 
-Tell = Callable[[Any], None]  # what long work calls to say something to the one who asked for it
-Task = Callable[..., Any] | str  # a function of a module, or "module:function" where who asks need not import it
+Tell = Callable[[Any], None]  # function by which a long task reports progress to its caller
+Task = Callable[..., Any] | str  # a module-level function, or "module:function" that the caller need not import
 
 LENGTH = struct.Struct("<Q")
 TELLS, DONE, FAILED = "tells", "done", "failed"
-SPARE_S = 1.0  # so much longer than we would ask it a worker waits
+SPARE_S = 1.0  # a worker waits this much longer than its parent would call it
 ONE_CORE = {"OPENBLAS_NUM_THREADS": "1"}  # numpy's library for products would take all cores
 OOM_SCORE = "/proc/self/oom_score_adj", "500"  # when memory runs out, Linux kills a worker rather than its parent
 
 
 class CallError(Exception):
-    """A call without a result; str() says why."""
+    """A call failed; str() gives the reason."""
 
 
 class KilledError(CallError):
-    """The worker died during the call; another try may succeed."""
+    """The worker died during the call; a retry may succeed."""
 
 
 def frame(value: Any) -> bytes:
-    """A value as it goes through a pipe."""
+    """A value as a message: its length and its pickle."""
     content = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
     return LENGTH.pack(len(content)) + content
 
 
 def read_frames(pipe: IO[bytes]) -> Iterator[Any]:
-    """The values that come through a pipe, until it ends; a frame that is cut off is its end, too. Raises what pickle raises for
-    a frame that is whole but cannot be read."""
+    """The values received through a pipe until it ends; an incomplete message also ends it. Raises what pickle raises for a
+    complete but unreadable message.
+    """
     while head := _read(pipe, LENGTH.size):
         content = _read(pipe, *LENGTH.unpack(head))
         if not content:
@@ -60,7 +60,7 @@ def read_frames(pipe: IO[bytes]) -> Iterator[Any]:
 
 
 def _read(pipe: IO[bytes], size: int) -> bytearray:
-    """Exactly size bytes; none where the pipe ends before."""
+    """Exactly `size` bytes; empty if the pipe ends before."""
     content = bytearray()
     while len(content) < size:
         more = pipe.read(size - len(content))
@@ -71,9 +71,9 @@ def _read(pipe: IO[bytes], size: int) -> bytearray:
 
 
 def listen(pipe: IO[bytes], take: Callable[[Any], None], end: Callable[[], None]) -> None:
-    """Hand each value that comes through a pipe to take(); call end() when no more can come, however the other side has ended.
+    """Pass each value received through a pipe to take(); call end() when no more can come, however the other side ended.
 
-    Nobody can speak to this process any more then, so end() is called after a frame that cannot be read, too.
+    An unreadable message also calls end(): no process can reach this one any more.
     """
     try:
         for value in read_frames(pipe):
@@ -85,9 +85,8 @@ def listen(pipe: IO[bytes], take: Callable[[Any], None], end: Callable[[], None]
 
 
 class Interpreter:
-    """A fresh interpreter that imports from where this one does and runs some code; we speak with it through its pipes.
-
-    leads: whether it leads a session of its own. One that does not ends with all of this process's session, whatever it is at.
+    """A fresh interpreter with this process's import path that runs some code and exchanges messages through pipes. leads:
+    whether it leads a session of its own; otherwise it ends with this process's session, whatever it is doing.
     """
 
     def __init__(self, code: str, environment: dict[str, str] | None = None, *, leads: bool = True) -> None:
@@ -103,17 +102,17 @@ class Interpreter:
 
     def say(self, value: Any) -> None:
         """Send a value to the process; ignored if it has already ended."""
-        with suppress(OSError, ValueError):  # it has ended, or we have ended it
+        with suppress(OSError, ValueError):  # the process has ended, or we have ended it
             self._in.write(frame(value))
             self._in.flush()
 
     def hear(self) -> Iterator[Any]:
-        """What it says, until it ends."""
+        """Yields the values that the process sends, until it ends."""
         yield from read_frames(self._out)
         self.process.wait()
 
     def end(self) -> None:
-        """Kill the process, with everything it started where it leads a session, and wait until it is gone."""
+        """Kill the process, with everything it started if it leads a session, and wait until it is gone."""
         if self.process.poll() is None:
             with suppress(ProcessLookupError, PermissionError):
                 if self._leads and hasattr(os, "killpg"):
@@ -126,8 +125,9 @@ class Interpreter:
 
 
 class Worker(Interpreter):
-    """A process that does calls, one at a time. one_core: whether it is one of many on its machine; idle_s: without a call, after
-    which it gives its memory back."""
+    """A process that runs calls, one at a time. one_core: it is one of many on its machine; idle_s: time without a call after
+    which it ends to free its memory.
+    """
 
     def __init__(self, *, one_core: bool = False, idle_s: float = 60.0) -> None:
         code = f"from mdp.kernels.workers import serve; serve({one_core}, {idle_s + SPARE_S})"
@@ -136,11 +136,11 @@ class Worker(Interpreter):
 
     @property
     def ready(self) -> bool:
-        """Whether it can be asked; a worker that has been idle too long ends and must be replaced."""
+        """Whether the worker can be called; one that has been idle too long ends and must be replaced."""
         return self.process.poll() is None and monotonic() - self._rests_since_s < self._idle_s
 
     def ask(self, task: Task, *given: Any) -> Iterator[tuple[bool, Any]]:
-        """(False, what a call tells) as it comes, and at last (True, what it returns). Raises CallError as call()."""
+        """Yields (False, value) for each progress report of a call, then (True, result). Raises CallError like call()."""
         self.say(pickle.dumps((task, given), pickle.HIGHEST_PROTOCOL))
         for kind, value in self.hear():
             if kind == TELLS:
@@ -156,9 +156,9 @@ class Worker(Interpreter):
         raise KilledError(f"its process was ended by {name}" if code < 0 else "its process ended")
 
     def call(self, task: Task, *given: Any, limit_s: float | None = None) -> Any:
-        """The result of a call. limit_s: seconds after which it is given up and the worker ended.
+        """The result of a call. limit_s: timeout after which the worker is ended.
 
-        Raises CallError for what the call raises, too; KilledError when the worker ends meanwhile.
+        Raises CallError, also for exceptions of the task; KilledError if the worker ends during the call.
         """
         timer, began_s = Timer(limit_s or 0.0, self.end), monotonic()
         timer.daemon = True
@@ -173,23 +173,23 @@ class Worker(Interpreter):
         finally:
             timer.cancel()
             if limit_s is not None:
-                timer.join()  # it may be ending the worker, which must not be asked again then
+                timer.join()  # it may be ending the worker, which must not be called again then
 
 
 def take_pipes() -> tuple[BinaryIO, BinaryIO]:
-    """This process's pipes from and to the one that asks; what work prints does not reach them."""
-    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    """This process's pipes from and to its caller; output printed by tasks does not reach them."""
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "r+b") as nowhere:
         os.dup2(nowhere.fileno(), 0)
         os.dup2(nowhere.fileno(), 1)
-    return asked, answers
+    return requests, answers
 
 
-_answers: list[BinaryIO] = []  # of this process, where it is a worker
+_answers: list[BinaryIO] = []  # pipe to the caller, if this process is a worker
 
 
 def tell(value: Any) -> None:
-    """In a worker: say something to the one who waits for the call under way."""
+    """In a worker: report progress to the caller of the running call."""
     _send(frame((TELLS, value)))
 
 
@@ -199,16 +199,16 @@ def _send(message: bytes) -> None:
 
 
 def serve(one_core: bool, idle_s: float) -> None:
-    """In a worker: do what is asked until nobody can ask any more, or nobody does for so long."""
+    """In a worker: answer calls until no process can call it any more or the idle time is over."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C does
-    asked, answers = take_pipes()
+    requests, answers = take_pipes()
     _answers.append(answers)
     with suppress(OSError), open(OOM_SCORE[0], "w") as score:
         score.write(OOM_SCORE[1])
     if one_core:
         threads.use_threads(1)
     calls: SimpleQueue[bytes] = SimpleQueue()
-    threads.harmless(Thread(target=listen, args=(asked, calls.put, _end_all), daemon=True)).start()
+    threads.harmless(Thread(target=listen, args=(requests, calls.put, _end_all), daemon=True)).start()
     while True:
         try:
             call = calls.get(timeout=idle_s)

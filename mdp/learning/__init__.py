@@ -1,4 +1,5 @@
-"""Training and judging rankers from the records of wide searches: lists, labels, networks, their export, tables and pictures.
+"""Training and evaluation of rankers from the records of wide searches: lists, labels, networks, their export, tables and
+figures.
 
-Everything here needs the extra `train`; a search needs only what `mdp.ranking` holds.
+Everything here needs the extra `train`; a search needs only `mdp.ranking`.
 """

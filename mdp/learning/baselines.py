@@ -1,6 +1,6 @@
-"""Baselines: orders without learning, a line in two features, and the learners that the paper compares uRank with.
+"""Baselines: ranking without learning, a linear trade-off of two features, and the learners that the paper compares with uRank.
 
-XGBoost's trees: as in the paper, on the features scaled by list, and tuned, on the unscaled features as well.
+XGBoost's trees come in two versions: as in the paper, on features scaled by list, and tuned, on unscaled features as well.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,27 +16,27 @@ from mdp.mesh import Floats
 if TYPE_CHECKING:
     from xgboost import DMatrix
 
-WEIGHTS = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 53)])  # of M6 against M2, tried in turn
-FITTED_AT = 5  # the NDCG that the line is fitted by and that tuned trees stop by
-# The settings of XGBoost's own ranking demo, which the paper names, with the paper's depth and rounds, and pairs as in 2020.
+WEIGHTS = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 53)])  # of M6 against M2; all are tried
+FITTED_AT = 5  # cutoff of the NDCG for fitting the trade-off and for early stopping of tuned trees
+# XGBoost's own ranking demo, which the paper cites, with the paper's depth and rounds, and pairs as in 2020.
 PAPER = {"max_depth": 8, "eta": 0.1, "gamma": 1.0, "min_child_weight": 0.1, "tree_method": "hist", "nthread": 1, "seed": 0}
 PAPER_PAIRS = {"lambdarank_pair_method": "mean", "lambdarank_num_pair_per_sample": 1}
 PAPER_ROUNDS = 500
 TUNED = {"max_depth": 4, "eta": 0.05, "min_child_weight": 5.0, "subsample": 0.8, "tree_method": "hist", "nthread": 1, "seed": 0}
-TUNED_ROUNDS, TUNED_PATIENCE = 1000, 50  # rounds; 50 without a gain on the validation lists end it
+TUNED_ROUNDS, TUNED_PATIENCE = 1000, 50  # rounds; early stopping after 50 without a gain on the validation lists
 
 Lists = Sequence[RatedList]
 Columns = Sequence[str]
-Fit = Callable[[Lists, Lists, Columns], Scores]  # lists to train with and to validate with, and what is learnt from
+Fit = Callable[[Lists, Lists, Columns], Scores]  # training lists, validation lists, names of features
 
 
 def random_order(rated: RatedList) -> Floats:
-    """Scores drawn anew for every list, the same whenever it comes again."""
+    """Random scores, reproducible for each list."""
     return np.random.default_rng(crc32(rated.features.tobytes())).random(len(rated.ratings))
 
 
 def trade_off(weight: float) -> Scores:
-    """M2 - weight M6: what the cuts so far save less what they lose for ever."""
+    """M2 - weight M6: what the cuts so far save, less what they lose for good."""
 
     def of_list(rated: RatedList) -> Floats:
         gain, loss = rated.table(("M2", "M6")).T.astype(np.float64)
@@ -54,7 +54,7 @@ def fit_trade_off(training: Lists, validation: Lists, columns: Columns) -> Score
 
 
 def fit_trees(objective: str) -> Fit:
-    """RankNet (rank:pairwise) or LambdaRank (rank:ndcg) as the paper ran them: 500 rounds, come what may."""
+    """RankNet (rank:pairwise) or LambdaRank (rank:ndcg) as in the paper: 500 rounds without early stopping."""
 
     def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
         del validation
@@ -68,7 +68,9 @@ def fit_trees(objective: str) -> Fit:
 
 
 def fit_tuned_trees(objective: str) -> Fit:
-    """As fit_trees with TUNED, XGBoost's own pairs and the unscaled features as well; the validation lists stop the training."""
+    """Trees with the settings TUNED, XGBoost's own pairs, and unscaled features as well; the validation lists stop the
+    training.
+    """
 
     def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
         import xgboost
@@ -85,7 +87,7 @@ def fit_tuned_trees(objective: str) -> Fit:
 
 
 def _rows(lists: Lists, columns: Columns, table: Callable[[RatedList, Columns], Singles]) -> "DMatrix":
-    """What XGBoost learns from."""
+    """The lists as XGBoost's training matrix."""
     import xgboost
 
     rows = xgboost.DMatrix(np.vstack([table(rated, columns) for rated in lists]), label=np.hstack([r.ratings for r in lists]))

@@ -2,8 +2,8 @@
 
     python -m mdp.learning.collect FOLDER -o OUT [--terms paper,ours] [--orientations N] [--machine NAME] [--set KEY=VALUE] ...
 
-One file a search, MODEL.ORIENTATION.TERMS.npz, and a line of OUT/index.csv. What is done is not done again, so whatever ended a
-run, it goes on when it is started again.
+Each search writes one file, MODEL.ORIENTATION.TERMS.npz, and one line of OUT/index.csv. Finished searches are not repeated, so an
+interrupted run resumes when it is started again.
 """
 
 import argparse
@@ -42,7 +42,7 @@ MOST_WIDE = 1000  # as search.beam_width allows
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Collect what is missing in the folder of records; the exit code."""
+    """Collect the missing records; returns the exit code."""
     return command.run(collect, arguments, "started again, the collection goes on where it stopped")
 
 
@@ -77,12 +77,12 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def collect(arguments: Sequence[str] | None) -> None:
-    """Make the records that are missing, and say what there is."""
+    """Make the missing records, and print a summary."""
     options = _options(arguments)
     profiles = (_name_or_path(options.machine), _name_or_path(options.material), _name_or_path(options.process))
     settings = Settings(options.beam_width, options.faces, options.time_limit, *profiles, tuple(options.set))
     for terms in options.terms:
-        settings.profile(terms)  # a wrong one is told before anything begins
+        settings.profile(terms)  # an invalid setting is reported before anything begins
     files = {name_of(file): file.resolve() for file in model_files(options.folder, options.only, options.every)}
     wanted = [(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
     with writing_alone(options.out, LOCK):
@@ -100,12 +100,12 @@ def collect(arguments: Sequence[str] | None) -> None:
 
 
 def _name_or_path(profile: str) -> str:
-    """A profile's name, or where its file is, for workers start elsewhere."""
+    """A profile's name, or its file's absolute path, since workers start in other folders."""
     return str(Path(profile).resolve()) if Path(profile).is_file() else profile
 
 
 def _rows(out: Path, settings: Settings) -> dict[Key, Row]:
-    """What is there already; UserError where it is of other settings."""
+    """The existing rows; raises UserError if they were collected with other settings."""
     rows = {row.key: row for row in read_index(out)}
     others = sorted({row.settings for row in rows.values()} - {settings.in_words})
     if others:
@@ -114,7 +114,7 @@ def _rows(out: Path, settings: Settings) -> dict[Key, Row]:
 
 
 def _run(options: argparse.Namespace, settings: Settings, files: dict[Key, Path], rows: dict[Key, Row]) -> None:
-    """Search, and write each record and line as soon as it is there."""
+    """Search, and write each record and line as soon as it is available."""
     calls = {key: (Row(*key, settings.in_words), file, settings) for key, file in files.items()}
     workers = Workers(options.scheduler, options.workers, options.retries, folders=(options.folder.resolve(),))
     with connected(workers) as pool, BatchProgress(len(calls), "searches") as progress:

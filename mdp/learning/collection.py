@@ -1,5 +1,6 @@
-"""Collection: the searches that make the records of many models: a line of an index for each, what came of it and why it has no
-record, and a summary of all lines."""
+"""Collection: searches that make the records of many models, an index with one line per search (its result, or why it has no
+record), and a summary.
+"""
 
 import io
 from collections import Counter
@@ -20,19 +21,20 @@ from profiles.profile import DEFAULTS, Profile, load
 INDEX = "index.csv"
 LOCK = "index.lock"
 NO_RISK, NO_CUT, NO_SIDE, FAILED = "no risky face", "nothing feasible", "no further side to rest on", "failed: "
-STAYS = (NO_RISK, NO_CUT, NO_SIDE)  # reasons for which a search has no record however often it is made
+STAYS = (NO_RISK, NO_CUT, NO_SIDE)  # reasons that hold however often the search is repeated
 HEADS = ("terms", "settings", "searches", "models", "records", "lists", "mean length", "mean J", "core h", "late")
-MOST_NAMES = 20  # of searches that failed: about a screen
+MOST_NAMES = 20  # of failed searches: about a screen
 
 
-Key = tuple[str, int, str]  # a model, the number of its orientation, and the terms on which it is searched
+Key = tuple[str, int, str]  # a model, the number of its orientation, and the terms of the search
 
 
 @dataclass(frozen=True)
 class Row:
-    """What came of a search. settings: what all searches of a collection share; faces, faces_after: of the model as read and as
-    searched; candidates: the number evaluated; seconds: of processor time; outcome: least cost as share of the risky area;
-    late: the time limit ended it; excluded: why there is no record, "" where there is one."""
+    """The result of a search. settings: the settings shared by all searches of a collection; faces, faces_after: of the model as
+    read and as searched; candidates: number of evaluated candidates; seconds: processor time; outcome: least cost as a share of
+    the risky area; late: 1 if the time limit ended the search; excluded: why there is no record, "" if there is one.
+    """
 
     id: str
     orientation: int
@@ -51,41 +53,41 @@ class Row:
 
     @property
     def key(self) -> Key:
-        """The search that the row is of."""
+        """Key of the row's search."""
         return self.id, self.orientation, self.terms
 
     @property
     def file(self) -> str:
-        """The name of its record."""
+        """The name of the search's record file."""
         return f"{self.id}.{self.orientation}.{self.terms}.npz"
 
     @property
     def in_words(self) -> str:
-        """What came of it, for a person who waits."""
+        """The result in words, for the progress display."""
         return self.excluded or f"J {self.outcome:.4f}, {self.lists} lists, {self.seconds:.0f} s"
 
 
 def read_index(folder: Path) -> list[Row]:
-    """The rows of a collection, the last one of each search; none where there is no index.
+    """The rows of a collection, the last one of each search; empty if there is no index.
 
-    Raises UserError for a damaged one.
+    Raises UserError for a damaged index.
     """
     return list({row.key: row for row in read_rows(folder / INDEX, Row)}.values())
 
 
 def write_index(folder: Path, rows: Iterable[Row]) -> None:
-    """The index of a collection, in the order of models, orientations and terms."""
+    """Write the index of a collection, sorted by model, orientation and terms."""
     write_rows(folder / INDEX, Row, sorted(rows, key=lambda row: row.key))
 
 
 def unfinished(folder: Path, rows: Iterable[Row], wanted: Iterable[Key]) -> list[Key]:
-    """The searches that have no line yet, whose record is gone, or that failed."""
+    """The searches without a line, without a record file, or that failed."""
     done = {row.key for row in rows if (not row.excluded and (folder / row.file).is_file()) or row.excluded in STAYS}
     return [key for key in wanted if key not in done]
 
 
 def summary(rows: Sequence[Row]) -> Iterator[str]:
-    """The number of searches on each of the terms, then which of them have no record and why."""
+    """The number of searches for each set of terms, then the reasons for missing records."""
     yield table(HEADS, [_of_terms([row for row in rows if row.terms == terms]) for terms in sorted({row.terms for row in rows})])
     reasons = Counter((row.terms, row.excluded.partition(":")[0]) for row in rows if row.excluded)
     if reasons:
@@ -111,13 +113,14 @@ def _of_terms(rows: Sequence[Row]) -> tuple[str, ...]:
 
 PAPER_TERMS = ("search.objective=risky", "search.count_platform_faces=true", "search.clearance=false")
 TERMS = {"paper": ("search.method=published", *PAPER_TERMS), "best": PAPER_TERMS, "ours": ()}
-UNPOLISHED = "search.polish=false"  # a record holds what the beam saw; polishing comes after it
+UNPOLISHED = "search.polish=false"  # a record holds what the beam saw; polishing comes later
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What all searches of a collection share. most_faces: None for any number; time_limit_s: None for as long as it takes;
-    machine, material, process: names or files of profiles; own: KEY=VALUE as of --set."""
+    """Settings shared by all searches of a collection. most_faces, time_limit_s: None for no limit; machine, material, process:
+    names or files of profiles; own: KEY=VALUE as for --set.
+    """
 
     beam_width: int = 50
     most_faces: int | None = None
@@ -129,7 +132,7 @@ class Settings:
 
     @property
     def in_words(self) -> str:
-        """What a record depends on."""
+        """The settings in words, as stored with each record."""
         faces = [] if self.most_faces is None else [f"faces<={self.most_faces}"]
         profiles = [f"{kind}={getattr(self, kind)}" for kind, usual in DEFAULTS.items() if getattr(self, kind) != usual]
         return " ".join((f"B={self.beam_width}", *faces, *profiles, *self.own))
@@ -142,9 +145,9 @@ class Settings:
 
 
 def run(row: Row, path: Path, settings: Settings) -> tuple[Row, bytes]:
-    """The line of a search in full, and its record, empty where there is none. row: as far as it is known before.
+    """Run a search: its complete row, and its record, empty if there is none. row: the known part of the row.
 
-    What is wrong with the model becomes a line, a bug is raised.
+    An invalid model gives a row; a bug raises.
     """
     began, records = process_time(), list[bytes]()
     try:

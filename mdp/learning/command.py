@@ -1,4 +1,4 @@
-"""Command: what the command lines of this room share. A complaint is a sentence on stderr and exit code 1, an interrupt 130."""
+"""Command: what the command lines of this package share. Errors are one sentence on stderr with exit code 1, an interrupt 130."""
 
 import argparse
 import subprocess
@@ -12,7 +12,7 @@ from mdp.learning.lists import FOLDS
 from mdp.ranking.features import CHECKED, COLUMNS, PAPER_COLUMNS
 from profiles.errors import UserError
 
-COLUMN_SETS = {  # cheap: those that are known of a candidate before it is checked
+COLUMN_SETS = {  # cheap: those known for a candidate before it is checked
     "paper": PAPER_COLUMNS,
     "cheap": tuple(name for name in COLUMNS if name not in CHECKED),
     "all": COLUMNS,
@@ -20,15 +20,15 @@ COLUMN_SETS = {  # cheap: those that are known of a candidate before it is check
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are sentences like all others."""
+    """An argument parser whose errors are sentences like all others."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise UserError in the place of printing how the command is used."""
+        """Raise UserError instead of printing the usage."""
         raise UserError(f"{message}; --help shows what is allowed")
 
 
 def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str] | None, interrupted: str) -> int:
-    """The exit code of a command; interrupted: what to say when a person stops it."""
+    """The exit code of a command. interrupted: message after Ctrl-C."""
     try:
         command(arguments)
     except UserError as error:
@@ -44,9 +44,9 @@ def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str
 
 
 def add_records(parser: argparse.ArgumentParser, use: str, nargs: str | None = None) -> None:
-    """Add the options that say what is read of which records.
+    """Add the options that select records and columns.
 
-    use: what the columns are for; nargs: how often the folder is given, once by default.
+    use: what the columns are for; nargs: as in argparse, for the folder; exactly one by default.
     """
     parser.add_argument("folder", type=Path, nargs=nargs, help="of record files, MODEL.ORIENTATION.TERMS.npz")
     parser.add_argument(
@@ -64,12 +64,12 @@ def add_records(parser: argparse.ArgumentParser, use: str, nargs: str | None = N
 
 
 def split_names(text: str) -> tuple[str, ...]:
-    """The names between commas."""
+    """The names in a comma-separated list."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def check_range(options: argparse.Namespace, name: str, least: float, most: float = inf) -> None:
-    """Raise UserError where an option was given a value that is not within its range."""
+    """Raise UserError if an option's value is outside its range."""
     value = getattr(options, name)
     if value is not None and not least <= value <= most:
         allowed = f"{least:g} or more" if most == inf else f"{least:g} to {most:g}"
@@ -77,16 +77,16 @@ def check_range(options: argparse.Namespace, name: str, least: float, most: floa
 
 
 def table(heads: Sequence[str], lines: Sequence[Sequence[str]], numbers: bool = False) -> str:
-    """A table in Markdown; numbers: whether all columns but the first are aligned to the right."""
+    """A table in Markdown. numbers: whether all columns but the first are right-aligned."""
     rows = [f"| {' | '.join(cells)} |" for cells in (heads, *lines)]
     return "\n".join([rows[0], "|---|" + ("---:|" if numbers else "---|") * (len(heads) - 1), *rows[1:]])
 
 
 def commit() -> str:
-    """The commit of this program, or its version where it is no clone."""
+    """The commit of this program, or its version if it is not a clone."""
     here = Path(__file__).resolve().parent
     try:
-        asked = subprocess.run(
+        output = subprocess.run(
             ["git", "-C", str(here), "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True, timeout=10
         )
     except (OSError, subprocess.SubprocessError):
@@ -94,4 +94,4 @@ def commit() -> str:
             return f"version {version('tiltprint')}"
         except PackageNotFoundError:
             return "unknown"
-    return asked.stdout.strip()
+    return output.stdout.strip()

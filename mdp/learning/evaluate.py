@@ -1,4 +1,4 @@
-"""Evaluate: rankers and baselines on lists of models that no training saw, and the pictures of the 2020 paper.
+"""Evaluate: rankers and baselines on lists of models that were not used for training, and the figures of the 2020 paper.
 
     python -m mdp.learning.evaluate FOLDER [--manifest CSV] [--terms NAME,...] [--ranker FILE.onnx ...] [--without NAME,...] ...
     python -m mdp.learning.evaluate --figure7 TABLE.csv [--pictures DIR]
@@ -24,17 +24,17 @@ from mdp.mesh import Floats
 from mdp.ranking.ranker import LearnedRanker
 from profiles.errors import UserError
 
-ALWAYS = ("M2", "M6")  # what lines are fitted in
-SHUFFLES, CUT = 10, 5  # importance is what NDCG@5 loses, as a mean of this many shuffles
+ALWAYS = ("M2", "M6")  # features of the linear trade-off
+SHUFFLES, CUT = 10, 5  # importance is the loss of NDCG@5, averaged over this number of shuffles
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the tables and draw the pictures; the exit code."""
+    """Print the tables and draw the figures; returns the exit code."""
     return run(evaluate, arguments, "nothing is kept, it begins anew")
 
 
 def evaluate(arguments: Sequence[str] | None) -> None:
-    """Do what is asked for."""
+    """Run the comparison and draw the figures that the options select."""
     options = _options(arguments)
     if options.folder is not None:
         _compare(options)
@@ -59,14 +59,14 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     check_range(options, "least_removed", 0.0, 1.0)
     unknown = [name for name in options.without if name not in BASELINES]
     if unknown:
-        raise UserError(f"--without {unknown[0]}: is no baseline; {'; '.join(BASELINES)} are there")
+        raise UserError(f"--without {unknown[0]}: is not a baseline; allowed are {'; '.join(BASELINES)}")
     if options.folder is None and options.figure7 is None:
         raise UserError("a folder of records or --figure7 is needed; --help shows what is allowed")
     return options
 
 
 def _compare(options: argparse.Namespace) -> None:
-    """Tables of all rankers, then what the features of each given one do."""
+    """Print tables of all rankers, then the feature importance of each given ranker."""
     networks = [LearnedRanker(file) for file in options.ranker]
     learnt = COLUMN_SETS[options.columns or "paper"]
     columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for network in networks for name in network.columns)]))
@@ -74,7 +74,7 @@ def _compare(options: argparse.Namespace) -> None:
     sides = {side: [rated for rated in of_side(lists, side, options.fold) if rated.teaches] for side in Side}
     for side, some in sides.items():
         if not some:
-            raise UserError(f"folder {options.folder}: no list of it is on the side {side}; record models of more sources")
+            raise UserError(f"folder {options.folder}: it has no list for {side}; record models of more sources")
     rankers = {str(network.file): _scores(network) for network in networks}
     for name, fit in BASELINES.items():
         if name not in options.without:
@@ -118,7 +118,7 @@ def _analyse(network: LearnedRanker, lists: Sequence[RatedList], options: argpar
 
 
 def importance(scores: Scores, columns: Sequence[str], lists: Sequence[RatedList]) -> Floats:
-    """(k,) the drop in mean NDCG@5 when each named feature is shuffled among all candidates (Altmann 2010)."""
+    """(k,) drop in mean NDCG@5 when a named feature is shuffled among all candidates (Altmann 2010)."""
     rng, worth = np.random.default_rng(0), at(CUT)
 
     def mean(some: Sequence[RatedList]) -> float:
@@ -130,7 +130,7 @@ def importance(scores: Scores, columns: Sequence[str], lists: Sequence[RatedList
 
 
 def shuffled(name: str, lists: Sequence[RatedList], rng: np.random.Generator) -> list[RatedList]:
-    """The lists with one feature dealt out anew among the candidates of all of them."""
+    """The lists with one feature permuted among the candidates of all of them."""
     features = np.vstack([rated.features for rated in lists])
     column = lists[0].columns.index(name)
     features[:, column] = rng.permutation(features[:, column])
@@ -139,7 +139,7 @@ def shuffled(name: str, lists: Sequence[RatedList], rng: np.random.Generator) ->
 
 
 def correlation(columns: Sequence[str], lists: Sequence[RatedList]) -> Floats:
-    """(k, k) Pearson correlation of the named features over all candidates; 0 with one that never changes."""
+    """(k, k) Pearson correlation of the named features over all candidates; 0 for a constant feature."""
     rows = np.vstack([rated.table(columns) for rated in lists])
     with np.errstate(invalid="ignore"):
         matrix = np.corrcoef(rows, rowvar=False, dtype=np.float64)

@@ -1,15 +1,15 @@
-"""Lists: the candidates that competed in one stage of a recorded search, what became of each, their ratings and their regrets.
+"""Lists: the candidates that competed in one stage of a recorded search, with their outcomes, ratings and regrets.
 
-Record files are what `mdp.ranking.record` writes, or anything with the same `version`, `model`, `columns`, `features`, `stage`
-and `outcome`; `child` and `node_expanded`, where they are there, tell the candidates whose outcome nobody has followed.
+Record files are those of `mdp.ranking.record`, or any with the same `version`, `model`, `columns`, `features`, `stage` and
+`outcome`; the optional `child` and `node_expanded` mark the candidates that the search did not pursue.
 
 The value of a candidate is the least final cost through it, stopping there included. The paper rates the five best candidates of
-a list 5, 4, 3, 2, 1 and the rest 0; its lists are what the beam kept, so candidates that were never cut are not among them.
-Nor are, where regrets are asked for, those that nobody followed: all that is known of them is that stopping there is worse.
+a list 5, 4, 3, 2, 1 and the rest 0; its lists are what the beam kept, so candidates that were never cut are not in them. For
+regrets, candidates that were not pursued are left out as well: all that is known about them is that stopping there is worse.
 
-A model's source says whether it trains a ranker, stops the training, or judges the result. Models of one repository and folder
-are often variants of one thing, so a source is never on two sides. The side is a hash of the source's name: it depends on no
-other model, so a set that grows moves none.
+A model's source determines whether it trains a ranker, stops the training, or tests the result. Models of one repository and
+folder are often variants of one object, so a source is always on one side. The side is a hash of the source's name: it does not
+depend on other models, so adding models moves none.
 """
 
 import csv
@@ -30,20 +30,20 @@ from mdp.ranking.record import VERSION, Arrays
 from profiles.errors import UserError
 
 NEEDED = ("model", "columns", "features", "stage", "outcome")
-BEST = 5  # candidates of a list that are rated
-TIE = 1e-9  # outcomes (shares) that differ less are the same
-SMALLEST_RANGE = 1e-8  # added to the range, which is 0 where all of a list have the same
-LEAST_OUTCOME = 0.05  # lists that can end with less count as if they ended with it, else the best of models would weigh most
+BEST = 5  # rated candidates per list
+TIE = 1e-9  # outcomes (shares) that differ less are equal
+SMALLEST_RANGE = 1e-8  # added to the range, which is 0 if all values of a list are equal
+LEAST_OUTCOME = 0.05  # lower outcomes count as this one, otherwise the best models would weigh most
 COLUMNS_NEEDED = ("id", "source_repo", "source_path")
-TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest judges
-FOLDS = 4  # splits whose test sets are disjoint and together hold every model
+TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest tests
+FOLDS = 4  # splits with disjoint test sets, which together hold every model
 
 Singles = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 
 class Side(StrEnum):
-    """What the lists of a source are for."""
+    """The use of a source's lists."""
 
     TRAIN = "train"
     VALIDATION = "validation"
@@ -59,22 +59,23 @@ def side(source: str, fold: int = 0) -> Side:
 
 
 def place(name: str) -> float:
-    """A number from 0 to 1 that depends on nothing but the name."""
+    """A number from 0 to 1 that depends only on the name (a hash)."""
     return int.from_bytes(sha256(name.encode()).digest()[:8], "big") / 2**64
 
 
 def model_id(file: Path) -> str:
-    """The model of a record file, which is named MODEL.ORIENTATION.TERMS.npz."""
+    """The model of a record file MODEL.ORIENTATION.TERMS.npz."""
     return file.name.split(".")[0]
 
 
 @dataclass(frozen=True, eq=False)
 class RatedList:
-    """The n candidates of one stage of a recorded search that were cut, in the classic order.
+    """The n cut candidates of one stage of a recorded search, in the classic order.
 
-    features: (n, F) unscaled, in single precision as a ranker gets them, named in `columns`; outcome: (n,) the least final cost
-    through the candidate as share of the model's risky area; censored: (n,) the outcome is its own cost, for nobody went on from
-    there; record: name of the file that the list is from, without its ending; a model has one for each orientation and terms.
+    features: (n, F) unscaled, in single precision as a ranker gets them, named in `columns`; outcome: (n,) least final cost
+    through the candidate as a share of the model's risky area; censored: (n,) whether the outcome is the candidate's own cost,
+    because the search did not pursue it; record: name of the list's file without suffix; a model has one for each orientation and
+    terms.
     """
 
     features: Singles
@@ -87,7 +88,7 @@ class RatedList:
 
     @cached_property
     def ratings(self) -> Ints:
-        """(n,) 5 for the least outcome down to 1 for the fifth, 0 for the rest; equal outcomes in the order they come."""
+        """(n,) ratings: 5 for the least outcome down to 1 for the fifth, 0 for the rest; ties keep their order."""
         rated = np.zeros(len(self.outcome), np.int32)
         best = np.argsort(self.outcome, kind="stable")[:BEST]
         rated[best] = BEST - np.arange(len(best))
@@ -95,30 +96,29 @@ class RatedList:
 
     @property
     def regrets(self) -> Floats:
-        """(n,) by how much each candidate ends with more than the best of the list, as share of the best."""
+        """(n,) regrets: how much more each candidate ends with than the best of the list, as a share of the best."""
         least = float(self.outcome.min())
         shares: Floats = (self.outcome - least) / max(least, LEAST_OUTCOME)
         return shares
 
     @property
     def teaches(self) -> bool:
-        """Whether there is an order to learn: a list of one candidate has none."""
+        """Whether the list has an order to learn: a list of one candidate has none."""
         return len(self.outcome) > 1
 
     def table(self, columns: Sequence[str]) -> Singles:
-        """(n, k) the named features."""
+        """(n, k) columns of the named features."""
         return self.features[:, [self.columns.index(name) for name in columns]]
 
 
 def read_lists(
     folder: Path, manifest: Path | None = None, columns: Sequence[str] = PAPER_COLUMNS, terms: Sequence[str] = ()
 ) -> list[RatedList]:
-    """The lists of a folder's record files, by file name and stage; a model's source is that of the manifest, else itself.
+    """The lists of a folder's record files, by file name and stage; a model's source comes from the manifest, or else is the
+    model. terms: only lists of searches on one of these terms, MODEL.ORIENTATION.TERMS.npz.
 
-    terms: only those of searches on one of these terms, MODEL.ORIENTATION.TERMS.npz.
-
-    Raises UserError for a folder without records of each of the terms, and for a record of another version, without one of
-    the columns, of a model that the manifest does not know, or with a feature that is no finite number.
+    Raises UserError for a folder without records for one of the terms, and for a record of another version, without one of the
+    columns, of a model that is not in the manifest, or with a feature that is not finite.
     """
     known, files = list(folder.glob("*.npz")), set[Path]()
     for ending in [f".{name}.npz" for name in terms] or [".npz"]:
@@ -137,7 +137,7 @@ def read_lists(
 
 
 def read_record(file: Path, columns: Sequence[str] = PAPER_COLUMNS) -> Arrays:
-    """The arrays of a record file that can be learnt from; UserError as for `read_lists`."""
+    """The arrays of a record file for training; raises UserError like `read_lists`."""
     try:
         with np.load(file, allow_pickle=False) as archive:
             arrays: Arrays = dict(archive)
@@ -159,7 +159,7 @@ def _check(file: Path, arrays: Arrays, columns: Sequence[str]) -> None:
         raise UserError(f"record {file}: has no feature {', '.join(absent)}; it has {', '.join(arrays['columns'])}")
     rows = len(arrays["stage"])
     if arrays["features"].shape != (rows, len(arrays["columns"])) or arrays["outcome"].shape != (rows,):
-        raise UserError(f"record {file}: its features, stages and outcomes are not of the same candidates")
+        raise UserError(f"record {file}: its features, stages and outcomes differ in length")
     unusable = ~np.isfinite(arrays["features"])
     if unusable.any():
         row, column = np.argwhere(unusable)[0]
@@ -183,7 +183,7 @@ def _censored(record: Arrays) -> Mask:
         return np.zeros(len(record["stage"]), np.bool_)
     cut = record["child"] >= 0
     followed = record["node_expanded"].astype(np.bool_)
-    if "parent" in record:  # a node that was expanded and of which nothing was cut tells no more than one that was not
+    if "parent" in record:  # an expanded node without any cut is no more informative than one that was not expanded
         followed &= np.isin(np.arange(len(followed)), record["parent"][cut])
     censored: Mask = cut.copy()
     censored[cut] = ~followed[record["child"][cut]]
@@ -196,12 +196,12 @@ def of_side(lists: Sequence[RatedList], wanted: Side, fold: int = 0) -> list[Rat
 
 
 def of_some_models(lists: Sequence[RatedList], share: float) -> list[RatedList]:
-    """The lists of a share of the models; those of a smaller share are among those of a larger one."""
+    """The lists of a share of the models; a smaller share is a subset of a larger one."""
     return [recorded for recorded in lists if place(f"share of {recorded.model}") < share]
 
 
 def followed(lists: Sequence[RatedList]) -> list[RatedList]:
-    """The lists without the candidates that nobody followed, unless they are the best there."""
+    """The lists without the candidates that the search did not pursue, unless they are the best of their list."""
     shorter = []
     for rated in lists:
         rows = ~rated.censored | (rated.outcome <= np.min(rated.outcome) + TIE)
@@ -211,16 +211,16 @@ def followed(lists: Sequence[RatedList]) -> list[RatedList]:
 
 
 def scale(features: Singles) -> Singles:
-    """(n, F) every column from 0 to 1 over its list; a column that is the same everywhere becomes 0."""
+    """(n, F) features scaled to 0 to 1 over their list; a constant column becomes 0."""
     low, high = features.min(axis=0), features.max(axis=0)
     scaled: Singles = (features - low) / (high - low + np.float32(SMALLEST_RANGE))
     return scaled
 
 
 def read_sources(manifest: Path) -> dict[str, str]:
-    """Model -> its repository and folder, of a table with the columns id, source_repo and source_path.
+    """The source of each model, its repository and folder, from a table with the columns id, source_repo and source_path.
 
-    Raises UserError for a file that is no such table.
+    Raises UserError for any other file.
     """
     try:
         with manifest.open(newline="", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""Models: the solids of a folder to learn from, made coarser where they are too fine, in several orientations."""
+"""Models: the training solids of a folder, simplified if they are too fine, in several orientations."""
 
 from itertools import pairwise
 from math import cos, radians
@@ -8,7 +8,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mdp.cut import simplify
-from mdp.directions.orientation import resting_orientations, standing_still
+from mdp.directions.orientation import resting_orientations, set_on_plate
 from mdp.formats.readers import READERS
 from mdp.formats.surface import check_surface
 from mdp.mesh import Floats, Mesh
@@ -18,18 +18,19 @@ from mdp.repair.repair import repair
 from profiles.errors import MeshError, UserError
 
 ARRAYS = ".npz"
-MOST_MOVED = 0.002  # share of the diagonal by which a coarser surface may lie off
-FINEST_MOVED = MOST_MOVED / 2**8  # tried first, then twice as much each time: at most nine simplifications
-SIDES_APART_DEG = 20.0  # directions of two sides that count as different
+MOST_MOVED = 0.002  # deviation of a simplified surface, as a share of the diagonal
+FINEST_MOVED = MOST_MOVED / 2**8  # first tolerance, doubled up to MOST_MOVED: at most nine simplifications
+SIDES_APART_DEG = 20.0  # least angle between the directions of two different sides
 
 
 def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
-    """The models of a folder by name: npz files and mesh files whose name has `only` in it, of these every nth (`every`).
+    """The models of a folder sorted by name: npz files and mesh files whose name contains `only`, and of these every nth
+    (`every`).
 
-    Raises UserError for a folder without any, and for two models of one name.
+    Raises UserError for a folder without models, and for two models with the same name.
     """
     if not folder.is_dir():
-        raise UserError(f"folder {folder}: there is none; models to learn from are expected in it")
+        raise UserError(f"folder {folder}: does not exist; a folder of models is expected")
     kinds = (ARRAYS, *READERS)
     files = sorted(file for file in folder.iterdir() if file.suffix.lower() in kinds and only in file.stem)[::every]
     if not files:
@@ -42,13 +43,14 @@ def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
 
 
 def name_of(file: Path) -> str:
-    """The model's name, without dots, which part the names of records."""
+    """The model's name with dots replaced, since dots separate the fields of record names."""
     return file.stem.replace(".", "_")
 
 
 def read_model(path: Path) -> Mesh:
-    """The solid of an npz file (vertices (n, 3) in mm and faces (m, 3)) or of a mesh file, repaired, resting on the platform and
-    centred; MeshError when it is none."""
+    """The repaired solid of an npz file (vertices (n, 3) in mm and faces (m, 3)) or of a mesh file, centred on the build plate;
+    raises MeshError for an invalid one.
+    """
     if path.suffix.lower() != ARRAYS:
         return read_mesh(path)[0]
     try:
@@ -71,22 +73,22 @@ def coarser(mesh: Mesh, most_faces: int) -> Mesh:
     while len(simpler.faces) > most_faces and share <= MOST_MOVED:
         simpler = simplify(mesh, share * diagonal_mm)
         share *= 2.0
-    return standing_still(simpler, np.eye(3))
+    return set_on_plate(simpler, np.eye(3))
 
 
 def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh | None:
-    """The mesh in one of its resting poses; None where it has fewer.
+    """The mesh in one of its resting poses; None if it has fewer.
 
-    0: as it stands. 1 and up: on its other sides, in the order of `other_sides`, which does not depend on the number.
+    number: 0 for the present pose, 1 and up for the other sides in the order of `other_sides`.
     """
     if number == 0:
         return mesh
     sides = other_sides(mesh, angle_deg)
-    return standing_still(mesh, sides[number - 1]) if number <= len(sides) else None
+    return set_on_plate(mesh, sides[number - 1]) if number <= len(sides) else None
 
 
 def other_sides(mesh: Mesh, angle_deg: float) -> list[Floats]:
-    """Rotations (3, 3) onto the other sides that a mesh rests on with a risky face left, the most different first."""
+    """Rotations (3, 3) onto the other sides on which a mesh rests and has risky faces, the most different first."""
     left = [orientation.rotation for orientation in resting_orientations(mesh, angle_deg) if orientation.risky_mm2 > 0.0]
     directions, sides = [UP], list[Floats]()
     while left:

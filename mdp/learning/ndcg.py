@@ -1,7 +1,7 @@
-"""NDCG as the 2020 paper's table has it, and regret: what the order of a list is worth.
+"""NDCG as in the 2020 paper's table, and regret: measures of a list's order.
 
-NDCG@k = DCG@k / ideal DCG@k, DCG@k = sum over the first k of (2^rating - 1) / log2(place + 1), the ideal list cut at the same
-k, the mean over lists, 0 for a list without a rating above 0. Candidates with equal scores stay in the order they come.
+NDCG@k = DCG@k / ideal DCG@k, DCG@k = sum over the first k of (2^rating - 1) / log2(place + 1), the ideal list cut at the same k,
+averaged over lists, 0 for a list without a rating above 0. Candidates with equal scores keep their order.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,24 +12,24 @@ from mdp.learning.lists import RatedList
 from mdp.mesh import Floats, Ints
 from mdp.ranking.ranker import DECIMALS
 
-RESAMPLES = 2000  # of a bootstrap: 50 of them lie beyond either end of 95 %
+RESAMPLES = 2000  # of a bootstrap: 50 of them lie beyond either end of the 95 % interval
 
 Scores = Callable[[RatedList], Floats]
 Measure = Callable[[Floats, RatedList], float]
 
 
 def order(scores: Floats) -> Ints:
-    """(n,) candidates by falling score."""
+    """(n,) candidates by descending score."""
     return np.argsort(-scores, kind="stable").astype(np.int32)
 
 
 def as_searched(scores: Scores) -> Scores:
-    """Scores of a network rounded as a search compares them, so that candidates alike stay in the order they come."""
+    """A network's scores rounded as in a search, so that equivalent candidates keep their order."""
     return lambda rated: np.asarray(np.round(scores(rated), DECIMALS), np.float64)
 
 
 def ndcg(scores: Floats, ratings: Ints, cut: int) -> float:
-    """NDCG at a place of one list."""
+    """NDCG of one list, cut at a place."""
     ideal = _dcg(np.sort(ratings)[::-1], cut)
     return _dcg(ratings[order(scores)], cut) / ideal if ideal > 0.0 else 0.0
 
@@ -41,12 +41,14 @@ def _dcg(ratings: Ints, cut: int) -> float:
 
 
 def at(cut: int) -> Measure:
-    """NDCG at a place as a measure."""
+    """NDCG cut at a place, as a measure."""
     return lambda scores, rated: ndcg(scores, rated.ratings, cut)
 
 
 def regret(first: int) -> Measure:
-    """By how much the best of the first few ends with more than the best of the list, as share of that."""
+    """Regret of the best of the first few candidates: how much more it ends with than the best of the list, as a share of
+    that.
+    """
     return lambda scores, rated: float(rated.regrets[order(scores)[:first]].min())
 
 
@@ -55,7 +57,7 @@ REGRETS = {f"regret@{first}": regret(first) for first in (1, 2, 5)}
 
 
 def interval(values: Floats, models: Sequence[str]) -> tuple[float, float]:
-    """95 % interval of the mean of the lists' values, the models resampled: the lists of one model stand or fall together."""
+    """95 % interval of the mean over lists, by resampling the models: lists of one model are not independent."""
     names, inverse = np.unique(np.asarray(models), return_inverse=True)
     sums = np.bincount(inverse, weights=values, minlength=len(names))
     counts = np.bincount(inverse, minlength=len(names))

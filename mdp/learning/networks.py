@@ -1,6 +1,6 @@
-"""Networks: trained in torch, exported as ONNX files that take raw features, prepare them in the graph and give scores.
+"""Networks trained in torch and exported as ONNX files that take raw features, prepare them in the graph and return scores.
 
-The graph is written node by node, so what a search runs is what stands here, and torch's exporter is not needed.
+The graph is written node by node, so a search runs exactly the code below, and torch's exporter is not needed.
 """
 
 from abc import ABC, abstractmethod
@@ -20,14 +20,14 @@ from mdp.ranking.ranker import INPUT, OUTPUT
 from profiles.errors import UserError
 from profiles.files import SHARED, write_whole
 
-OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of the last years
+OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of recent years
 TRADE_OFFS = (1.0, 4.0, 16.0)  # of M6 against M2
-LEAST_RANGE = 1e-4  # added to a feature's range: a share of 1e-4 of the model is no difference to go by
+LEAST_RANGE = 1e-4  # added to a feature's range: a difference of 1e-4 of the model is insignificant
 SMALLEST_SPREAD = 1e-6  # inputs with a smaller standard deviation count as constant
 
 
 class Network(torch.nn.Module, ABC):
-    """Dense layers with ReLU between them, and a linear term beside them where there is one; subclasses prepare the inputs."""
+    """Dense layers with ReLU between them, plus a linear term in some subclasses; subclasses prepare the inputs."""
 
     def __init__(self, inputs: int, hidden: Sequence[int]) -> None:
         super().__init__()
@@ -38,7 +38,7 @@ class Network(torch.nn.Module, ABC):
         """Set what depends on the training lists; nothing by default."""
 
     def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
+        """(L, n) scores of (L, n, F) features; present: (L, n) true for candidates, false for padding."""
         rows = inputs = self.inputs(features, present)
         for layer in self.layers[:-1]:
             rows = torch.relu(layer(rows))
@@ -47,15 +47,15 @@ class Network(torch.nn.Module, ABC):
 
     @abstractmethod
     def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-        """(L, n, inputs) what the layers take."""
+        """(L, n, inputs) inputs of the first layer."""
 
     @abstractmethod
     def inputs_in(self, graph: "Graph") -> str:
-        """The (n, inputs) value of a graph that the layers take."""
+        """Name of the (n, inputs) value in a graph that feeds the first layer."""
 
 
 class PaperNetwork(Network):
-    """The paper's: scores each candidate from its features, scaled over its list; Glorot-uniform weights."""
+    """The paper's network: scores each candidate by its features, scaled over its list; Glorot-uniform weights."""
 
     def __init__(self, columns: Sequence[str], hidden: Sequence[int] = (100, 100), seed: int = 0) -> None:
         """columns: names of the features."""
@@ -70,14 +70,15 @@ class PaperNetwork(Network):
         return scaled(features, present, SMALLEST_RANGE)
 
     def inputs_in(self, graph: "Graph") -> str:
-        """The same in a graph."""
+        """Add the scaling of the inputs to an ONNX graph; returns the name of its output."""
         return graph.scaled(INPUT, SMALLEST_RANGE)
 
 
 class RegretNetwork(Network):
-    """Ours: takes the features as they are, scaled by list, and M2 - k M6 below the best of the list for some k, standardised.
+    """Our network. Inputs: features unscaled and scaled by list, and M2 - k M6 relative to the best of the list for several k,
+    standardised.
 
-    M2 - k M6 is what a cut saves less what it loses for ever: the trade-offs that the slots of a beam follow.
+    M2 - k M6 is what a cut saves less what it loses for good: the trade-offs that the slots of a beam follow.
     """
 
     def __init__(self, columns: Sequence[str], hidden: Sequence[int] = (32, 32), seed: int = 0) -> None:
@@ -95,21 +96,21 @@ class RegretNetwork(Network):
                 torch.nn.init.uniform_(parameter, -most, most, generator=generator)
 
     def prepare(self, features: torch.Tensor, present: torch.Tensor) -> None:
-        """Take mean and spread of the inputs."""
+        """Compute mean and spread of the inputs."""
         inputs = self.inputs(features, present)[present].double()
         spread, mean = torch.std_mean(inputs, dim=0, correction=0)
         self.mean.copy_(mean)
         self.spread.copy_(torch.where(spread < SMALLEST_SPREAD, 1.0, spread))
 
     def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-        """(L, n, 2F + TRADE_OFFS) what the layers take: of mean 0 and spread 1 once the network is prepared."""
+        """(L, n, 2F + TRADE_OFFS) inputs of the first layer, with mean 0 and spread 1 once the network is prepared."""
         saved = features @ self.contrasts
         most = torch.where(present.unsqueeze(-1), saved, -torch.inf).amax(dim=1, keepdim=True)
         whole = torch.cat([features, scaled(features, present, LEAST_RANGE), saved - most], dim=-1)
         return (whole - self.mean) / self.spread
 
     def inputs_in(self, graph: "Graph") -> str:
-        """The same in a graph."""
+        """Add the preparation of the inputs to an ONNX graph; returns the name of its output."""
         saved = graph.add("MatMul", INPUT, graph.constant(self.contrasts))
         below = graph.add("Sub", saved, graph.add("ReduceMax", saved, axes=[0], keepdims=1))
         inputs = graph.add("Concat", INPUT, graph.scaled(INPUT, LEAST_RANGE), below, axis=1)
@@ -121,7 +122,7 @@ NETWORKS = {"urank": PaperNetwork, "regret": RegretNetwork}
 
 
 def contrasts(columns: Sequence[str]) -> Singles:
-    """(F, TRADE_OFFS) what features are multiplied by to get M2 - k M6."""
+    """(F, TRADE_OFFS) matrix that turns features into M2 - k M6."""
     matrix = np.zeros((len(columns), len(TRADE_OFFS)), np.float32)
     matrix[columns.index("M2")] = 1.0
     matrix[columns.index("M6")] = np.negative(TRADE_OFFS)
@@ -129,7 +130,7 @@ def contrasts(columns: Sequence[str]) -> Singles:
 
 
 def scaled(features: torch.Tensor, present: torch.Tensor, smallest_range: float) -> torch.Tensor:
-    """(L, n, F) every feature from 0 to 1 over its list, as `mdp.learning.lists.scale`."""
+    """(L, n, F) features scaled to 0 to 1 over their list, as in `mdp.learning.lists.scale`."""
     here = present.unsqueeze(-1)
     low = torch.where(here, features, torch.inf).amin(dim=1, keepdim=True)
     high = torch.where(here, features, -torch.inf).amax(dim=1, keepdim=True)
@@ -137,7 +138,7 @@ def scaled(features: torch.Tensor, present: torch.Tensor, smallest_range: float)
 
 
 def scores(networks: Sequence[Network], columns: Sequence[str]) -> Scores:
-    """The mean of what networks give the candidates of a list from the named features."""
+    """Mean score of several networks for the candidates of a list, from the named features."""
 
     def of_list(rated: RatedList) -> Floats:
         features = torch.from_numpy(rated.table(columns)).unsqueeze(0)
@@ -151,32 +152,32 @@ def scores(networks: Sequence[Network], columns: Sequence[str]) -> Scores:
 
 
 class Graph:
-    """An ONNX graph that grows node by node; values are known by their names."""
+    """An ONNX graph built node by node; values are referred to by name."""
 
     def __init__(self) -> None:
         self._nodes: list[onnx.NodeProto] = []
         self._constants: list[onnx.TensorProto] = []
 
     def add(self, operator: str, *inputs: str, **attributes: object) -> str:
-        """A node with one output; the output's name."""
+        """Add a node with one output; returns the output's name."""
         name = f"{operator.lower()}_{len(self._nodes)}"
         self._nodes.append(helper.make_node(operator, inputs, [name], **attributes))
         return name
 
     def constant(self, tensor: torch.Tensor) -> str:
-        """A tensor of numbers that stay; its name."""
+        """Add a constant tensor; returns its name."""
         name = f"constant_{len(self._constants)}"
         self._constants.append(numpy_helper.from_array(tensor.detach().numpy(), name))
         return name
 
     def scaled(self, features: str, smallest_range: float) -> str:
-        """(n, F) every column from 0 to 1 over its list."""
+        """Add the scaling of (n, F) columns to 0 to 1 over their list; returns the name of its output."""
         low, high = (self.add(operator, features, axes=[0], keepdims=1) for operator in ("ReduceMin", "ReduceMax"))
         smallest = self.constant(torch.tensor(smallest_range))
         return self.add("Div", self.add("Sub", features, low), self.add("Add", self.add("Sub", high, low), smallest))
 
     def model(self, columns: Sequence[str], scores: str, metadata: Mapping[str, str]) -> bytes:
-        """The file's content; scores: name of the (n,) value that is given out; columns: names of the (n, F) features."""
+        """The file's content. scores: name of the (n,) output value; columns: names of the (n, F) features."""
         self._nodes.append(helper.make_node("Identity", [scores], [OUTPUT]))
         given = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["candidates", len(columns)])
         taken = helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["candidates"])
@@ -190,10 +191,10 @@ class Graph:
 
 
 def export(networks: Sequence[Network], columns: Sequence[str], metadata: Mapping[str, str]) -> bytes:
-    """The content of an ONNX file that scores by the mean of networks of one kind that were prepared with the same lists.
+    """The content of an ONNX file that averages the scores of networks of one kind, prepared with the same lists.
 
-    Their weights are stacked, so that all of them are one product a layer: (networks, inputs, outputs). metadata: what else a
-    person may want to know of the file (kind, data_set, commit, figures).
+    Their weights are stacked, so that each layer is one product: (networks, inputs, outputs). metadata: further information about
+    the file (kind, data_set, commit, figures).
     """
     graph = Graph()
     inputs = rows = networks[0].inputs_in(graph)
@@ -211,7 +212,7 @@ def export(networks: Sequence[Network], columns: Sequence[str], metadata: Mappin
 
 
 def write(file: Path, content: bytes) -> None:
-    """Write a ranker whole or not at all; UserError where that cannot be done."""
+    """Write a ranker whole or not at all; raises UserError if that fails."""
     try:
         write_whole(file, content, SHARED)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Pictures as in the 2020 paper: J and time against the beam's width (Fig. 7), what the features do (Fig. 8)."""
+"""Figures of the 2020 paper: J and time against beam width (Fig. 7), importance and correlation of features (Fig. 8)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,13 +10,15 @@ from mdp.learning.widths import Comparison
 from mdp.mesh import Floats
 from profiles.errors import UserError
 
-INCHES, DOTS = 4.2, 150  # of a panel, per inch
-DARK = 0.6  # correlation from which its square is too dark for black figures
+INCHES, DOTS = 4.2, 150  # size of a panel, resolution per inch
+DARK = 0.6  # correlation above which a square is too dark for black figures
 PLAIN, LEARNED = "#4472a8", "#e0a030"
 
 
 def draw_widths(comparisons: Sequence[Comparison]) -> Figure:
-    """A row a comparison: what each width takes off the mean J of the narrowest plain beam, and the time it takes."""
+    """One row per comparison: reduction of the mean J relative to the narrowest plain beam, and processor time, for each
+    width.
+    """
     figure = Figure(figsize=(2 * INCHES, INCHES * len(comparisons)), layout="constrained")
     for comparison, (left, right) in zip(comparisons, figure.subplots(len(comparisons), 2, squeeze=False), strict=True):
         first = float(next(iter(comparison.shares.values())).mean())
@@ -49,7 +51,7 @@ def _colours(count: int) -> list[str]:
 
 
 def draw_features(columns: Sequence[str], importance: Floats, correlation: Floats) -> Figure:
-    """Bars of (k,) importance beside the (k, k) matrix of correlation."""
+    """Bars of (k,) importance beside the (k, k) correlation matrix."""
     side = max(INCHES, 0.42 * len(columns))
     figure = Figure(figsize=(2 * side, side), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -69,7 +71,7 @@ def draw_features(columns: Sequence[str], importance: Floats, correlation: Float
 
 
 def save(figure: Figure, file: Path) -> None:
-    """Write a picture as PNG; UserError where that cannot be done."""
+    """Write a figure as PNG; raises UserError if that fails."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(file, dpi=DOTS, format="png", metadata={"Software": None})

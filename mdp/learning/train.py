@@ -1,9 +1,8 @@
-"""Train: a ranker from a folder of records, the paper's or one that is asked for little regret.
+"""Train: a ranker from a folder of records, with the paper's loss or with expected regret as the loss.
 
     python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--loss urank|regret] [--terms NAME,...] ...
 
-The lists of the training side teach, those of the validation side say when to stop, those of the test side are only counted in
-the file's figures.
+The training lists fit the ranker, the validation lists stop the training, and the test lists only give the figures in the file.
 """
 
 import argparse
@@ -23,19 +22,19 @@ from profiles.errors import UserError
 if TYPE_CHECKING:
     from mdp.learning.networks import Network
 
-Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
-MOST_NETWORKS = 12  # of an ensemble; with --loss regret its file stays below 200 kB
-LOSSES = {"urank": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
-OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has its own
+Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # for training and for validation
+MOST_NETWORKS = 12  # in an ensemble; with --loss regret its file stays below 200 kB
+LOSSES = {"urank": "paper", "regret": "cheap"}  # and the default columns of each
+OWN = ("epochs", "patience", "batch", "rate")  # of the schedule; each loss has its own defaults
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Train and write the ranker; the exit code."""
+    """Train and write the ranker; returns the exit code."""
     return run(train, arguments, "nothing was written")
 
 
 def train(arguments: Sequence[str] | None) -> None:
-    """Train, write the ranker, say what it is worth on the lists that it never saw."""
+    """Train and write the ranker, then report its figures on the test lists."""
     options = _options(arguments)
     from mdp.learning.networks import export, scores, write
 
@@ -59,7 +58,9 @@ def train(arguments: Sequence[str] | None) -> None:
 
 
 def _trained(options: argparse.Namespace, columns: Sequence[str], lists: Sides) -> list["Network"]:
-    """The networks of a ranker, each by the schedule of its loss with what was given in its place; each shows how it goes."""
+    """The trained networks of a ranker, each with the schedule of its loss and the options that override it; progress is
+    shown.
+    """
     from mdp.learning.networks import NETWORKS
     from mdp.learning.training import OBJECTIVES, SCHEDULES, train
 
@@ -98,7 +99,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _show(measures: Sequence[str], number: int, loss: float, validation: Sequence[float], best: int) -> None:
-    """An epoch as a line that the next one replaces on a terminal."""
+    """Show an epoch as a line that the next one replaces on a terminal."""
     figures = ", ".join(f"{name} {value:.4f}" for name, value in zip(measures, validation, strict=True))
     line = f"epoch {number}: loss {loss:.3f}, validation {figures}, best epoch {best}"
     sys.stderr.write(f"\r\x1b[K{line}" if sys.stderr.isatty() else f"{line}\n")
@@ -106,13 +107,13 @@ def _show(measures: Sequence[str], number: int, loss: float, validation: Sequenc
 
 
 def counts(lists: Sequence[RatedList]) -> str:
-    """How many records, lists and models."""
+    """The numbers of records, lists and models, in words."""
     records, models = len({rated.record for rated in lists}), len({rated.model for rated in lists})
     return f"{records} records, {len(lists)} lists, {models} models"
 
 
 def judged(scores: Scores, lists: Sequence[RatedList]) -> dict[str, float | int]:
-    """How many lists, and the means of NDCG over them with four digits."""
+    """The number of lists, and the mean NDCG over them to four digits."""
     sums = {name: sum(measure(scores(rated), rated) for rated in lists) for name, measure in NDCGS.items() if lists}
     return {"lists": len(lists), **{name: round(total / len(lists), 4) for name, total in sums.items()}}
 

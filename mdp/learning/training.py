@@ -1,12 +1,12 @@
-"""Training: steps over shuffled batches of lists until the validation lists are ordered no better.
+"""Training: steps over shuffled batches of lists until the order of the validation lists improves no more.
 
-Adam, the norm of all gradients together cut off. The network with the highest figures on the validation lists is kept.
-One thread, and an order of lists drawn anew from seed and epoch: the same lists give the same weights.
+Adam with a limit on the norm of all gradients together. The network with the highest figures on the validation lists is kept. One
+thread, and an order of lists drawn from seed and epoch: equal lists give equal weights.
 
-uRank (Zhu and Klabjan 2020) as the 2020 paper uses it; the paper prints the loss without its minus sign and calls |R| what is
-the number of distinct ratings. Regret, ours: the regret that one has to expect who draws a candidate by the softmax of the
-scores, so candidates that are nearly as good as the best cost nearly nothing, whatever their place. A step of it sees part of
-each list, for searches meet short ones. Lists of different lengths are padded to one length, so that a step takes many at once.
+uRank (Zhu and Klabjan 2020) as the 2020 paper uses it; the paper prints the loss without its minus sign, and calls the number of
+distinct ratings |R|. Regret, ours: the expected regret of a candidate drawn by the softmax of the scores, so candidates that are
+nearly as good as the best cost nearly nothing, wherever they are placed. A step of it uses part of each list, since searches meet
+short ones. Lists are padded to one length, so that a step takes many at once.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,11 +24,11 @@ from mdp.learning.networks import Network
 from mdp.mesh import Floats, Ints
 from profiles.errors import UserError
 
-FAR_BELOW = -1e30  # a score that no exponential sees, finite so that gradients stay numbers
-CUTS = (1, 3, 5)  # of the NDCG by which uRank is validated
-FIRST = (1, 2)  # candidates: by the regret of the best of them a training for little regret is validated
-LEAST_PART = 0.3  # of a list that a step for little regret sees
-PERCENT, MOST_REGRET, ENTROPY_WEIGHT = 100.0, 1.0, 0.005  # a list costs 1 at most; entropy keeps scores from running away
+FAR_BELOW = -1e30  # a score without weight in an exponential, finite so that gradients stay numbers
+CUTS = (1, 3, 5)  # cutoffs of the NDCG by which uRank is validated
+FIRST = (1, 2)  # numbers of first candidates whose best regret validates a training with the regret loss
+LEAST_PART = 0.3  # least share of a list that a step with the regret loss uses
+PERCENT, MOST_REGRET, ENTROPY_WEIGHT = 100.0, 1.0, 0.005  # a list costs 1 at most; the entropy term keeps scores bounded
 
 Loss = Callable[[torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
 Targets = Floats | Ints
@@ -44,17 +44,17 @@ class Padded:
     present: torch.Tensor
 
     def take(self, rows: torch.Tensor) -> "Padded":
-        """Some of the lists, no longer than the longest of them needs."""
+        """A selection of the lists, padded to the longest of them."""
         longest = int(self.present[rows].sum(dim=1).max())
         return Padded(self.features[rows, :longest], self.targets[rows, :longest], self.present[rows, :longest])
 
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What a training asks for.
+    """A training objective.
 
-    targets: (n,) what the scores of a list are held against; loss: (L,) of scores, targets and present; figures: what scores of
-    a list are worth by `measures`, each the better the higher; thins: whether a step sees only a part of each list.
+    targets: (n,) targets for the scores of a list; loss: (L,) from scores, targets and present; figures: values of `measures` for
+    the scores of a list, where higher is better; thins: whether a step uses only a part of each list.
     """
 
     targets: Callable[[RatedList], Targets]
@@ -64,7 +64,7 @@ class Objective:
     thins: bool
 
     def pad(self, lists: Sequence[RatedList], columns: Sequence[str]) -> Padded:
-        """Lists side by side, with the named features."""
+        """Lists padded to one length, with the named features."""
         targets = [torch.from_numpy(self.targets(rated)) for rated in lists]
         features = [torch.from_numpy(rated.table(columns)) for rated in lists]
         present = [torch.ones(len(array), dtype=torch.bool) for array in targets]
@@ -72,7 +72,8 @@ class Objective:
 
 
 def urank_loss(scores: torch.Tensor, ratings: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-    """(L,) loss of each list: every candidate against all of lower rating, weighted by its gain, over the ratings but one.
+    """(L,) uRank loss of each list: every candidate against all of lower rating, weighted by its gain, divided by the number of
+    distinct ratings less one.
 
     1/(U-1) sum_i (2^r_i - 1) softplus(logsumexp_{j: r_j < r_i} s_j - s_i), U the number of distinct ratings of the list.
     """
@@ -85,16 +86,16 @@ def urank_loss(scores: torch.Tensor, ratings: torch.Tensor, present: torch.Tenso
 
 
 def regret_loss(scores: torch.Tensor, regrets: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-    """(L,) loss of each list: expected regret under the softmax of the scores in percent, less a little of its entropy."""
+    """(L,) regret loss of each list: expected regret under the softmax of the scores in percent, less a little of its entropy."""
     chances = torch.where(present, scores, FAR_BELOW).softmax(dim=1)
     least = torch.where(present, regrets, torch.inf).amin(dim=1, keepdim=True)
     more = torch.where(present, regrets - least, 0.0).to(scores.dtype)
-    entropy = torch.special.entr(chances.clamp(min=1e-7)).sum(dim=1)  # the clamp: no gradient without end at a chance of 0
+    entropy = torch.special.entr(chances.clamp(min=1e-7)).sum(dim=1)  # the clamp avoids an infinite gradient at a chance of 0
     return PERCENT * (chances * more).sum(dim=1).clamp(max=MOST_REGRET) - ENTROPY_WEIGHT * entropy
 
 
 def thin(present: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-    """(L, n) a part of each list, drawn anew, between LEAST_PART and all of it; all where fewer than two would be left."""
+    """(L, n) random part of each list, between LEAST_PART and all of it; the whole list if fewer than two would remain."""
     parts = LEAST_PART + (1.0 - LEAST_PART) * torch.rand(len(present), 1, generator=generator)
     some = present & (torch.rand(present.shape, generator=generator) < parts)
     return torch.where(some.sum(dim=1, keepdim=True) >= 2, some, present)
@@ -119,10 +120,10 @@ OBJECTIVES = {
 
 @dataclass(frozen=True)
 class Schedule:
-    """How to train.
+    """Schedule of a training.
 
-    loss: name of an objective; patience: epochs without a gain; batch: lists a step; rate: Adam's; clip: largest norm of the
-    gradients; decay: of the weights, added to the gradients.
+    loss: name of an objective; patience: epochs without a gain; batch: lists per step; rate: learning rate of Adam; clip:
+    greatest norm of the gradients; decay: weight decay, added to the gradients.
     """
 
     loss: str = "urank"
@@ -149,9 +150,9 @@ def train(
     schedule: Schedule,
     on_epoch: OnEpoch = lambda number, loss, validation, best: None,
 ) -> Figures:
-    """Train a network in place on the named features of lists for training and for validation; the best figures.
+    """Train a network in place on the named features of training and validation lists; returns the best figures.
 
-    Lists of one candidate are left out. Raises UserError if no others remain.
+    Lists of one candidate are left out. Raises UserError if none remain.
     """
     torch.set_num_threads(1)
     training, validation = ([rated for rated in side if rated.teaches] for side in lists)
@@ -177,7 +178,7 @@ def train(
 
 
 def _steps(network: Network, adam: torch.optim.Optimizer, lists: Padded, schedule: Schedule, epoch: int) -> float:
-    """One epoch; the mean loss of the lists, each as its step met it."""
+    """Run one epoch; returns the mean loss of the lists, each at the time of its step."""
     total, objective = 0.0, OBJECTIVES[schedule.loss]
     generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + epoch)
     for rows in torch.randperm(len(lists.targets), generator=generator).split(schedule.batch):

@@ -1,7 +1,7 @@
-"""Widths: what whole searches end with at several beam widths, plain and learned (Fig. 7 of the 2020 paper).
+"""Widths: results of whole searches at several beam widths, plain and learned (Fig. 7 of the 2020 paper).
 
-The searches are rows of the table that tools/campaigns/widths.py writes. Plain is the ranking of the paper. J is what stays risky
-as a share of what printing straight up leaves risky; where seams and stairs cost something, the cost.
+The searches are rows of the table that tools/campaigns/widths.py writes. Plain is the ranking of the paper. J is the remaining
+risky area as a share of the risky area of printing straight up; if seams and stair-stepping have a cost, the share of the cost.
 """
 
 import csv
@@ -21,7 +21,7 @@ NEEDED = ("mesh", "settings", "method", "width", "share", "core_s")
 CLASSIC = "classic"
 NOTHING_COMMON = "no model in it was searched with every ranker at every width, or none meets --least-removed"
 RESAMPLES = 10_000
-MORE = 0.01  # share of J by which a model must differ from a plain beam of the same width to count as worse or better
+MORE = 0.01  # share of J by which a model must differ from a plain beam of equal width to count as worse or better
 HEADS = (
     *("ranker", "B", "mean J", "of plain B = 1", "95 %", "of the gap from plain 2 to the best plain width", "95 %"),
     *("core time, of the widest plain beam", "worse than plain by > 1 %", "better by > 1 %"),
@@ -32,7 +32,7 @@ Kind = tuple[str, int]  # ranker and width
 
 @dataclass(frozen=True)
 class TimedSearch:
-    """One search of the table: its J and its processor time."""
+    """One search of the table: its J (share) and its processor time."""
 
     mesh: str
     settings: str
@@ -45,9 +45,9 @@ class TimedSearch:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """All searches of one method and its settings, over the n models for which every one of them was made.
+    """All searches with one method and its settings, over the n models for which the set of searches is complete.
 
-    shares, core_s: (n,) of each ranker and width, plain ones first, by rising width.
+    shares, core_s: (n,) for each ranker and width, plain ones first, by ascending width.
     """
 
     method: str
@@ -58,12 +58,12 @@ class Comparison:
 
     @property
     def plain_widths(self) -> list[int]:
-        """The widths that were searched with the plain ranking."""
+        """The beam widths of the plain ranking."""
         return [width for ranker, width in self.shares if ranker == CLASSIC]
 
 
 def read_searches(table: Path) -> list[TimedSearch]:
-    """The searches that did not fail, of models with a risky face; UserError for a file that is no such table."""
+    """The searches that did not fail, of models with risky faces; raises UserError for any other file."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
@@ -82,17 +82,17 @@ def _search(row: dict[str, str]) -> TimedSearch:
     numbers = int(row["width"]), float(row["share"]), float(row["core_s"])
     if not all(map(isfinite, numbers)):
         raise ValueError(f"{row['mesh']}, width {row['width']}: share is {row['share']}, core_s {row['core_s']}")
-    ranker = Path(row.get("ranker") or CLASSIC).stem  # files of one name are one ranker, trained for different folds
+    ranker = Path(row.get("ranker") or CLASSIC).stem  # files with equal names are one ranker, trained for different folds
     return TimedSearch(row["mesh"], row["settings"], row["method"], ranker, *numbers)
 
 
 def compare(searches: Sequence[TimedSearch], least_removed: float = 0.0) -> list[Comparison]:
-    """A comparison for every method and its settings, in the order they come.
+    """A comparison for every method and its settings, in the order of the table.
 
     A comparison is left out if no model was searched with every ranker at all of its widths.
 
-    least_removed: only models of which the widest plain beam removes at least this share of the risky area; the choice depends on
-    no learned ranker.
+    least_removed: only models from which the widest plain beam removes at least this share of the risky area; this choice does
+    not depend on a learned ranker.
     """
     kinds = dict.fromkeys((search.method, search.settings) for search in searches)
     found = (_comparison(kind, [s for s in searches if (s.method, s.settings) == kind], least_removed) for kind in kinds)
@@ -115,7 +115,7 @@ def _comparison(method: tuple[str, str], searches: Sequence[TimedSearch], least_
 
 
 def table(comparison: Comparison) -> str:
-    """A table in Markdown, one row a ranker and width; intervals by resampling the models."""
+    """A table in Markdown, one row per ranker and width; intervals by resampling the models."""
     title = f"{comparison.method}, {comparison.settings or 'default settings'}: {len(comparison.models)} models"
     drawn = np.random.default_rng(0).integers(0, len(comparison.models), (RESAMPLES, len(comparison.models)), np.int32)
     kinds = sorted(comparison.shares, key=lambda kind: (kind[1], kind[0]))
@@ -151,7 +151,7 @@ def best_plain(comparison: Comparison) -> int:
 
 
 def _with_interval(measure: Callable[[Ints], Floats], drawn: Ints, form: str) -> list[str]:
-    """A figure over all models, and its 95 % interval over the draws of them in which it is a number; "-" where it is none."""
+    """A figure over all models, and its 95 % interval over those draws that give a number; "-" if undefined."""
     with np.errstate(divide="ignore", invalid="ignore"):
         whole, draws = float(measure(np.arange(drawn.shape[1], dtype=np.int32))), measure(drawn)
     known = draws[np.isfinite(draws)]

@@ -1,7 +1,7 @@
-"""Which cuts are possible, what they are worth, and in what order a search takes them.
+"""Feasible cuts, their value, and the order in which a search makes them.
 
-`node.Node` is what remains after some cuts. `candidates` scores and checks planes, a `ranking.CandidateTable` holds
-those of one node, `ranking` and `ranker.ranker_named` order them, `record.Trace` puts them on record.
+`node.Node` is the remainder after some cuts. `candidates` scores and checks planes, a `ranking.CandidateTable` holds the
+candidates of one node, `ranking` and `ranker.ranker_named` order them, and `record.Trace` records them.
 """
 
-SUFFIX = ".onnx"  # of a trained ranker's file
+SUFFIX = ".onnx"  # suffix of a trained ranker's file

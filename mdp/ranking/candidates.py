@@ -1,7 +1,7 @@
-"""Candidates: directions times offsets, and what the criteria, the axes and the head leave of them.
+"""Candidates: planes by direction and offset, filtered by the criteria, the reach of the axes and the clearance of the head.
 
-Criteria of the 2020 paper: I (self-supported above the plane) is the search's relaxed goal, II (what remains stands on the
-platform), III (the platform lies below the plane), IV (a large volume above the plane).
+Criteria of the 2020 paper: I (self-supported above the plane) is the search's relaxed goal, II (the remainder stands on the build
+plate), III (the plate lies below the plane), IV (a large volume above the plane).
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ from mdp.clearance import least_height_mm
 from mdp.cost.cost import CostTerms, CutCost
 from mdp.directions.unit_vectors import spread
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
+from mdp.overhang import PLATE_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
 from mdp.sweep.components import LEAST_CONTACT_AREA_MM2
 from mdp.sweep.limbs import LimbSums
@@ -25,12 +25,13 @@ from profiles.messages import key_name, phrase
 from profiles.profile import Profile
 from profiles.search import Search
 
-# A plane is never laid into a face that overhangs along its direction: that would look like resting on the cut, over air.
+# A plane never coincides with a face that overhangs along its direction: the face would seem to rest on the cut, but lies over
+# air.
 COPLANAR_MM = 1e-4
 
 
 class Reason(IntEnum):
-    """Why a candidate is out; FEASIBLE: it is not. The first reason that holds is counted."""
+    """Why a candidate is rejected, FEASIBLE if it is not. The first reason that holds is counted."""
 
     FEASIBLE = 0
     PLATFORM = 1
@@ -47,8 +48,8 @@ class Reason(IntEnum):
 
 
 REASONS = {
-    Reason.PLATFORM: f"the plane would cut the platform{phrase('', ' (criterion III)')}",
-    Reason.FLOATING: f"what remains would not stand on the platform{phrase('', ' (criterion II)')}",
+    Reason.PLATFORM: f"the plane would cut the build plate{phrase('', ' (criterion III)')}",
+    Reason.FLOATING: f"the remainder would not stand on the build plate{phrase('', ' (criterion II)')}",
     Reason.REACH: "the axes do not reach the direction",
     Reason.CLEARANCE: "the head would meet the table",
     Reason.VOLUME: f"the part would be too small ({key_name('search.least_volume_share')})",
@@ -70,9 +71,10 @@ def directions(search: Search) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """What every direction must respect, worked out once a search: (k,) arrays. keep_mm: (k, spans, 2) offsets between which a
-    plane passes through a zone; fragment_mm: a piece that is lower is a fragment; fragile_mm: what is thinner is a sliver;
-    step_mm: between the candidates of a direction."""
+    """Constraints per direction, computed once per search: (k,) arrays. keep_mm: (k, spans, 2) offsets between which a plane
+    would pass through a [[keep]] zone; fragment_mm: height below which a piece is a fragment; fragile_mm: thickness below which
+    it is a sliver; step_mm: between candidates along a direction.
+    """
 
     directions: Floats
     least_offset_mm: Floats
@@ -86,14 +88,14 @@ class Bounds:
 
     @property
     def contact_area_mm2(self) -> float:
-        """The least area that a piece of the part stands on."""
+        """The least area on which a piece of the part may stand, mm2."""
         return max(self.least_interface_mm2, LEAST_CONTACT_AREA_MM2)
 
 
 def bounds_of(
     chosen: Floats, mesh: Mesh, profile: Profile, disc: tuple[Floats, float], keep: Sequence[Zone | KeptFaces] = ()
 ) -> Bounds:
-    """Bounds for (k, 3) directions; disc: what every plane must clear; keep: the zones that stay whole."""
+    """Bounds for (k, 3) directions. disc: the disc that every plane must clear; keep: the zones that stay in one piece."""
     (centre, radius), search = disc, profile.search.effective
     tilt = np.hypot(chosen[:, 0], chosen[:, 1])
     heights = np.zeros(len(chosen))
@@ -112,14 +114,16 @@ def bounds_of(
     )
 
 
-def platform_disc(mesh: Mesh, search: Search) -> tuple[Floats, float]:
-    """Centre and radius of the disc of criterion III: the one that is asked for, or the model's footprint."""
+def plate_disc(mesh: Mesh, search: Search) -> tuple[Floats, float]:
+    """Centre and radius of the disc of criterion III: the configured one, or else the model's footprint."""
     return footprint(mesh) if search.platform_radius_mm is None else (np.zeros(2), search.platform_radius_mm)
 
 
 def footprint(mesh: Mesh) -> tuple[Floats, float]:
-    """Centre (2,) and radius of a nearly least disc around what stands on the platform (Badoiu and Clarkson)."""
-    points = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM][:, :2]
+    """Centre (2,) and radius of an approximately minimal disc around the model's contact with the build plate (Badoiu and
+    Clarkson).
+    """
+    points = mesh.vertices[mesh.vertices[:, 2] <= PLATE_TOLERANCE_MM][:, :2]
     if len(points) == 0:
         return np.zeros(2), 0.0
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -131,11 +135,11 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 
 @dataclass(frozen=True, eq=False)
 class ScoredCandidates:
-    """The candidates of one solid that gain enough above the platform, one array row each.
+    """The candidates of one solid with enough gain above the build plate, one array row each.
 
-    Whether they can be cut is not known yet. direction is a row of limits.directions; above_mm2: the risky area above the plane
-    when it is printed straight up; residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; unavoidable_mm2: the share of the
-    first two that no cut can save, unavoidable_here_mm2: that of the solid's risky area, both 0 unless requested. first, columns:
+    Their feasibility is not known yet. direction is a row of limits.directions; above_mm2: the risky area above the plane when it
+    is printed straight up; residual_mm2, lost_mm2, stairs_mm2, seam_mm2: see CutCost; unavoidable_mm2: the share of the first two
+    that no cut can save; unavoidable_here_mm2: that share of the solid's risky area; both 0 unless requested. first, columns:
     (k,) the first plane along each direction, in steps of limits.step_mm, and the number of all planes along it.
     """
 
@@ -162,22 +166,22 @@ class ScoredCandidates:
 
     @property
     def evaluated(self) -> int:
-        """The number of all planes, scored or not."""
+        """The number of all planes, whether scored or not."""
         return int(self.columns.sum())
 
     def cost(self, row: int) -> CutCost:
-        """What the cut of a row costs."""
+        """The cost of a row's cut."""
         costs = (self.residual_mm2, self.lost_mm2, self.stairs_mm2, self.seam_mm2)
         return CutCost(*(float(cost[row]) for cost in costs))
 
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """What the sweep gives for some candidates, one array row each; reason is FEASIBLE or why not.
+    """Results of the sweep for some candidates, one array row each. reason is FEASIBLE or the reason for rejection.
 
     fragile_mm is the distance to the nearest surface that the plane would cut into a sliver. contact_area_mm2 is the least area
-    that a piece of the part stands on. A piece lower than the side of a square of least_interface_mm2 is a fragment and may stand
-    on less.
+    on which a piece of the part stands; fragments, pieces lower than the side of a square of least_interface_mm2, may stand on
+    less.
     """
 
     reason: Ints
@@ -190,8 +194,9 @@ class Feasibility:
 def score_candidates(
     remainder: Remainder, limits: Bounds, terms: CostTerms, least_gain_mm2: float, unavoidable: Mask | None = None
 ) -> ScoredCandidates:
-    """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe and the stairs that
-    it takes away, less those that it brings and its seam. unavoidable: the faces that no cut can save, see sweep.gains."""
+    """Candidates of a solid with a gain of at least least_gain_mm2: the risky area and the stair-stepping that a cut saves, less
+    the stair-stepping that it adds and its seam. unavoidable: the faces that no cut can save, see sweep.gains.
+    """
     swept = gains(remainder, limits.directions, limits.step_mm, threshold(terms.angle_deg), unavoidable)
     residual, offset = residual_mm2(swept, terms), swept.offsets_mm(limits.step_mm)
     gain = gain_mm2(swept, residual)
@@ -219,28 +224,29 @@ def score_candidates(
 
 
 def residual_mm2(swept: Gains | LimbSums, terms: CostTerms) -> Floats:
-    """What each cut costs for ever, see CutCost."""
+    """The final cost of each cut, see CutCost, mm2."""
     return swept.residual_mm2 + swept.stairs_mm2 + seam_mm2(swept, terms)
 
 
 def lost_mm2(swept: Gains | LimbSums, residual_mm2: Floats) -> Floats:
-    """The part of the residual by which each cut has made things worse. Every surface has stairs whichever way it is printed, so
-    large parts would be shunned for those that they had before."""
+    """The share of each cut's final cost that it has added, mm2. Every surface shows stair-stepping in any orientation, so
+    without this correction large parts would be avoided for the steps that they had before.
+    """
     return residual_mm2 - np.minimum(swept.stairs_mm2, swept.stairs_up_mm2)
 
 
 def gain_mm2(swept: Gains | LimbSums, residual_mm2: Floats) -> Floats:
-    """What each cut saves on the whole."""
+    """The net saving of each cut, mm2."""
     return swept.up_mm2 + swept.stairs_up_mm2 - residual_mm2
 
 
 def seam_mm2(swept: Gains | LimbSums, terms: CostTerms) -> Floats:
-    """The scar of each cut's seam, the bores that it cuts askew, and that it is made."""
+    """Cost of each cut's seam, of the bores that it cuts askew, and of the cut itself, mm2."""
     return terms.seam_mm * swept.rim_mm + terms.feature_mm2 * swept.crossed + terms.cut_mm2
 
 
 def check(remainder: Remainder, limits: Bounds, step_mm: float, direction: Ints, offset_mm: Floats) -> Feasibility:
-    """Which of the planes (rows of limits.directions, offsets on a grid of step_mm) can be cut."""
+    """Feasibility of planes (rows of limits.directions, offsets on a grid of step_mm)."""
     rows, inverse = np.unique(direction, return_inverse=True)
     swept = sweep(remainder, limits.directions[rows], step_mm, limits.least_height_mm[rows], limits.fragment_mm)
     at = (inverse, np.rint(offset_mm / step_mm).astype(np.int64) - swept.first[inverse])
@@ -262,8 +268,9 @@ def check(remainder: Remainder, limits: Bounds, step_mm: float, direction: Ints,
 
 
 def count_rejected(scored: ScoredCandidates, least_gain_mm2: float, is_weak: Callable[[Plane], bool]) -> dict[Reason, int]:
-    """How many of all planes of a solid each reason takes, to report why nothing can be cut. scored: at least those of its
-    candidates that gain least_gain_mm2; is_weak: called only for planes that pass every other check."""
+    """The number of a solid's planes rejected for each reason, to report why nothing can be cut. scored: at least the candidates
+    that gain least_gain_mm2; is_weak: called only for planes that pass every other check.
+    """
     limits, step_mm = scored.limits, scored.limits.step_mm
     direction = np.repeat(np.arange(len(scored.columns), dtype=np.int32), scored.columns)
     begins = np.concatenate([[0], np.cumsum(scored.columns)])

@@ -1,17 +1,17 @@
-"""Features: what a ranker knows of a candidate, one definition for search and training.
+"""Features: a ranker's inputs for each candidate, defined once for search and training.
 
 M1..M6 are the metrics of the 2020 paper: M1 reduced risky area, M2 the same accumulated over the cuts so far, M3 volume of the
-part, M4 distance of the plane from the platform, M5 distance to fragile regions (what the plane would cut into slivers, thin
+part, M4 distance of the plane from the build plate, M5 distance to fragile regions (slivers that the plane would leave, thin
 walls and rods, on either side of it), M6 accumulated residual risky area. Areas are shares of the model's risky area, volumes of
-the model's, distances of the radius of its bounding sphere, cut to 0..1. Where seams and stairs cost something, M1, M2 and M6
-count them, M6 stairs only where a cut brings them.
+the model's, distances of the radius of its bounding sphere, clipped to 0..1. If seams and stair-stepping have a cost, M1, M2 and
+M6 include it, M6 only the stair-stepping that a cut adds.
 
-The others come from the same sweep: wasted, the part of the residual that another cut could have saved; hopeless, the part that
-no cut could, and hopeless_left, the same of the remainder, a part of every later cost (elsewhere these two are called
-unavoidable; records and rankers keep the old names); risky_left, the area at risk that remains; seam; tilt and turn, the
-cosines of the direction with upright and with the cut before; section and contact, areas as shares of the sphere's great
-circle; extent of the part along its direction; volume_left; cuts made before, in tens; round of the classic ranking's
-relaxation; risky, the model's risky area in great circles; scale, the radius in decimetres.
+The others come from the sweep as well: wasted, the share of the residual that another cut could have saved; hopeless, the share
+that no cut could save, and hopeless_left, that share of the remainder, which is part of every later cost (called unavoidable
+elsewhere; records and rankers keep the old names); risky_left, the area at risk that remains; seam; tilt and turn, the cosines
+between the direction and upright or the previous cut's direction; section and contact, areas as shares of the sphere's great
+circle; extent of the part along its direction; volume_left; cuts made before, in tens; round of the classic ranking's relaxation;
+risky, the model's risky area in great circles; scale, the radius in decimetres.
 """
 
 from collections.abc import Callable
@@ -63,9 +63,9 @@ FEATURES: dict[str, Column] = {
 }
 COLUMNS = tuple(FEATURES)
 PAPER_COLUMNS = COLUMNS[:6]
-CHECKED = frozenset({"M3", "M5", "section", "contact", "volume_left"})  # known only of candidates that were checked
+CHECKED = frozenset({"M3", "M5", "section", "contact", "volume_left"})  # known only for candidates that have been checked
 
 
 def features(table: CandidateTable, rows: Ints, columns: tuple[str, ...] = COLUMNS) -> Floats:
-    """(n, len(columns)) the features of a table's rows, of checked ones where a column is one of CHECKED."""
+    """(n, len(columns)) features of a table's rows; rows must have been checked for columns in CHECKED."""
     return np.stack([FEATURES[name](table, rows) for name in columns], axis=1)

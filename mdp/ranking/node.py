@@ -1,4 +1,4 @@
-"""Node: what remains of a model after some cuts, the unit of the search."""
+"""Node: the remainder of a model after some cuts, the unit of the search."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +21,9 @@ UNCUT = CutCost(0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """What remains after some cuts, and how good that is.
+    """The remainder of a model after some cuts, and its cost.
 
-    parent: the node before the last cut, None for the whole model; base: the plane of that cut, cut_cost: what it costs for ever.
+    parent: the node before the last cut, None for the whole model; base: the plane of the last cut; cut_cost: its final cost.
     """
 
     solid: Solid
@@ -35,7 +35,7 @@ class Node:
 
     @property
     def root(self) -> "Node":
-        """The whole model."""
+        """The node of the whole model."""
         node = self
         while node.parent is not None:
             node = node.parent
@@ -48,17 +48,17 @@ class Node:
 
     @property
     def cuts(self) -> "list[Node]":
-        """The nodes after each of the cuts."""
+        """The nodes after each cut."""
         return self.path[1:]
 
     @property
     def planes(self) -> list[Plane]:
-        """The planes of the cuts in the order in which they are made."""
+        """The planes of the cuts in the order of the cuts."""
         return [node.base for node in self.cuts]
 
     @cached_property
     def part(self) -> Solid:
-        """What the last cut took off. Most of what a search cuts off is never looked at, so it is made when it is asked for."""
+        """The part that the last cut took off, computed on demand: a search never uses most of them."""
         if self.parent is None:
             return self.solid
         whole = self.parent.solid
@@ -66,12 +66,12 @@ class Node:
 
     @cached_property
     def piece(self) -> TracedMesh:
-        """The remaining solid, and which faces of the model its own are."""
+        """The remaining solid as a mesh, with the source face in the model of each of its faces."""
         return self.places.piece(self.solid)
 
     @cached_property
     def remainder(self) -> Remainder:
-        """The remaining solid for the sweep."""
+        """The remaining solid in the form that the sweep takes."""
         mesh, terms = self.piece.mesh, self.terms
         weights = self.seam_weights if terms.seam_mm > 0.0 else None
         risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
@@ -83,12 +83,12 @@ class Node:
 
     @cached_property
     def seam_weights(self) -> Floats:
-        """(m,) how much a mm of rim counts on each face of what remains."""
+        """(m,) weight of a mm of rim on each face of the remainder."""
         return self.places.weights(self.piece)
 
     @cached_property
     def seams(self) -> tuple[Rim, ...]:
-        """The seams of the cuts."""
+        """The seams of all cuts."""
         before, base = self.parent, self.base
         if before is None:
             return ()
@@ -99,49 +99,49 @@ class Node:
 
     @cached_property
     def risky_mm2(self) -> float:
-        """Area of what remains that needs support when it is printed straight up; where none is wanted it counts more."""
+        """Area of the remainder that needs support when it is printed straight up, weighted where the user wants none."""
         return self.remainder.risky_mm2
 
     @cached_property
     def residual_mm2(self) -> float:
-        """What the parts cut off so far cost for ever: a lower bound of the cost of every descendant."""
+        """Final cost of the parts cut off so far, mm2: a lower bound of the cost of every descendant."""
         return sum(node.cut_cost.residual_mm2 for node in self.cuts)
 
     @cached_property
     def lost_mm2(self) -> float:
-        """What the cuts so far have made worse."""
+        """Cost that the cuts so far have added, mm2."""
         return sum(node.cut_cost.lost_mm2 for node in self.cuts)
 
     @property
     def saved_mm2(self) -> float:
-        """How much less it costs when the search stops here than the whole model does."""
+        """How much less the decomposition that stops here costs than the whole model, mm2."""
         return self.root.cost_mm2 - self.cost_mm2
 
     @cached_property
     def stairs_mm2(self) -> float:
-        """What the stairs of what remains count when it is printed straight up."""
+        """Cost of the remainder's stair-stepping when it is printed straight up, mm2."""
         return self.remainder.stairs_mm2
 
     @property
     def cost_mm2(self) -> float:
-        """What it costs when the search stops here; the paper's J where seams cost nothing."""
+        """Cost if the search stops here, mm2; the paper's J if seams cost nothing."""
         return self.risky_mm2 + self.stairs_mm2 + self.residual_mm2
 
     @cached_property
     def signature(self) -> tuple[float, ...]:
-        """Equal for two orders of the same cuts."""
+        """Key that is equal for different orders of the same cuts."""
         return (round(self.solid.volume(), 3), round(self.risky_mm2 + self.stairs_mm2, 3), round(self.residual_mm2, 3))
 
     def corners_cut(self, plane: Plane) -> Floats:
-        """(n, 3) the corners of what a plane would cut off: vertices, and where edges pass through it. Nothing is cut."""
+        """(n, 3) corners of the part that a plane would cut off: vertices, and crossing points of edges, without cutting."""
         return corners_above(self.remainder.mesh if plane.limbs_mm is None else limb_mesh(self.remainder, plane), plane)
 
     def sliver_mm(self, plane: Plane) -> float:
-        """Thickness of the thinnest sliver that cutting off the limbs of a plane would leave."""
+        """Thickness of the thinnest sliver that a cut of a plane's limbs would leave, mm."""
         limb = limb_vertices(self.remainder, plane)
         return sliver_mm(self.remainder.facets, limb, plane, frame_across(plane.normal))
 
     def release(self) -> None:
-        """Forget what is large and made again when it is asked for: a search keeps all its nodes and comes back to few."""
+        """Drop large cached values, which are recomputed on demand: a search keeps all its nodes but returns to few."""
         for name in ("piece", "remainder", "seam_weights"):
             self.__dict__.pop(name, None)

@@ -1,8 +1,8 @@
-"""Ranker: a network that says which of the candidate cuts the beam follows, in place of the classic ranking of the 2020 paper.
+"""Ranker: a network that ranks the candidate cuts for the beam, in place of the classic ranking of the 2020 paper.
 
-It scores candidates by an ONNX file, raw features in, scores out. The file names the features that it wants (metadata
-`features`); what prepares them is part of its graph. Scores are rounded before they are compared, so that processors that round
-otherwise take the same order. A network is offered the shortlist, which takes a tenth of the sweeps of the classic ranking.
+It scores candidates with an ONNX file that maps raw features to scores. The file names its features (metadata `features`); its
+graph prepares them. Scores are rounded before they are compared, so that processors with different rounding give the same order.
+A network ranks the shortlist, which takes a tenth of the sweeps of the classic ranking.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 CLASSIC, LEARNED = "classic", "learned"
 INPUT, OUTPUT = "features", "scores"
-DECIMALS = 4  # of scores; networks give some 7 digits, and those that differ less are ties that the order offered decides
+DECIMALS = 4  # of scores; networks are accurate to some 7 digits, and scores that differ less keep the given order
 RANKED_TOGETHER = 50  # candidates, the B of the 2020 paper
 
 
 class LearnedRanker:
-    """A trained ranker. Its file is read when it ranks for the first time, or by `check`."""
+    """A trained ranker. Its file is loaded at the first ranking, or by `check`."""
 
     def __init__(self, file: Path) -> None:
         self.file = file
@@ -41,7 +41,7 @@ class LearnedRanker:
         self.scores(np.zeros((2, len(self.columns))))
 
     def rank(self, offered: Iterable[RankedCandidate]) -> Iterator[RankedCandidate]:
-        """The first candidates by their scores, then the others as they come."""
+        """The first RANKED_TOGETHER candidates by descending score, then the others in the given order."""
         others = iter(offered)
         first = list(islice(others, RANKED_TOGETHER))
         if len(first) > 1:
@@ -51,11 +51,11 @@ class LearnedRanker:
         yield from others
 
     def scores(self, rows: Floats) -> Floats:
-        """(n,) rounded scores of (n, len(columns)) features, the best one highest."""
+        """(n,) rounded scores of (n, len(columns)) features, higher is better."""
         session = self._session
         try:
             (scores,) = session.run([OUTPUT], {INPUT: rows.astype(np.float32)})
-        except Exception as error:  # noqa: BLE001 - onnxruntime's own have no common base
+        except Exception as error:  # noqa: BLE001 - onnxruntime's exceptions have no common base
             raise UserError(f"ranker {self.file}: cannot score candidates ({first_line(error)})") from None
         if np.shape(scores) != (len(rows),) or not np.isfinite(scores).all():
             raise UserError(f"ranker {self.file}: gives no number for each of {len(rows)} candidates")
@@ -64,7 +64,7 @@ class LearnedRanker:
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """The features that it wants."""
+        """The names of the features that the network takes."""
         named = self._session.get_modelmeta().custom_metadata_map.get("features", "")
         columns = tuple(named.split(",")) if named else ()
         unknown = [name for name in columns if name not in FEATURES]
@@ -77,7 +77,7 @@ class LearnedRanker:
         return columns
 
     def _features(self, candidates: Sequence[RankedCandidate]) -> Floats:
-        """(n, len(columns)) the features of candidates."""
+        """(n, len(columns)) features of candidates."""
         rows = np.zeros((len(candidates), len(self.columns)))
         for table in dict.fromkeys(candidate.table for candidate in candidates):
             positions = [position for position, candidate in enumerate(candidates) if candidate.table is table]
@@ -87,7 +87,7 @@ class LearnedRanker:
 
     @cached_property
     def _session(self) -> "InferenceSession":
-        """The file, read; one thread, so that the order does not depend on their number."""
+        """The loaded network; one thread, so that the order does not depend on the number of threads."""
         from onnxruntime import InferenceSession, SessionOptions, set_default_logger_severity
 
         if not self.file.is_file():
@@ -101,7 +101,7 @@ class LearnedRanker:
         except OSError as error:
             raise UserError(f"ranker {self.file}: cannot be read ({error.strerror})") from None
         except Exception as error:  # noqa: BLE001 - as above
-            raise UserError(f"ranker {self.file}: is no ONNX file ({first_line(error)})") from None
+            raise UserError(f"ranker {self.file}: is not an ONNX file ({first_line(error)})") from None
         named = ([value.name for value in session.get_inputs()], [value.name for value in session.get_outputs()])
         if named != ([INPUT], [OUTPUT]):
             raise UserError(f"ranker {self.file}: takes {named[0]} and gives {named[1]}; {INPUT} and {OUTPUT} are needed")
@@ -110,8 +110,9 @@ class LearnedRanker:
 
 @cache
 def ranker_named(name: str) -> LearnedRanker | None:
-    """The ranker of a name: None is the classic ranking, `learned` the network that ships, the name of an .onnx file a network of
-    one's own. Raises UserError for a name that is none and for a file that holds no ranker."""
+    """The ranker with a name: None for the classic ranking, the shipped network for `learned`, or the network in an .onnx file.
+    Raises UserError for an unknown name, and for a file without a ranker.
+    """
     if name == CLASSIC:
         return None
     if name == LEARNED:
@@ -125,5 +126,5 @@ def ranker_named(name: str) -> LearnedRanker | None:
 
 @cache
 def shipped() -> LearnedRanker:
-    """The network that ships."""
+    """The network that ships with the program."""
     return LearnedRanker(Path(str(files("mdp") / "ranker.onnx")))

@@ -1,8 +1,8 @@
-"""Record: everything a search looked at and what became of it, as arrays to train a ranker on.
+"""Record: all candidates that a search evaluated and their outcomes, as arrays for training a ranker.
 
-One row a candidate that was ranked in a stage, cut or not; one row a node (the model is node 0). A node's outcome is the least
-final cost over all decompositions that go through it, those that stop there included, as share of the model's risky area.
-A node that the beam left behind was never followed: its outcome is its own cost, and `node_expanded` tells it apart.
+One row per candidate ranked in a stage, cut or not; one row per node (the model is node 0). A node's outcome is the least final
+cost over all decompositions through it, stopping there included, as a share of the model's risky area. A node that the beam
+dropped was not pursued: its outcome is its own cost, and `node_expanded` marks it.
 """
 
 import io
@@ -19,17 +19,19 @@ from mdp.plane import PLATFORM, Plane
 from mdp.ranking.features import COLUMNS, features
 from mdp.ranking.ranking import Model, RankedCandidate
 
-VERSION = 2  # of the arrays; 1 had the six metrics of the paper only
+VERSION = 2  # of the arrays; version 1 had only the six metrics of the paper
 NO_NODE = -1
-FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file can carry; the clock would change the bytes
+FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip file; the clock would change the bytes
 
 Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(eq=False)
 class Offer:
-    """A ranked candidate. parent: signature of the node it would cut; features: its COLUMNS; round: the one whose residual
-    threshold let it in. A trace adds the stage, the number of the parent and of the node it led to, and whether that was new."""
+    """A ranked candidate. parent: signature of the node it would cut; features: its COLUMNS; round: first round whose residual
+    threshold admits it. A trace adds the stage, the numbers of the parent and of the resulting node, and whether that node was
+    new.
+    """
 
     parent: Hashable
     plane: Plane
@@ -42,41 +44,43 @@ class Offer:
 
 
 def offer(candidate: RankedCandidate) -> Offer:
-    """A candidate as it is put on record."""
+    """A candidate in the form that is recorded."""
     table, row = candidate.table, candidate.row
     return Offer(table.node.signature, table.plane(row), features(table, np.array([row]))[0], candidate.round)
 
 
-Child = tuple[int, Hashable, float]  # the number of the offer that led to it, its signature, and its cost where the search stops
+# the number of the offer that led to it, its signature, and its cost if the search stops there
+Child = tuple[int, Hashable, float]
 
 
 class Trace:
-    """Collects a search: `begin_stage`, then `add` for every ranking of that stage, at the end `arrays` or `to_bytes`."""
+    """Records a search: `begin_stage`, then `add` for every ranking of that stage, finally `arrays` or `to_bytes`."""
 
     def __init__(self, name: str, model: Model, root: Hashable, cost_mm2: float | None = None) -> None:
-        """root: signature of the uncut model, whose risky area is the measure of all shares; cost_mm2: what it costs uncut,
-        absent: that area."""
+        """root: signature of the uncut model, whose risky area is the reference of all shares; cost_mm2: the cost of the uncut
+        model, by default that area.
+        """
         self.name, self.model = name, model
-        self._number: dict[Hashable, int] = {root: 0}  # of the node with a solid of this signature; twins share one
+        self._number: dict[Hashable, int] = {root: 0}  # number of the node with a solid of this signature; twins share one
         whole_mm2 = model.risky_mm2 if cost_mm2 is None else cost_mm2
-        self._costs = [whole_mm2 / model.risky_mm2 if model.risky_mm2 > 0 else 0.0]  # of every node, the model first
+        self._costs = [whole_mm2 / model.risky_mm2 if model.risky_mm2 > 0 else 0.0]  # cost of every node, the model first
         model_itself = Offer(root, PLATFORM, np.full(len(COLUMNS), np.nan), 0)
-        self._made_by = [model_itself]  # the offer that led to every node
+        self._made_by = [model_itself]  # the offer that led to each node
         self._expanded = set[int]()
         self._candidates: list[Offer] = []
         self._stage = 0
         self._known: dict[tuple[int, bytes, float], Offer] = {}
 
     def begin_stage(self, beam: Sequence[Hashable]) -> None:
-        """The next stage begins: the nodes with these signatures are the ones that are cut."""
+        """Begin the next stage. beam: signatures of the nodes that are cut in it."""
         self._stage += 1
         self._known.clear()
         self._expanded.update(self._number[signature] for signature in beam)
 
     def add(self, offers: Sequence[Offer], children: Sequence[Child]) -> None:
-        """Candidates that competed in this stage, and the cuts that were made of them, twins of known solids included.
+        """Record candidates that competed in this stage, and the cuts made from them, including twins of known solids.
 
-        What is added several times in a stage is one row.
+        A candidate added several times in a stage gets one row.
         """
         candidates = [self._candidate(offer) for offer in offers]
         for row, signature, cost_mm2 in children:
@@ -87,15 +91,15 @@ class Trace:
                 if candidate.chosen:
                     self._costs.append(cost_mm2 / self.model.risky_mm2)
                     self._made_by.append(candidate)
-            else:  # of a twin of its parent: the same solid, whatever rounding made of its signature
+            else:  # from a twin of its parent: the same solid, whose signature may differ by rounding
                 self._number.setdefault(signature, candidate.child)
 
     def outcomes(self) -> Floats:
-        """(nodes,) outcome of every node as share of the model's risky area."""
+        """(nodes,) outcome of every node as a share of the model's risky area."""
         best = np.array(self._costs)
         links = [(candidate.parent_number, candidate.child) for candidate in self._candidates if candidate.child != NO_NODE]
         changed = True
-        while changed:  # a twin can link a node to one made earlier, so one pass from the last node to the first may not do
+        while changed:  # a twin can link a node to an earlier one, so one pass from the last node to the first may not suffice
             changed = False
             for parent, child in reversed(links):
                 if best[child] < best[parent]:
@@ -103,12 +107,12 @@ class Trace:
         return best
 
     def arrays(self) -> Arrays:
-        """All that was collected.
+        """All recorded arrays.
 
         Candidates (n rows): features, parent_features (NaN where the parent is the model), stage (1, 2, ...), round, parent,
-        normal, offset_mm, chosen (it made a new node), child (its node or that of its twin; -1: not cut), outcome (the
-        child's; NaN: not cut). Nodes (k rows): node_cost and node_outcome (shares), node_stage, node_parent, node_expanded.
-        And version, columns, model, risky_mm2, volume_mm3, radius_mm.
+        normal, offset_mm, chosen (the cut made a new node), child (its node or that of its twin; -1 if not cut), outcome (the
+        child's; NaN if not cut). Nodes (k rows): node_cost and node_outcome (shares), node_stage, node_parent, node_expanded. And
+        version, columns, model, risky_mm2, volume_mm3, radius_mm.
         """
         outcomes = self.outcomes()
         rows, made_by = self._candidates, self._made_by
@@ -138,7 +142,7 @@ class Trace:
         }
 
     def to_bytes(self) -> bytes:
-        """The arrays as the content of an .npz file; the same search gives the same bytes."""
+        """The arrays as the content of an .npz file; equal searches give equal bytes."""
         return npz(self.arrays())
 
     def _candidate(self, offer: Offer) -> Offer:
@@ -150,7 +154,7 @@ class Trace:
 
 
 def npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """Arrays as a compressed .npz that numpy.load reads, without a date in it."""
+    """Arrays as a compressed .npz for numpy.load, without a date."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():

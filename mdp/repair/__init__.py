@@ -1,1 +1,1 @@
-"""Repair: surfaces as model files give them become one closed solid: `repair.repair`."""
+"""Repair: surfaces read from model files become one closed solid, see `repair.repair`."""

@@ -1,4 +1,4 @@
-"""Colours and paint: which face of a repaired solid is a face, or a piece of one, that the file has painted."""
+"""Colours and paint: the painted source face of each face of a repaired solid."""
 
 from collections.abc import Iterator
 
@@ -7,20 +7,21 @@ import numpy as np
 from mdp.formats.surface import Surface, concatenate
 from mdp.mesh import NO_COLOUR, Floats, Indices
 
-NONE = -1  # the number of no triangle, behind which the last row of a table has what holds for none
-NEAR_SHARE = 1e-4  # of the model's size: as far as repairs move a vertex
+NONE = -1  # no triangle; as an index it selects the last row of a table, which holds the default
+NEAR_SHARE = 1e-4  # of the model's size: the greatest shift of a vertex by a repair
 SAME_DIRECTION = 1.0 - 1e-6  # cosine of two normals
 INSIDE = -1e-6  # least barycentric coordinate
-# Cells of a plane: its normal, and its distance from the middle in sizes of the model; normals of about one direction differ by
-# 1.5e-3, and with it the distance of a place: what a triangle reaches beyond its own plane, in cells.
+# Cell sizes of a plane's normal and its distance from the middle, in sizes of the model. Normals of about one direction differ by
+# 1.5e-3, and so do the distances: the margin, in cells, by which a triangle extends beyond its own plane.
 PLANE_CELLS, PLANE_MARGIN = np.array([0.05, 0.05, 0.05, 0.005]), np.array([0.04, 0.04, 0.04, 0.4])
-FINEST = 8  # halvings of the model's size: no smaller cells of place
-PAIRS_AT_ONCE = 1_000_000  # of points and triangles: what that takes of memory is some 100 MB
+FINEST = 8  # halvings of the model's size: limit for cells of position
+PAIRS_AT_ONCE = 1_000_000  # of points and triangles, which take some 100 MB of memory
 
 
 def carry_colours(surfaces: list[Surface], solid: Surface) -> Indices | None:
-    """(m,) colours of the solid's faces, NO_COLOUR where the repair made them or the file has not painted them; None: it paints
-    nothing at all."""
+    """(m,) colours of the solid's faces, NO_COLOUR for faces that the repair created or that are unpainted; None if nothing is
+    painted.
+    """
     given = concatenate(surfaces)
     if given.colours is None or _same_faces(given, solid):
         return given.colours
@@ -30,11 +31,12 @@ def carry_colours(surfaces: list[Surface], solid: Surface) -> Indices | None:
 
 
 def triangle_of(corners: Floats, wanted: Floats) -> Indices:
-    """(m,) for (m, 3, 3) faces of a repaired solid which of (k, 3, 3) triangles of its file each is, or lies on with its middle;
-    NONE: it is none of them."""
+    """(m,) the triangle of (k, 3, 3) in the file to which each of (m, 3, 3) faces of the repaired solid is equal, or on which its
+    centre lies; NONE if there is none.
+    """
     row = _same_corners(corners, wanted)
     rest, cut = np.flatnonzero(row == NONE), np.setdiff1d(np.arange(len(corners)), row)
-    if len(rest) and len(cut):  # what is there as a whole is there in no pieces
+    if len(rest) and len(cut):  # a triangle that exists as a whole does not exist in pieces
         row[rest] = np.append(cut, NONE)[_pieces(corners[cut], wanted[rest])]
     return row
 
@@ -44,8 +46,8 @@ def _same_faces(given: Surface, solid: Surface) -> bool:
 
 
 def _same_corners(corners: Floats, wanted: Floats) -> Indices:
-    """The first triangle that has the corners of each wanted one, in any order; NONE: there is none."""
-    both = np.concatenate([corners, wanted]) + 0.0  # -0.0 and 0.0 are one place
+    """The first triangle with the same corners as each wanted one, in any order; NONE if there is none."""
+    both = np.concatenate([corners, wanted]) + 0.0  # -0.0 and 0.0 are equal
     _, vertex_of = np.unique(both.reshape(-1, 3), axis=0, return_inverse=True)
     _, group = np.unique(np.sort(vertex_of.reshape(-1, 3), axis=1), axis=0, return_inverse=True)
     group = group.ravel()
@@ -56,7 +58,9 @@ def _same_corners(corners: Floats, wanted: Floats) -> Indices:
 
 
 def _pieces(corners: Floats, wanted: Floats) -> Indices:
-    """The triangle that the middle of each wanted one lies on, and that faces the same way or the opposite; NONE: none does."""
+    """The triangle that contains the centre of each wanted one and is parallel to it, facing either way; NONE if there is
+    none.
+    """
     both = np.concatenate([corners, wanted]).reshape(-1, 3)
     middle, size = (both.min(axis=0) + both.max(axis=0)) / 2.0, float(np.ptp(both, axis=0).max())
     near_mm = NEAR_SHARE * size
@@ -82,10 +86,10 @@ def _pieces(corners: Floats, wanted: Floats) -> Indices:
 def _neighbours(
     corners: Floats, normals: Floats, points: Floats, point_normals: Floats, size: float
 ) -> Iterator[tuple[Indices, Indices]]:
-    """Pairs of points and of triangles in about one plane whose box holds the point: rows of either.
+    """Candidate pairs of points and triangles in about one plane, where the triangle's box contains the point: rows of both.
 
-    Both go into cells of direction, distance of the plane from the origin, and place; a triangle into all that it may reach.
-    Triangles of about one size share a grid for the place whose cells are as large as they are.
+    Both are put into cells of direction, distance of the plane from the origin, and position; a triangle into all cells that it
+    may touch. Triangles of similar size share a grid whose cells have that size.
     """
     near = NEAR_SHARE * size
     low, high = corners.min(axis=1) - near, corners.max(axis=1) + near
@@ -117,7 +121,7 @@ def _neighbours(
 
 
 def _cells(least: Indices, most: Indices) -> tuple[Indices, Indices]:
-    """The cells that boxes from (n, d) least to (n, d) most ones cover, two at most along each axis, and whose each is."""
+    """The cells that boxes between (n, d) corners cover, at most two along each axis, and the box of each cell."""
     cells, rows = least, np.arange(len(least))
     for axis in range(least.shape[1]):
         wider = np.flatnonzero(most[rows, axis] > cells[:, axis])
@@ -128,7 +132,7 @@ def _cells(least: Indices, most: Indices) -> tuple[Indices, Indices]:
 
 
 def _holds(corners: Floats, normals: Floats, points: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(n,) whether each of (n, 3) points lies over its triangle, of (n, 3, 3) corners and (n, 3) unit normals."""
+    """(n,) whether each of (n, 3) points lies over its triangle, given by (n, 3, 3) corners and (n, 3) unit normals."""
     next_corners = np.roll(corners, -1, axis=1)
     turns = np.einsum("ncx,nx->nc", np.cross(next_corners - corners, points[:, None] - corners), normals)
     whole = turns.sum(axis=1)
@@ -137,7 +141,7 @@ def _holds(corners: Floats, normals: Floats, points: Floats) -> np.ndarray[tuple
 
 
 def _normals(corners: Floats) -> Floats:
-    """(n, 3) unit normals of (n, 3, 3) triangles; zero for one without area."""
+    """(n, 3) unit normals of (n, 3, 3) triangles; zero for triangles without area."""
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(crosses, axis=1)
     normals: Floats = crosses / np.where(lengths > 0, lengths, 1.0)[:, None]

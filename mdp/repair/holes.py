@@ -1,4 +1,4 @@
-"""Holes: the rims of a surface, and small ones filled."""
+"""Holes: rims of a surface, and filling of small holes."""
 
 import numpy as np
 
@@ -8,18 +8,19 @@ from mdp.repair.winding import format_point, pair_half_edges
 from mdp.topology.edges import edges_of
 from profiles.errors import MeshError
 
-# A hole is a defect when it is small beside the model; the opening of a cup is meant, and a lid on it would be another model.
-RIM_SHARE = 0.5  # longest rim of a hole, of the diagonal of the model's box
-HOLE_SHARE = 0.02  # largest area of one filling, of the surface's area
-FACET_SHARE = 0.1  # the same for a rim of three or four edges: a facet or two lost from a coarse model
-TOTAL_SHARE = 0.1  # all fillings together
-LONGEST = 400  # corners of a rim; the table of its chords grows with the square and the work with the cube of it
+# A hole is a defect if it is small relative to the model; the opening of a cup is intended, and a lid on it would change the
+# model.
+RIM_SHARE = 0.5  # longest rim of a hole, as a share of the diagonal of the model's box
+HOLE_SHARE = 0.02  # largest area of one filling, as a share of the surface's area
+FACET_SHARE = 0.1  # that share for a rim of three or four edges: one or two facets missing from a coarse model
+TOTAL_SHARE = 0.1  # share for all fillings together
+LONGEST = 400  # corners of a rim; the table of chords grows with the square, the computing time with the cube
 
 
 def fill_holes(surface: Surface) -> tuple[Surface, list[str]]:
-    """The surface with its small holes filled, and a sentence about them.
+    """The surface with its small holes filled, and a note about them.
 
-    Raises MeshError when a hole is too large: how many edges are open, and a point on a rim.
+    Raises MeshError if a hole is too large, with the number of open edges and a point on its rim.
     """
     loops = rim_loops(surface)
     if not loops:
@@ -54,7 +55,7 @@ def _too_large(loops: list[Indices], surface: Surface, loop: Indices, rim: float
 
 
 def rim_loops(surface: Surface) -> list[Indices]:
-    """Simple loops of vertices around the holes, each running so that a face wound like it fits in."""
+    """Simple loops of vertices around the holes, oriented like a face that would fill the hole."""
     edges = edges_of(surface.faces)
     free = np.ones(len(edges.edge), dtype=bool)
     free[pair_half_edges(surface, edges).ravel()] = False
@@ -80,7 +81,7 @@ def rim_loops(surface: Surface) -> list[Indices]:
 
 
 def triangulate_loop(points: Floats) -> Indices:
-    """(n - 2, 3) triangles of least total area over the (n, 3) corners, wound like the loop.
+    """(n - 2, 3) triangles of minimal total area over the (n, 3) corners, wound like the loop.
 
     Dynamic programming over the loop's chords: G. T. Klincsek, Minimal triangulations of polygonal domains (1980); O(n^3).
     """

@@ -1,4 +1,4 @@
-"""Repair: surfaces as files give them into one closed, outward-wound solid, or a sentence why that cannot be."""
+"""Repair: surfaces read from files become one closed, outward-wound solid, or an error that says why they cannot."""
 
 from typing import TYPE_CHECKING
 
@@ -33,22 +33,22 @@ from profiles.errors import MeshError, counted
 if TYPE_CHECKING:
     import manifold3d as m3
 
-WELD_SHARES = (1e-6, 1e-5, 1e-4)  # of the model's size: the rounding of ASCII files first, gaps of 0.01 mm in 100 mm last
-SHRINK = 0.01  # of the model's size: what a repair may take off its box
-SAME_VOLUME = 1e-5  # share that two readings of one surface may differ by: float32 files move corners by 6e-8 of a size
-MOST_CHANGED = 0.01  # of the volume: what the reading of edges that many faces share may change
-MOST_READINGS = 5  # each pairs edges anew; a surface that has not settled by then is judged by what it is
-SECTIONS = 23  # an overlap missed by all of them reaches over less than a 24th of the height
-EXCESS = 1e-3  # of the area of all sections; folds of less are left alone, since mending them would re-triangulate the model
-DEEPEST, TOGETHER = 5, 8  # halvings, and pieces that are united at once
-LEAST_MOST, MOST_GROWTH = 1000, 2  # faces that a union may have, and for each face of its pieces
-SHARED = 0.5  # of the volume: a body that counts half of itself twice is not understood
+WELD_SHARES = (1e-6, 1e-5, 1e-4)  # of the model's size: first the rounding of ASCII files, last gaps of 0.01 mm in 100 mm
+SHRINK = 0.01  # of the model's size: how much a repair may reduce its box
+SAME_VOLUME = 1e-5  # share by which two readings of one surface may differ: float32 files move corners by 6e-8 of the size
+MOST_CHANGED = 0.01  # of the volume: how much the reading of edges with many faces may change it
+MOST_READINGS = 5  # each pairs the edges again; the last reading of an unstable surface is used
+SECTIONS = 23  # an overlap missed by all of them is lower than a 24th of the height
+EXCESS = 1e-3  # of the area of all sections; smaller folds are left alone, since repairing them would re-triangulate the model
+DEEPEST, TOGETHER = 5, 8  # depth of halvings, and number of pieces united at once
+UNION_FACES, UNION_GROWTH = 1000, 2  # faces that a union may have, and limit per face of its pieces
+SHARED = 0.5  # of the volume: a body that counts half of itself twice cannot be resolved
 
 
 def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
-    """One closed solid of all surfaces, and a short sentence for every repair; a sound surface comes back as it is.
+    """One closed solid from all surfaces, and a short sentence for every repair; a sound surface is returned unchanged.
 
-    Raises MeshError (a predicate without the file's name) when that cannot be, or only by changing the shape.
+    Raises MeshError (a predicate without the file's name) if that is impossible, or possible only by changing the shape.
     """
     before = _bounds(concatenate(surfaces))
     size = float((before[1] - before[0]).max())
@@ -69,7 +69,7 @@ def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
     gap = max(surface.gap for surface in surfaces)
     names = {surface.name for surface, merged in zip(surfaces, tidy, strict=True) if not _is_closed(merged)} - {""}
     try:
-        closed = [_mend(piece, size, gap, notes) for piece in pieces]
+        closed = [_close_surface(piece, size, gap, notes) for piece in pieces]
     except MeshError as error:
         raise MeshError(f"its part {names.pop()!r} {error}" if len(names) == 1 and len(surfaces) > 1 else f"{error}") from None
     solid = _unite_shells([split_touching_fans(piece) for piece in closed if len(piece.faces)], size, notes)
@@ -83,10 +83,10 @@ def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
 
 
 def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
-    """The surface and its manifold3d solid, which must enclose the same volume.
+    """The surface and its manifold3d solid, which must enclose equal volumes.
 
-    An edge of four faces leaves open which of them go on in which; where manifold3d pairs them otherwise, the edge is made two.
-    Where even that leaves a difference, what manifold3d made of it is taken, unless it is another shape.
+    An edge shared by four faces leaves their pairing open; where manifold3d pairs them differently, the edge is duplicated. If a
+    difference remains, manifold3d's reading is used, unless it is a different shape.
     """
     for change in (lambda surface: surface, split_shared_edges):
         tried = change(solid)
@@ -98,7 +98,7 @@ def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manif
 
 
 def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
-    """What manifold3d made of the surface, until it reads that as what it is. Raises MeshError for another shape."""
+    """Take manifold3d's reading of the surface, repeated until it is stable. Raises MeshError for a different shape."""
     for _ in range(MOST_READINGS):
         if whole.is_empty():
             break
@@ -110,7 +110,7 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
     same = abs(taken_mm3 - enclosed_mm3) <= MOST_CHANGED * taken_mm3 and len(cleaned.faces) > 0
     if not same or np.abs(_bounds(cleaned) - box).max() > SHRINK * (box[1] - box[0]).max():
         raise MeshError(
-            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm³, what can be kept of them "
+            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm³, but the closest valid solid has "
             f"{taken_mm3:.5g} mm³; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
         )
     percent = round(100 * (taken_mm3 / enclosed_mm3 - 1), 4) + 0.0
@@ -120,15 +120,15 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
 
 
 def _count_once(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surface:
-    """The solid without what it counts twice; as it is when that cannot be told apart."""
-    mended = resolve_overlap(whole)
-    left = mended is None or any(_overlaps_itself(piece) for piece in mended.decompose())
-    shared_mm3 = 0.0 if mended is None else whole.volume() - mended.volume()
-    if mended is None or left or not 0 < shared_mm3 < SHARED * whole.volume():
-        notes.append("left a body that passes through itself as it is: some of its volume may count twice")
+    """The solid with overlapping volume counted once; unchanged if the overlap cannot be resolved."""
+    resolved = resolve_overlap(whole)
+    left = resolved is None or any(_overlaps_itself(piece) for piece in resolved.decompose())
+    shared_mm3 = 0.0 if resolved is None else whole.volume() - resolved.volume()
+    if resolved is None or left or not 0 < shared_mm3 < SHARED * whole.volume():
+        notes.append("left a self-intersecting body as it is: some of its volume may count twice")
         return solid
-    notes.append(f"united a body that passes through itself with itself: {shared_mm3:.3g} mm³ counted twice")
-    return surface_of(mended)
+    notes.append(f"resolved a self-intersecting body: {shared_mm3:.3g} mm³ counted twice")
+    return surface_of(resolved)
 
 
 def _bounds(surface: Surface) -> Floats:
@@ -141,13 +141,13 @@ def _is_closed(surface: Surface) -> bool:
 
 
 def _tidy(surface: Surface) -> Surface:
-    """The surface as it is when it is closed so, else with its coincident vertices merged, as STL files need it."""
+    """The surface as it is if it is closed, else with coincident vertices merged, as STL files need."""
     given = drop_unused_vertices(Surface(surface.vertices, drop_collapsed_faces(surface.faces)))
     return given if _is_closed(given) and len(given.faces) else merge_vertices(given)
 
 
-def _mend(surface: Surface, size: float, gap: float, notes: list[str]) -> Surface:
-    """The surface closed and wound consistently; appends to the notes. Raises MeshError when it stays open."""
+def _close_surface(surface: Surface, size: float, gap: float, notes: list[str]) -> Surface:
+    """The surface closed and wound consistently; appends to the notes. Raises MeshError if it stays open."""
     faces = len(surface.faces)
     surface = _drop_repeats(surface)
     _note(notes, faces - len(surface.faces), "left out {} duplicate face{}")
@@ -171,7 +171,9 @@ def _mend(surface: Surface, size: float, gap: float, notes: list[str]) -> Surfac
 
 
 def _drop_repeats(surface: Surface) -> Surface:
-    """Every face once, unless that opens a closed surface which opposite pairs alone leave closed."""
+    """Remove duplicate faces, except where that would open a surface closed by opposite pairs; then only such pairs are
+    removed.
+    """
     once = drop_duplicate_faces(surface)
     if len(once.faces) == len(surface.faces) or _is_closed(once) or not _is_closed(surface):
         return once
@@ -180,7 +182,7 @@ def _drop_repeats(surface: Surface) -> Surface:
 
 
 def _sew(surface: Surface, gap: float) -> Surface:
-    """The surface whose faces lie that far apart at most along edges that they share."""
+    """Join faces whose common edges lie within a distance of each other."""
     joined = split_rim_edges(merge_rim_vertices(surface, gap), gap)
     return drop_duplicate_faces(Surface(joined.vertices, drop_collapsed_faces(joined.faces)))
 
@@ -201,7 +203,7 @@ def _close_seams(surface: Surface, size: float, notes: list[str]) -> Surface:
 
 
 def _unite_shells(closed: list[Surface], size: float, notes: list[str]) -> Surface:
-    """The shells of closed surfaces turned outwards and united; the surfaces as they are when nothing of that is needed."""
+    """The shells of closed surfaces turned outwards and united; the surfaces unchanged if nothing has to be repaired."""
     shells = [shell for surface in closed for shell in shells_of(surface)]
     shells, specks = drop_specks(shells)
     check_count(shells)
@@ -218,18 +220,20 @@ def _note(notes: list[str], count: int, text: str, endings: tuple[str, str] = ("
 
 
 def _overlaps_itself(solid: "m3.Manifold") -> bool:
-    """Whether the horizontal sections of the solid have less area than their outlines wind around."""
+    """Whether the solid overlaps itself: its horizontal sections have less area than their outlines wind around."""
     mesh = solid.to_mesh64()
     vertices, faces = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
     _, _, low, _, _, high = solid.bounding_box()
-    # Odd fractions of the height, since models are made in steps that even ones would hit.
+    # Odd fractions of the height, since models are made in steps that round fractions would hit.
     heights = (low + (np.arange(1, SECTIONS + 1) - 0.0137) * (high - low) / (SECTIONS + 1)).tolist()
     wound = sum(_section_area(vertices, faces, height) for height in heights)
     return bool(wound - sum(solid.slice(height).area() for height in heights) > EXCESS * wound)
 
 
 def _section_area(vertices: Floats, faces: Indices, height: float) -> float:
-    """Area of a section at a height, every region as often as the outline winds around it: Green's theorem over the cut faces."""
+    """Area of a section at a height, each region counted as often as the outline winds around it: Green's theorem over the cut
+    faces.
+    """
     above = vertices[:, 2] > height
     sides = above[faces]
     cut = faces[sides.any(axis=1) & ~sides.all(axis=1)]
@@ -248,10 +252,10 @@ def _section_area(vertices: Floats, faces: Indices, height: float) -> float:
 
 
 def resolve_overlap(solid: "m3.Manifold") -> "m3.Manifold | None":
-    """The solid with every point counted once; None for one so tangled that its union would have many times its faces.
+    """The solid with every point counted once; None if it is so tangled that its union would have many times its faces.
 
-    Halved across its longest side until no piece overlaps itself: pieces that were one body far along the surface
-    are bodies of their own then, and their union counts nothing twice.
+    It is halved across its longest side until no piece overlaps itself: halves of a body that overlaps itself are separate bodies
+    where the overlapping regions are far apart along the surface, and their union counts nothing twice.
     """
     return _united(solid, 0)
 
@@ -271,8 +275,8 @@ def _united(solid: "m3.Manifold", depth: int) -> "m3.Manifold | None":
             if resolved is None:
                 return None
             whole.append(resolved)
-    most = LEAST_MOST + MOST_GROWTH * sum(piece.num_tri() for piece in whole)
-    while len(whole) > 1:  # few at a time: the union of what crosses everywhere is noticed before it fills the memory
+    most = UNION_FACES + UNION_GROWTH * sum(piece.num_tri() for piece in whole)
+    while len(whole) > 1:  # few at a time, so a union that intersects everywhere is detected before it fills the memory
         whole = [m3.Manifold.batch_boolean(whole[k : k + TOGETHER], m3.OpType.Add) for k in range(0, len(whole), TOGETHER)]
         if sum(piece.num_tri() for piece in whole) > most:
             return None

@@ -1,4 +1,4 @@
-"""Sheets: faces that are there more than once, and patches that hang loose on a solid."""
+"""Sheets: duplicate faces, and patches loosely attached to a solid."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ from mdp.repair.weld import drop_unused_vertices
 from mdp.topology.components import connected_components
 from mdp.topology.edges import Edges, Flags, edges_of
 
-LOOSE_SHARE = 0.2  # of the area; a larger loose patch may well be the model itself
-MOST_LOOSE = 300  # patches taken away; a surface with more of them is no solid with a blemish
+LOOSE_SHARE = 0.2  # of the area; a larger loose patch may be the model itself
+MOST_LOOSE = 300  # patches removed; a surface with more of them is not a solid with a small defect
 
 
 def drop_duplicate_faces(surface: Surface) -> Surface:
-    """Every face once; of faces that lie on each other wound oppositely, both go or one stays, whichever leaves fewer edges odd.
+    """Remove duplicate faces; of coinciding faces wound oppositely, remove both or one, whichever leaves fewer odd edges.
 
-    Both go where two bodies touch in a common wall, one stays where a program wrote every face for both sides.
+    Both go where two bodies touch in a common wall; one stays where a program wrote every face for both sides.
     """
     faces = surface.faces
     group, first, even = _groups(faces)
@@ -30,7 +30,7 @@ def drop_duplicate_faces(surface: Surface) -> Surface:
 
 
 def cancel_opposite_faces(surface: Surface) -> Surface:
-    """The surface without pairs of faces that lie on each other wound oppositely: what was balanced stays balanced."""
+    """Remove pairs of coinciding faces with opposite winding; balanced edges stay balanced."""
     group, first, even = _groups(surface.faces)
     if len(first) == len(surface.faces):
         return surface
@@ -44,7 +44,9 @@ def cancel_opposite_faces(surface: Surface) -> Surface:
 
 
 def _groups(faces: Indices) -> tuple[Indices, Indices, Flags]:
-    """Number of the corner set of every face, a face of each set, and whether each face winds upwards from its lowest corner."""
+    """For every face: the number of its corner set, a representative face of each set, and whether it winds upwards from its
+    lowest corner.
+    """
     span = int(faces.max(initial=0)) + 1
     low, middle, high = np.sort(faces, axis=1).T
     key = (low * span + middle) * span + high if span < 2**21 else _rows(faces)
@@ -66,7 +68,7 @@ def _first_where(group: Indices, chosen: Flags, groups: int) -> Indices:
 
 
 def _drop_both(faces: Indices, opposed: Flags) -> Flags:
-    """Which of the opposed faces to drop, patch by patch: where that makes more edges even than odd."""
+    """The opposed faces to drop, decided patch by patch: those whose removal makes more edges even than odd."""
     if not opposed.any():
         return opposed
     edges = edges_of(faces)
@@ -78,7 +80,7 @@ def _drop_both(faces: Indices, opposed: Flags) -> Flags:
 
 
 def _gains(edges: Edges, patch: Indices) -> Indices:
-    """By patch, how many more edges are shared by an even number of faces when it is taken away."""
+    """For each patch, the net number of edges that become even (shared by an even number of faces) if it is removed."""
     owner = np.repeat(patch, 3)
     key, index = np.unique(owner * len(edges.counts) + edges.edge, return_inverse=True)
     count, own = edges.counts[key % len(edges.counts)], np.bincount(index)
@@ -87,10 +89,11 @@ def _gains(edges: Edges, patch: Indices) -> Indices:
 
 
 def drop_loose_sheets(surface: Surface) -> Surface:
-    """The surface without the patches that hang on its outside or divide its inside.
+    """Remove patches that hang on the outside of the surface or divide its inside.
 
-    Such a patch shares edges with two faces of the rest, which close without it. Taken away one after the other: those with an
-    open edge first, then the least area, since a wall across a solid has less than what it parts; never a large share of all.
+    Such a patch shares edges with two faces of the rest, which is closed without it. Patches are removed one by one: first those
+    with an open edge, then by area, since a wall across a solid is smaller than the parts that it divides; never a large share of
+    the area.
     """
     for _ in range(MOST_LOOSE):
         edges = edges_of(surface.faces)

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 NEGLIGIBLE = 1e-7  # of the volume of all shells: 0.1 mm across beside a 20 mm cube
 FLAT_SHEETS = "its faces lie in one plane or on each other; give it a thickness (Blender: Solidify)"
 FLAT = 1e-9  # of the cube of a shell's diagonal
-MOST_BODIES = 2000  # each takes its time in every step: 20 s of export for this number of cubes of 1 mm
-GRID = 0.1  # of the reach: corners of bodies that are united lie on a grid as fine as that, finer than files round
-SAMPLES = 24  # vertices of a shell that must all lie inside another for it to count as contained
+MOST_BODIES = 2000  # each costs time in every step: 20 s of export for this number of cubes of 1 mm
+GRID = 0.1  # of the reach: grid for corners of bodies that are united, finer than the rounding of files
+SAMPLES = 24  # vertices of a shell that must lie inside another for it to count as contained
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +35,11 @@ class Shell:
     high: Floats
 
     def flip(self) -> "Shell":
-        """The same shell inside out."""
+        """The shell turned inside out."""
         return Shell(self.vertices, self.faces[:, ::-1], -self.volume, self.low, self.high)
 
     def contains(self, inner: "Shell") -> bool:
-        """Whether the other shell lies inside this one, judged by its box and a sample of its vertices."""
+        """Whether another shell lies inside this one, judged by its box and a sample of its vertices."""
         if (inner.low < self.low).any() or (inner.high > self.high).any():
             return False
         corners = np.unique(inner.faces)
@@ -48,7 +48,7 @@ class Shell:
 
 
 def winding_number(position: Floats, vertices: Floats, faces: Indices) -> float:
-    """How often the closed faces wind around a point.
+    """Winding number of the closed faces around a point.
 
     Sum of solid angles over 4 pi: A. van Oosterom, J. Strackee, The solid angle of a plane triangle (1983).
     """
@@ -84,7 +84,7 @@ def volume_of(surface: Surface) -> float:
 
 
 def drop_specks(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
-    """The shells that enclose a volume worth printing, and a sentence about the others."""
+    """The shells that enclose a printable volume, and a note on the others."""
     total = sum(abs(shell.volume) for shell in shells)
     sizeable = [
         shell
@@ -98,20 +98,20 @@ def drop_specks(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
 
 
 def check_count(shells: list[Shell]) -> None:
-    """Raises MeshError for more bodies than are taken; voids are none."""
+    """Raise MeshError for too many bodies; voids do not count."""
     bodies = sum(shell.volume > 0 for shell in shells) or len(shells)
     if bodies > MOST_BODIES:
         raise MeshError(
-            f"is {bodies} separate bodies, at most {MOST_BODIES} are taken: unite those that belong together (Blender: Boolean, "
+            f"has {bodies} separate bodies, {MOST_BODIES} are allowed: unite those that belong together (Blender: Boolean, "
             "Union), or save them in several files"
         )
 
 
 def orient_outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
-    """Every shell wound so that it bounds solid: outwards, or inwards when it is a void in another.
+    """Wind every shell so that it bounds solid: outwards, or inwards if it is a void in another shell.
 
-    An outermost shell that is inside out is turned together with all that it contains, since the windings of a file
-    are right relative to each other more often than not. A shell wound inwards that lies in no solid is turned too.
+    An outermost shell that is inside out is turned with everything inside it, since the relative windings in a file are more
+    often right than wrong. A shell wound inwards outside any solid is turned as well.
     """
     if all(shell.volume > 0 for shell in shells):
         return shells, []
@@ -127,7 +127,7 @@ def orient_outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
 
 
 def _containers(shells: list[Shell]) -> list[list[int]]:
-    """For each shell the larger ones that contain it."""
+    """For each shell, the larger shells that contain it."""
     low, high = np.array([shell.low for shell in shells]), np.array([shell.high for shell in shells])
     size = np.array([abs(shell.volume) for shell in shells])
     containers = []
@@ -138,7 +138,7 @@ def _containers(shells: list[Shell]) -> list[list[int]]:
 
 
 def unite(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
-    """One surface of all shells, overlapping and touching bodies united; shells that stay apart keep their triangles."""
+    """One surface from all shells, overlapping and touching bodies united; separate shells keep their triangles."""
     solid = [i for i, shell in enumerate(shells) if shell.volume > 0]
     voids: dict[int, list[Shell]] = {i: [] for i in solid}
     for hollow in (shell for shell in shells if shell.volume < 0):
@@ -157,7 +157,7 @@ def unite(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
 
 
 def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
-    """Bodies whose boxes come within reach of each other, transitively."""
+    """Groups of bodies whose boxes are within reach of each other, transitively."""
     low, high = np.array([s.low for s in outers]), np.array([s.high for s in outers])
     near = [
         np.flatnonzero((low <= high[i] + reach).all(axis=1) & (high >= low[i] - reach).all(axis=1)) for i in range(len(outers))
@@ -169,10 +169,10 @@ def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
 
 
 def _union(bodies: list[Surface], reach: float) -> Surface | None:
-    """The union of closed surfaces; None when they neither overlap nor touch.
+    """The union of closed surfaces; None if they neither overlap nor touch.
 
-    Their corners come onto a grid finer than the reach: walls that are meant to touch then do, where the rounding of a
-    file leaves slivers between them so thin that their union cannot be read again.
+    Their corners are snapped to a grid finer than the reach: walls that are meant to touch then do. Otherwise the rounding of a
+    file leaves slivers between them so thin that the union cannot be read again.
     """
     import manifold3d as m3
 
@@ -188,19 +188,19 @@ def _union(bodies: list[Surface], reach: float) -> Surface | None:
 
 
 def subtract(surface: Surface, others: list[Surface]) -> Surface:
-    """What other closed surfaces leave of one, without faces where that is nothing."""
+    """Difference of closed surfaces; without faces if nothing is left."""
     import manifold3d as m3
 
     return surface_of(m3.Manifold.batch_boolean([solid_of(surface), *map(solid_of, others)], m3.OpType.Subtract))
 
 
 def above(surface: Surface, z_mm: float) -> Surface:
-    """The part of a closed surface above a height; without faces where there is none."""
+    """The part of a closed surface above a height; without faces if there is none."""
     return surface_of(solid_of(surface).trim_by_plane((0.0, 0.0, 1.0), z_mm))
 
 
 def _on_grid(body: Surface, grid: float) -> Surface:
-    """A closed surface with its corners on a grid; as it is where that opens it or turns it inside out."""
+    """A closed surface with its corners on a grid; unchanged if that would open it or turn it inside out."""
     snapped = merge_vertices(Surface(np.round(body.vertices / grid) * grid, body.faces))
     closed = len(snapped.faces) and not len(edges_of(snapped.faces).unbalanced)
     return snapped if closed and (edges_of(snapped.faces).counts == 2).all() else body
@@ -213,7 +213,7 @@ def surface_of(solid: "m3.Manifold") -> Surface:
 
 
 def solid_of(surface: Surface) -> "m3.Manifold":
-    """The manifold3d solid of a closed surface; raises MeshError when it is not accepted."""
+    """The manifold3d solid of a closed surface; raises MeshError if manifold3d rejects it."""
     import manifold3d as m3
 
     mesh = m3.Mesh64(np.ascontiguousarray(surface.vertices), np.ascontiguousarray(surface.faces).astype(np.uint64))

@@ -1,4 +1,4 @@
-"""Weld: coincident vertices become one, exactly first, then along open edges within a small distance."""
+"""Weld: merge coincident vertices, first exactly, then along open edges within a small distance."""
 
 from itertools import pairwise
 
@@ -9,12 +9,13 @@ from mdp.mesh import Indices
 from mdp.topology.components import connected_components
 from mdp.topology.edges import edges_of
 
-SKEW = np.array([0.5773, 0.6841, 0.4459])  # a line that no common direction of a model is square to, to sort vertices along
+# direction along which vertices are sorted; no common direction of a model is square to it
+SKEW = np.array([0.5773, 0.6841, 0.4459])
 
 
 def merge_vertices(surface: Surface) -> Surface:
-    """The surface with one vertex for every position, in order of first use, and without the faces that collapse."""
-    vertices = surface.vertices + 0.0  # -0.0 and 0.0 are one place
+    """Merge equal vertices, in order of first use, and drop the faces that collapse."""
+    vertices = surface.vertices + 0.0  # -0.0 and 0.0 are equal
     order = np.lexsort(vertices.T)
     fresh = np.ones(len(vertices), dtype=bool)
     fresh[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
@@ -24,7 +25,7 @@ def merge_vertices(surface: Surface) -> Surface:
 
 
 def merge_rim_vertices(surface: Surface, distance: float) -> Surface:
-    """The surface with the vertices of its open edges merged that lie within the distance of each other."""
+    """Merge the vertices of open edges that lie within a distance of each other."""
     edges = edges_of(surface.faces)
     odd = edges.counts[edges.edge] % 2 == 1
     rim = np.unique(np.concatenate([edges.starts[odd], edges.ends[odd]]))
@@ -45,9 +46,9 @@ def merge_rim_vertices(surface: Surface, distance: float) -> Surface:
 
 
 def split_rim_edges(surface: Surface, distance: float) -> Surface:
-    """The surface with its open edges split at the vertices of other open edges that lie within the distance of them.
+    """Split open edges at the vertices of other open edges within a distance of them.
 
-    Faces that share an edge in space but not its corners, as those of CAD files, match corner by corner then.
+    Faces that share an edge in space but not its corners, as in CAD files, then match corner by corner.
     """
     while True:
         edges = edges_of(surface.faces)
@@ -75,7 +76,7 @@ def split_rim_edges(surface: Surface, distance: float) -> Surface:
 
 
 def _between(surface: Surface, start: int, end: int, near: Indices, distance: float) -> list[int]:
-    """The vertices within the distance of an edge and farther than that from its ends, in their order along it."""
+    """The vertices near an edge and not near its ends, in order along the edge."""
     origin, way = surface.vertices[start], surface.vertices[end] - surface.vertices[start]
     length = float(np.linalg.norm(way))
     if length <= 2.0 * distance:
@@ -95,7 +96,7 @@ def drop_collapsed_faces(faces: Indices) -> Indices:
 
 
 def drop_unused_vertices(surface: Surface) -> Surface:
-    """The surface without unused vertices, the others in order of first use."""
+    """Remove unused vertices; the others in order of first use."""
     used, first, sorted_row = np.unique(surface.faces.ravel(), return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)

@@ -1,4 +1,4 @@
-"""Winding: which half-edges belong together, and all faces of a patch wound the same way."""
+"""Winding: pairs of half-edges, and consistent orientation of the faces of a patch."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from profiles.errors import MeshError
 
 
 def pair_half_edges(surface: Surface, edges: Edges) -> Indices:
-    """(k, 2) half-edges that belong together; where more than two faces meet in an edge, neighbours around it.
+    """(k, 2) pairs of half-edges; where more than two faces meet in an edge, neighbours around it.
 
-    Oppositely wound neighbours come first, the nearest in angle before others, so that bodies that only touch stay apart.
+    Oppositely wound neighbours come first, and the nearest in angle before others, so that bodies that only touch stay separate.
     """
     order, runs = edges.by_edge
     pairs = [edges.twins]
@@ -57,9 +57,9 @@ def _match_around_edge(angles: Floats, forward: object, normals: Floats) -> Indi
 
 
 def orient_faces(surface: Surface) -> Surface:
-    """The surface with the faces of every patch wound consistently, as most of its area is.
+    """Wind the faces of every patch consistently, like most of its area.
 
-    Raises MeshError when a patch cannot be: a one-sided sheet.
+    Raises MeshError if a patch is a one-sided sheet.
     """
     edges = edges_of(surface.faces)
     if not len(edges.unbalanced):
@@ -72,7 +72,7 @@ def orient_faces(surface: Surface) -> Surface:
 
 
 def _turn_faces(surface: Surface, edges: Edges, pairs: Indices, strict: bool) -> Indices:
-    """Faces turned over where the pairs ask for it: components of the two-sheeted cover with nodes (face, kept or turned)."""
+    """Faces turned over so that the pairs agree: components of the two-sheeted cover with nodes (face, kept or turned)."""
     m = len(surface.faces)
     a, b = pairs[:, 0] // 3, pairs[:, 1] // 3
     clash = edges.forward[pairs[:, 0]] == edges.forward[pairs[:, 1]]
@@ -96,10 +96,9 @@ def _turn_faces(surface: Surface, edges: Edges, pairs: Indices, strict: bool) ->
 
 
 def split_touching_fans(surface: Surface) -> Surface:
-    """The closed surface with a copy of a vertex for every fan of faces that is connected over paired edges.
+    """Duplicate vertices so that every fan of faces connected over paired edges has its own.
 
-    Edges that more than two faces share become edges of two faces each, except where the faces hang together at both
-    ends all the same.
+    Edges shared by more than two faces become edges of two faces each, unless the faces are connected at both ends anyway.
     """
     edges = edges_of(surface.faces)
     if not (edges.counts > 2).any():
@@ -117,7 +116,7 @@ def split_touching_fans(surface: Surface) -> Surface:
 
 
 def split_shared_edges(surface: Surface) -> Surface:
-    """The closed surface without edges that more than two faces share: all pairs but one of them get a vertex within the edge."""
+    """Split edges shared by more than two faces: all pairs but one get a new vertex within the edge."""
     while True:
         edges = edges_of(surface.faces)
         if not (edges.counts > 2).any():
@@ -134,7 +133,7 @@ def split_shared_edges(surface: Surface) -> Surface:
 
 
 def _split_pair(surface: Surface, edges: Edges, pair: Indices) -> Surface:
-    """The two faces of a pair of half-edges halved by a new vertex in the middle of their edge."""
+    """Halve the two faces of a pair of half-edges by a new vertex in the middle of their edge."""
     middle = surface.vertices[[edges.starts[pair[0]], edges.ends[pair[0]]]].mean(axis=0)
     faces = np.concatenate([surface.faces, surface.faces[pair // 3]])
     for row, half_edge in enumerate(pair.tolist()):
@@ -148,5 +147,5 @@ def _next(half_edges: Indices) -> Indices:
 
 
 def format_point(position: Floats) -> str:
-    """A position for a message."""
+    """A position in the form for messages."""
     return "({:.4g}, {:.4g}, {:.4g})".format(*position)

@@ -1,13 +1,13 @@
-"""Beam: the nodes that a search follows, one in each slot.
+"""Beam: the nodes that a search pursues, one in each slot.
 
-The first slot follows the ranker: the classic ranking, large parts first, or a learned one. Every further slot has a trade-off
-of its own between what is made safe and what is left risky for ever, and each takes its node from the children of its own and all
-lower slots. So a wider beam holds the narrower ones and never ends worse, and the slots do not fill with what one ranking finds
-nearly equal; a learned ranker that chose for all of them won less.
+The first slot follows the ranker: the classic ranking, large parts first, or a learned one. Every further slot has its own
+trade-off between saved area and final loss, and takes its node from the children of its own node and those of all lower slots. So
+a wider beam contains the narrower ones and never ends worse, and the slots do not fill with near-equal cuts of one ranking; a
+learned ranker for all slots gained less.
 
-The cuts of these slots take all that lies above their planes. When cuts of single limbs compete with them for the slots, the
-result can be worse, so limbs have slots of their own (search_limbs). Those choose among few planes: limbs of the uncut model that
-save enough and that the head can print beside what stands, and the planes that rank first in the beam.
+The cuts of these slots take everything above their planes. If cuts of single limbs competed with them for the slots, the result
+could be worse, so limbs have their own slots (search_limbs). Those choose among few planes: limbs of the uncut model that save
+enough and that the head can print beside standing parts, and the planes that rank first in the beam.
 
 search_as_published is the authors' own loop of 2020, for comparisons and for records on the paper's terms.
 """
@@ -28,34 +28,43 @@ from mdp.plane import Plane
 from mdp.ranking.candidates import Bounds, gain_mm2, lost_mm2, residual_mm2
 from mdp.ranking.node import Node
 from mdp.ranking.ranker import LearnedRanker
-from mdp.ranking.ranking import LISTED, CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, shortlist
+from mdp.ranking.ranking import (
+    SHORTLIST_TRADE_OFFS,
+    CandidateTable,
+    RankedCandidate,
+    nearly_equal,
+    rank_by_trade_off,
+    rank_classic,
+    shortlist,
+)
 from mdp.ranking.record import Trace, offer
 from mdp.search.front import ParetoFront
 from mdp.search.problem import Problem
 from mdp.sweep.limbs import LimbGrid, LimbSums, find_limbs
 
-# How many times the area made safe an area that is left for ever counts; None: the ranker's own. Many models, one greedy search
-# each: 4 is best on average, no value is best on most models.
+# Weight of finally lost area against saved area; None: the ranker's own order. In greedy searches of many models, 4 is best on
+# average, and no value is best on most models.
 TRADE_OFFS = (None, 4.0, 1.0, 8.0, 2.0, 0.5, 16.0, 0.0)
-RECORDED = 50  # candidates of a stage that are put on record, the B of the 2020 paper
+RECORDED = 50  # candidates of a stage that are recorded, the B of the 2020 paper
 EVERY = 6  # limbs are searched along every sixth of the sampled directions
 WORTH = 0.005  # share of the uncut model's cost that a limb must save
-MOST_LIMBS, MOST_CHECKED = 16, 32  # planes of limbs that are kept, and that are checked to find them
-MOST_PLANES = 16  # planes of the beam's ranking, by each trade-off, whose directions are used
+MOST_LIMBS, MOST_CHECKED = 16, 32  # planes of limbs that are used, and planes that are checked to find them
+MOST_PLANES = 16  # planes of the beam's ranking, per trade-off, whose directions are used
 LIMB_TRADE_OFFS = (4.0, 1.0)  # a slot each
-PATIENCE = 2  # stages without a better node after which the search for limbs ends
-MOST_TRIED = 16  # limbs, and planes, that a slot tries at a node
+MAX_STALLED_STAGES = 2  # stages without a better node after which the search for limbs ends
+MOST_TRIED = 16  # limbs, and planes, tried by a slot at a node
 
-Pick = tuple[RankedCandidate, Node]  # a candidate that a slot of the beam took, and the node that it leads to
-Offered = tuple[float, Node, Plane, CutCost | None]  # a possible cut: its key, lower is better, and its cost where that is known
+Pick = tuple[RankedCandidate, Node]  # a candidate taken by a slot of the beam, and the resulting node
+# a possible cut: its key (lower is better), node, plane, and its cost if known
+Offered = tuple[float, Node, Plane, CutCost | None]
 
 
-# The candidates for the next cut of a node that is followed, worked out while other slots are still picking.
+# The candidates for the next cut of a node, computed in the background while other slots are still picking.
 FutureTable = Future[CandidateTable]
 
 
 class Beam:
-    """A beam of search.beam_width slots; bests holds the best node that each slot ever had."""
+    """A beam of search.beam_width slots; bests holds the best node of each slot so far."""
 
     def __init__(self, problem: Problem, ranker: LearnedRanker | None, trace: Trace | None) -> None:
         self.problem, self.ranker, self.trace = problem, ranker, trace
@@ -65,17 +74,17 @@ class Beam:
         self.front = ParetoFront(problem.start)
         self.first = self._branch(problem.start, 0)
         self._branches: list[FutureTable | None] = [self.first]
-        self._seen = {problem.start.signature: 0}  # solids and the lowest slot that had them
+        self._seen = {problem.start.signature: 0}  # solids by signature, and the lowest slot that had them
         self._children: dict[tuple[CandidateTable, int], Node | None] = {}
         self._taken: dict[CandidateTable, list[Plane]] = {}
 
     @property
     def best(self) -> Node:
-        """The best node ever held."""
+        """The best node so far."""
         return min(self.bests, key=lambda node: node.cost_mm2)
 
     def advance(self) -> None:
-        """One more cut in every slot; slots that find none stay empty."""
+        """Make one more cut in every slot; slots without a feasible cut stay empty."""
         if self.trace is not None:
             self.trace.begin_stage([node.signature for node in self.nodes if node is not None])
         branches, self._branches = self._branches, []
@@ -98,7 +107,7 @@ class Beam:
                 branch.result().node.release()
 
     def close(self) -> None:
-        """Leave off what was begun for a next cut."""
+        """Cancel pending evaluations for a next cut."""
         for branch in self._branches:
             if branch is not None:
                 branch.cancel()
@@ -108,8 +117,9 @@ class Beam:
         return ahead(self.problem.table, node, large, self.ranker is not None or self.trace is not None)
 
     def finalists(self) -> list[Node]:
-        """The nodes to polish: of the second slot and of every slot with a square number the best one that it or a lower one
-        ever held and that is no finalist yet; of a single slot its best where a learned ranker saved the time."""
+        """The nodes to polish: for the second slot and every slot with a square number, the best node so far of that or any lower
+        slot that is not a finalist yet; for a single slot its best, if a learned ranker saved the time.
+        """
         if len(self.bests) == 1:
             return [node for node in self.bests if node.cuts and self.ranker is not None]
         finalists: list[Node] = []
@@ -120,7 +130,7 @@ class Beam:
         return finalists
 
     def _pick(self, branches: Sequence[FutureTable], slot: int) -> Pick | None:
-        """What a slot takes of the children of some branches: no solid twice, no two near-equal cuts of one node."""
+        """The candidate and node that a slot takes from some branches: no solid twice, no two near-equal cuts of one node."""
         for candidate in self._rank(branches, slot):
             plane, taken = candidate.table.plane(candidate.row), self._taken.setdefault(candidate.table, [])
             if any(nearly_equal(plane, earlier) for earlier in taken):
@@ -140,8 +150,10 @@ class Beam:
         trade_off = TRADE_OFFS[slot % len(TRADE_OFFS)]
         if trade_off is not None:
             return rank_by_trade_off(tables, trade_off, bound_mm2)
-        if self.ranker is not None:  # what follows the shortlist is for the case that nothing on it can be cut
-            return chain(self.ranker.rank(shortlist(tables, bound_mm2)), rank_by_trade_off(tables, LISTED[0], bound_mm2))
+        if self.ranker is not None:  # the shortlist is followed by candidates for the case that nothing on it can be cut
+            return chain(
+                self.ranker.rank(shortlist(tables, bound_mm2)), rank_by_trade_off(tables, SHORTLIST_TRADE_OFFS[0], bound_mm2)
+            )
         return rank_classic(tables, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
 
     def _child(self, candidate: RankedCandidate) -> Node | None:
@@ -151,7 +163,7 @@ class Beam:
         return self._children[key]
 
     def _record(self, trace: Trace, branches: Sequence[FutureTable], picks: Sequence[Pick | None]) -> None:
-        """Put the stage on record: the first candidates of the classic ranking, and what the slots took."""
+        """Record the stage: the first candidates of the classic ranking, and those taken by the slots."""
         tables = [branch.result() for branch in branches]
         bound_mm2, preferred_mm3 = self.best.cost_mm2, self.problem.preferred_mm3
         classic = rank_classic(tables, bound_mm2, preferred_mm3=preferred_mm3) if tables else iter(())
@@ -165,9 +177,8 @@ class Beam:
 
 
 def search_limbs(problem: Problem, first: FutureTable) -> list[Node]:
-    """The best node after each stage of a search that may cut off single limbs; empty where no limb is worth a cut.
-
-    first: the node that the search begins with.
+    """The best node after each stage of a search that may cut off single limbs; empty if no limb is worth a cut. first: the
+    candidate table of the start node.
     """
     limbs = [] if problem.full(problem.start) or problem.late() else _find_limbs(problem)
     if not limbs:
@@ -187,7 +198,7 @@ def search_limbs(problem: Problem, first: FutureTable) -> list[Node]:
             nodes += [] if child is None else [child]
         best = min((best, *nodes), key=lambda node: node.cost_mm2)
         found.append(best)
-        if len(found) > PATIENCE and found[-1 - PATIENCE] is best:
+        if len(found) > MAX_STALLED_STAGES and found[-1 - MAX_STALLED_STAGES] is best:
             break
     return found
 
@@ -195,8 +206,9 @@ def search_limbs(problem: Problem, first: FutureTable) -> list[Node]:
 def _rank_cuts(
     problem: Problem, limbs: Sequence[Plane], offer: tuple[LimbSums, CandidateTable], trade_off: float, bound_mm2: float
 ) -> Iterator[Offered]:
-    """What may be cut off a node, limbs or what lies above planes of its table: best first, by trade_off times the loss less the
-    gain, over all cuts so far. Cuts that would leave at least bound_mm2 for ever are left out."""
+    """Feasible cuts of a node, limbs or everything above planes of its table, best first by trade_off times the loss less the
+    gain over all cuts so far. Cuts with a final cost of bound_mm2 or more are left out.
+    """
     sums, table = offer
     node, residual = table.node, residual_mm2(sums, problem.terms)
     gain = np.where(sums.exists & ~sums.alone, gain_mm2(sums, residual), -np.inf)
@@ -214,7 +226,7 @@ def _rank_cuts(
 
 
 def _cut(problem: Problem, offered: Offered, seen: set[tuple[float, ...]]) -> Node | None:
-    """The node after a cut; None where it cannot be made or its solid was seen before."""
+    """The node after a cut; None if it is impossible or its solid is already known."""
     _, node, plane, cost = offered
     child = problem.cut(node, plane, cost) if plane.limbs_mm is None or problem.allowed(node, plane) else None
     if child is None or child.signature in seen:
@@ -224,7 +236,7 @@ def _cut(problem: Problem, offered: Offered, seen: set[tuple[float, ...]]) -> No
 
 
 def _find_limbs(problem: Problem) -> list[Plane]:
-    """The limbs of the uncut model that save most and can be cut off; of near-equal planes of one limb only the best."""
+    """The limbs of the uncut model that save most and can be cut off; among near-equal planes of one limb only the best."""
     node = problem.start
     grid = _limb_grid(problem, problem.bounds_along(problem.limits.directions[::EVERY]))
     candidates = find_limbs(node.remainder, grid, threshold(problem.terms.angle_deg))
@@ -246,7 +258,7 @@ def _find_limbs(problem: Problem) -> list[Plane]:
 
 
 def _limb_grid(problem: Problem, limits: Bounds) -> LimbGrid:
-    """Where limbs are looked for: along the directions of some bounds, with the least gain that a limb must bring."""
+    """Search grid for limbs: the directions and constraints of some bounds, and the least gain of a limb."""
     return LimbGrid(
         directions=limits.directions,
         step_mm=limits.step_mm,
@@ -264,18 +276,19 @@ def _limb_grid(problem: Problem, limits: Bounds) -> LimbGrid:
 def search_as_published(
     problem: Problem, ranker: LearnedRanker | None, trace: Trace | None, on_stage: Callable[[int, int, Node], None]
 ) -> tuple[Node, int]:
-    """The best node of the authors' loop, and after how many stages.
+    """The best node of the authors' loop, and its number of stages.
 
-    It ends as soon as the beam's best does not rise, keeps twins, and stops looking at candidates once one of a good parent
-    is useless. A learned ranker chooses among the first 50 candidates; the plain best is followed beside its choice, so the beam
-    holds one node more where it was not chosen. on_stage is called with a stage, its beam and the best node.
+    It ends as soon as the beam's best stops improving, keeps twins, and skips the rest once a candidate of a good parent is
+    useless. A learned ranker chooses among the first 50 candidates; the best of the classic ranking is pursued as well, so the
+    beam holds one more node if the ranker did not choose it. on_stage is called with a stage, the size of its beam and the best
+    node.
     """
     best, beam, stage = problem.start, [problem.start], 0
     while problem.continues(stage):
         stage += 1
         tables = [problem.table(node, described=trace is not None or ranker is not None) for node in beam]
         chosen, children = _fill_as_published(problem, ranker, tables)
-        if trace is not None:  # nodes of the last stage are not expanded, the loop ended
+        if trace is not None:  # nodes of the last stage are not expanded, since the loop ended
             trace.begin_stage([node.signature for node in beam])
             trace.add(list(map(offer, chosen)), [(row, child.signature, child.cost_mm2) for row, child in enumerate(children)])
         highest = min(children, key=lambda node: node.cost_mm2, default=best)
@@ -289,7 +302,7 @@ def search_as_published(
 def _fill_as_published(
     problem: Problem, ranker: LearnedRanker | None, tables: Sequence[CandidateTable]
 ) -> tuple[list[RankedCandidate], list[Node]]:
-    """The candidates that fill the next beam, best first, and what they lead to; what cannot be cut is passed over."""
+    """The candidates that fill the next beam, best first, and the resulting nodes; infeasible ones are skipped."""
     useless = max(table.saved_mm2 for table in tables) / problem.model.risky_mm2
     classic = iter(rank_classic(tables, np.inf, useless))
     plain = list(islice(classic, 1))

@@ -1,8 +1,8 @@
-"""Planes by hand: a person's cuts made in turn, completed by the search where they are left open, or rejected with the reason.
+"""User-defined planes: cuts made in turn, completed by the search where a value is missing, or rejected with the reason.
 
-Only what cannot be printed forbids a person's plane: it misses the model, cuts the platform, lets something float, is out of
-the machine's reach, lets the head meet the table, leaves a sliver or a base that the nozzle could break, or passes through a zone
-that stays whole. That a cut gains little, makes a small part or a long seam is the person's to judge.
+A plane is rejected only if it cannot be printed: it misses the model, cuts the plate, leaves a floating piece, is out of the
+machine's reach, makes the head meet the table, leaves a sliver or a base that the nozzle could break, or passes through a
+[[keep]] zone. A small gain, a small part or a long seam is the user's own decision.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,21 +30,20 @@ from profiles.errors import PlanError
 from profiles.messages import key_name, phrase
 
 EQUAL_MM2 = 1e-6
-SHIFT_MM, MOST_SHIFTS = 0.1, 10  # how the planes beside one that cannot be cut are shifted, of each lean
+SHIFT_MM, MOST_SHIFTS = 0.1, 10  # shifts of the planes around an infeasible one, for each lean
 LEANS_DEG = (0.0, 1.0, 3.0)
-MOST_PLACES = 400  # along a normal that are looked at for the nearest one to a plane
-FARTHER_LEANS_DEG = (*LEANS_DEG, 10.0, 30.0)  # on a model with steps all the way up only these miss them
+MOST_PLACES = 400  # offsets along a normal that are checked for the nearest feasible plane
+FARTHER_LEANS_DEG = (*LEANS_DEG, 10.0, 30.0)  # on a model with steps all the way up only these avoid the steps
 OUT_OF_REACH = "what it stands on is out of reach"
-LIMB_SHIFT_MM = 0.5  # between the offsets that are tried for limbs, each with a check of its own
+LIMB_SHIFT_MM = 0.5  # between the offsets tried for limbs, each of which is checked separately
 MOST_SHOWN = 8  # colours in a message
 
 
 def check_plan(plan: PlanFile, mesh: Mesh, name: str) -> None:
-    """Raise PlanError where a plan was made of another model, or means faces that the model has not: of a colour, or around a
-    point."""
+    """Raise PlanError if a plan belongs to another model, or names faces that the model lacks, by colour or around a point."""
     if plan.sha256 and plan.sha256 != mesh_sha256(mesh):
         raise PlanError(
-            f"plan {plan.name} was made of another model: {plan.model or 'its model'} is not {name} as it is read now "
+            f"plan {plan.name} was made for another model: {plan.model or 'its model'} is not {name} as it is read now "
             f"(the file has changed, or {key_name('process.scale')}, {key_name('process.rotate_deg')} or "
             f"{key_name('search.pedestal_mm')}; without the line sha256 the "
             "planes are tried all the same)"
@@ -69,7 +68,7 @@ def _check_colour(zone: Painted, mesh: Mesh, name: str, label: str) -> None:
 
 
 def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
-    """The node after the cuts of all planned parts, the last one in print order first. Raises PlanError."""
+    """The node after the cuts of all planned parts, from the last one in print order. Raises PlanError."""
     node, least_mm = problem.root, FINEST * problem.settings.offset_step_mm
     for number in range(len(plan.parts) + 1, 1, -1):
         planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
@@ -85,7 +84,7 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
 
 @dataclass(frozen=True, eq=False)
 class Rejection:
-    """Why a person's plane cannot cut a node; reason: what was found against it, FEASIBLE: there is nothing to cut."""
+    """Why a user's plane cannot cut a node. reason: the failed check, FEASIBLE if there is nothing to cut."""
 
     node: Node
     text: str
@@ -93,7 +92,7 @@ class Rejection:
 
 
 def try_planes(problem: Problem, node: Node, planes: Sequence[Plane]) -> Node | Rejection:
-    """The node after a person's cuts in turn, or why the first of them that cannot be made cannot."""
+    """The node after a user's cuts in turn, or the rejection of the first impossible one."""
     for plane in planes:
         child = _cut(problem, node, plane)
         if isinstance(child, Rejection):
@@ -103,11 +102,11 @@ def try_planes(problem: Problem, node: Node, planes: Sequence[Plane]) -> Node | 
 
 
 def _cut(problem: Problem, node: Node, plane: Plane) -> Node | Rejection:
-    """The node after a person's cut, or why it cannot be made."""
+    """The node after a user's cut, or its rejection."""
     named = name_limbs(node, plane)
     if isinstance(named, Rejection):
         return named
-    why = _unfit(problem, node, named)
+    why = _find_violation(problem, node, named)
     if why is not None:
         return why
     child = problem.cut(node, named)
@@ -115,12 +114,13 @@ def _cut(problem: Problem, node: Node, plane: Plane) -> Node | Rejection:
         return child
     if named.limbs_mm is None:
         return Rejection(node, OUT_OF_REACH, Reason.REACH)
-    return _in_the_way(problem, node, named) or Rejection(node, REASONS[Reason.FLOATING], Reason.FLOATING)
+    return _find_collision(problem, node, named) or Rejection(node, REASONS[Reason.FLOATING], Reason.FLOATING)
 
 
 def name_limbs(node: Node, plane: Plane) -> Plane | Rejection:
-    """A plane whose limbs are named by vertices. A point stands for the nearest piece above the plane; unless all points are
-    vertices, each piece is named by its farthest vertex. Where the limbs are all that lies above, the plane has none."""
+    """A plane whose limbs are given by vertices. A point selects the nearest piece above the plane; unless all points are
+    vertices, each piece is represented by its farthest vertex. If the limbs are everything above the plane, limbs_mm is None.
+    """
     if plane.limbs_mm is None:
         return plane
     limbs, standing = divide(above(node.solid, plane), plane.limbs_mm)
@@ -142,22 +142,23 @@ def name_limbs(node: Node, plane: Plane) -> Plane | Rejection:
 
 
 def cut_near(problem: Problem, node: Node, plane: Plane) -> Node | None:
-    """The node after a cut by the nearest plane to one that can be cut: the plane itself, one beside it, or one that leans by a
-    few degrees; None where there is none."""
+    """The node after a cut by the nearest feasible plane: the plane itself, a shifted one, or one that leans by a few degrees;
+    None if there is none.
+    """
     children = (try_planes(problem, node, [near]) for near in chain([plane], _beside(problem, node, plane)))
     return next((child for child in children if isinstance(child, Node)), None)
 
 
 def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The planes around one that the sweep finds nothing against: shifted ones, the nearest first, then leaning ones."""
-    if plane.limbs_mm is not None:  # one by one, and leaning about the section of the limbs
+    """Feasible planes around an infeasible one, by the sweep: shifted ones, nearest first, then leaning ones."""
+    if plane.limbs_mm is not None:  # one by one, leaning about the limbs' section
         passed = passing_places(limb_mesh(node.remainder, plane), plane)
         middle = passed.mean(axis=0) if len(passed) else plane.offset_mm * plane.normal
         for lean_deg in LEANS_DEG:
             for normal in _leaning(plane.normal, lean_deg):
                 for shift in sorted(range(-MOST_SHIFTS, MOST_SHIFTS + 1), key=abs):
                     offset_mm = float(normal @ middle) + SHIFT_MM * shift
-                    yield from _if_free(problem, node, replace(plane, normal=normal, offset_mm=offset_mm))
+                    yield from _if_feasible(problem, node, replace(plane, normal=normal, offset_mm=offset_mm))
         return
     vertices, passed = node.remainder.mesh.vertices, passing_places(node.remainder.mesh, plane)
     if len(passed) == 0:
@@ -176,18 +177,19 @@ def _beside(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
 
 
 def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """The planes that the sweep finds nothing against, over the whole height of what remains: first those of the same normal, the
-    nearest first, then those that lean by a few degrees."""
+    """Feasible planes by the sweep, over the whole height of the remainder: first those with the same normal, nearest first, then
+    those that lean by a few degrees.
+    """
     vertices = node.remainder.mesh.vertices
     if plane.limbs_mm is not None:  # along its normal only
         heights = vertices @ plane.normal
         low, high = float(heights.min()), float(heights.max())
         offsets = np.arange(low, high, max(LIMB_SHIFT_MM, (high - low) / MOST_PLACES))
         for offset_mm in offsets[np.argsort(np.abs(offsets - plane.offset_mm), kind="stable")]:
-            yield from _if_free(problem, node, replace(plane, offset_mm=float(offset_mm)))
+            yield from _if_feasible(problem, node, replace(plane, offset_mm=float(offset_mm)))
         return
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # a plane that leans, leans about it
+    middle = middle - plane.heights_mm(middle[None])[0] * plane.normal  # pivot of the planes that lean
     for lean_deg in FARTHER_LEANS_DEG:
         for normal in _leaning(plane.normal, lean_deg):
             heights = vertices @ normal
@@ -200,15 +202,15 @@ def planes_near(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
                 yield Plane(normal, float(offset_mm))
 
 
-def _if_free(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
-    """A plane, its limbs named, where nothing is found against it."""
+def _if_feasible(problem: Problem, node: Node, plane: Plane) -> Iterator[Plane]:
+    """Yields the plane with its limbs named, if it is feasible."""
     named = name_limbs(node, plane)
     if isinstance(named, Plane) and rejection(problem, node, named) is None:
         yield named
 
 
 def _leaning(normal: Floats, lean_deg: float) -> Floats:
-    """(k, 3) normals that lean four ways from one; itself for 0."""
+    """(k, 3) normals that lean to four sides; the normal itself for 0."""
     if lean_deg == 0.0:
         return normal[None]
     aside, across = frame_across(normal)
@@ -216,27 +218,28 @@ def _leaning(normal: Floats, lean_deg: float) -> Floats:
 
 
 def rejection(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """Why a person's plane cannot cut a node, None: it can. Nothing is cut."""
-    return _unfit(problem, node, plane) or _in_the_way(problem, node, plane)
+    """Why a user's plane cannot cut a node, without cutting; None if it can."""
+    return _find_violation(problem, node, plane) or _find_collision(problem, node, plane)
 
 
-def _in_the_way(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """A rejection where the head would meet what stands beside the limbs of a plane."""
+def _find_collision(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
+    """A rejection if the head would meet parts standing beside the limbs of a plane; None if it would not."""
     if plane.limbs_mm is None or problem.is_clear(node, plane):
         return None
     return Rejection(node, REASONS[Reason.STANDING], Reason.STANDING)
 
 
-def _unfit(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
-    """Why a plane cannot cut a node, what stands beside limbs left aside: it cuts nothing, the sweep finds something against it,
-    or no pose serves the part."""
-    missed = _miss(problem, node, plane)
+def _find_violation(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
+    """Why a plane cannot cut a node, parts beside limbs aside: it cuts nothing, the sweep rejects it, or no pose works for the
+    part.
+    """
+    missed = _missed_reason(problem, node, plane)
     if missed is not None:
         return Rejection(node, missed)
     limits = _limits(problem, plane.normal[None])
     reason, sliver_mm = problem.check(node, plane, limits)
     if reason != Reason.FEASIBLE:
-        return Rejection(node, _sentence(problem, node, plane, limits, reason, sliver_mm), reason)
+        return Rejection(node, _reason_text(problem, node, plane, limits, reason, sliver_mm), reason)
     if not problem.settings.clearance:
         return None
     points, machine = node.corners_cut(plane) + problem.place_mm, problem.machine
@@ -251,12 +254,12 @@ def _unfit(problem: Problem, node: Node, plane: Plane) -> Rejection | None:
 
 
 def _limits(problem: Problem, directions: Floats) -> Bounds:
-    """The bounds of (k, 3) directions without those that are no physical law."""
+    """The bounds of (k, 3) directions, without preferences that are not physical limits."""
     return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
 
 
-def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason: Reason, sliver_mm: float) -> str:
-    """What the sweep finds against a plane, with its numbers."""
+def _reason_text(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason: Reason, sliver_mm: float) -> str:
+    """A rejection by the sweep as a message with numbers."""
     text = REASONS[reason]
     match reason:
         case Reason.PLATFORM:
@@ -270,7 +273,7 @@ def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason
             needed, body, _ = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
             text = f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
         case Reason.INTERFACE:
-            text = "a piece of it would hang in the air: it stands on nothing that is printed before"
+            text = "a piece of it would float: nothing printed before lies below it"
         case Reason.FRAGILE:
             visible = f"{sliver_mm:.2g}" if sliver_mm >= 1e-4 else "less than 0.001"
             sliver = f"its plane would leave a sliver {phrase('thin', f'{sliver_mm:.2g}', visible)} mm thin"
@@ -283,8 +286,8 @@ def _sentence(problem: Problem, node: Node, plane: Plane, limits: Bounds, reason
     return text
 
 
-def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
-    """Why a plane cuts nothing: it misses the model, or later parts took what it would cut."""
+def _missed_reason(problem: Problem, node: Node, plane: Plane) -> str | None:
+    """Why a plane cuts nothing: it misses the model, or later parts already contain what it would cut."""
     heights = plane.heights_mm(node.remainder.mesh.vertices)
     if heights.min() < -COPLANAR_MM and heights.max() > COPLANAR_MM:
         return None
@@ -299,8 +302,9 @@ def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
 
 
 def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) -> Plane:
-    """The plane of a part whose normal or offset is left open: the feasible one that makes the most safe, among equals the one
-    with the largest part. Raises PlanError where there is none."""
+    """The plane of a part whose normal or offset is missing: the feasible one that saves most, among equals the one with the
+    largest part. Raises PlanError if there is none.
+    """
     if planned.normal is None and planned.offset_mm is None:
         raise PlanError(f"{label} has neither normal nor offset_mm: leave it out, the search adds parts by itself")
     directions = problem.limits.directions if planned.normal is None else np.array([planned.normal])
@@ -319,7 +323,7 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
         if reason[row] == Reason.FEASIBLE:
             offset = float(offset_mm[row]) if planned.offset_mm is None else planned.offset_mm
             plane = Plane(directions[direction[row]], offset)
-            if _unfit(problem, node, plane) is None and problem.cut(node, plane) is not None:
+            if _find_violation(problem, node, plane) is None and problem.cut(node, plane) is not None:
                 return plane
     counts = [(int((reason == why).sum()), text) for why, text in REASONS.items()]
     shares = "; ".join(f"{count} because {text}" for count, text in counts if count)

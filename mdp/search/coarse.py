@@ -1,8 +1,8 @@
-"""Coarse copy: a model with many faces is searched on a copy with fewer, and the planes that are found cut the model itself.
+"""Coarse copy: a model with many faces is searched on a simplified copy, and the resulting planes cut the model itself.
 
-Whatever the search weighs is many layers wide, and the copy's surface lies within a layer of the model's or, where many faces
-are left, within one and a half, nearly all of it within half of one. What the parts need, weigh and take is worked out on the
-model itself; the rows of the front that are not taken stay those of the copy.
+All the search's criteria refer to features many layers wide, and the copy's surface lies within one layer of the model's, or
+within one and a half if many faces remain; nearly all of it within half a layer. Support, cost and time of the parts are computed
+on the model itself; the rows of the front that are not chosen keep the copy's figures.
 """
 
 from collections.abc import Callable
@@ -23,20 +23,21 @@ from mdp.zone import Volume, Zones
 from profiles.profile import Profile
 
 WORTH = 0.7  # share of the faces above which a copy saves too little
-# How far simplifying may go, and how far the copy's surface may lie from the model's then, in layers: one face after another
-# moves the surface by more than the tolerance. The first goes for copies that keep half as many faces as a model may have.
+# Tolerance of the simplification, and limit of the copy's distance from the model, in layers: successive removals of faces move
+# the surface by more than the tolerance. The first pair is for copies with at most half as many faces as a model may have.
 COARSEST, *FINER = (0.5, 1.5), (0.25, 1.0), (0.125, 1.0), (0.0625, 1.0)
 
 
 def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones, on_phase: Callable[[str], None] = lambda text: None) -> Mesh | None:
-    """A copy with fewer faces to search, from which no vertex of a closed mesh lies farther than one layer and a half; None where
-    the mesh itself is to be searched: it has not many, has few to spare, single faces are marked, or the paper's terms count."""
+    """A simplified copy to search, whose surface lies within one and a half layers of every vertex; None if the mesh itself is to
+    be searched: it has few faces, few can be removed, single faces are marked, or the paper's terms apply.
+    """
     search, layer_mm = profile.search.effective, profile.process.layer_height_mm
     fine = 0 < search.simplify_faces < len(mesh.faces) and search.method == "best" and search.objective == "scar"
     marked = any(not isinstance(zone, Volume) for zone in (*zones.keep, *zones.no_seam, *zones.no_support, *zones.support))
     if not fine or marked:
         return None
-    on_phase(f"looking for a copy of {len(mesh.faces):,} faces with fewer of them")
+    on_phase(f"simplifying {len(mesh.faces):,} faces for the search")
     for tolerance, off in (COARSEST, *FINER):
         copy = simplify(mesh, tolerance * layer_mm)
         if len(copy.faces) >= WORTH * len(mesh.faces):
@@ -48,9 +49,10 @@ def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones, on_phase: Callable[[
 
 
 def cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) -> Decomposition | None:
-    """A problem's mesh, from where its search goes on, cut by the planes that were chosen for its coarse copy, or by planes next
-    to those where bumps that the copy has not forbid them, then moved a little as the mesh itself wants them; None where there
-    are none. The mesh as the search found it is measured anew as well."""
+    """Cut a problem's mesh, from the start node of its search, by the planes chosen for its coarse copy, or by neighbouring
+    planes where bumps missing in the copy make them infeasible; then refine the planes on the mesh itself. None if there are no
+    such planes. The row of the start node is measured again as well.
+    """
     began, rows, start = perf_counter(), list(copy.front), problem.start
     place = next(place for place, row in enumerate(rows) if row.chosen)
     node = start
@@ -73,6 +75,6 @@ def cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) ->
 
 
 def _measured(row: FrontRow, node: Node) -> FrontRow:
-    """A row with the planes and costs of a node, its time as it was."""
+    """A row with the planes and costs of a node; its time stays."""
     costs = front_row(node)
     return replace(costs, chosen=row.chosen, reason=row.reason, time_s=row.time_s, filament_mm=row.filament_mm)

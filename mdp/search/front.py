@@ -1,4 +1,4 @@
-"""Front: the best decomposition for every number of parts that one search has met, and which of them to take."""
+"""Pareto front: the best decomposition of a search for every number of parts, and the choice among them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,55 +14,57 @@ from profiles.errors import counted
 from profiles.messages import advice
 from profiles.profile import Profile
 
-# Costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams.
+# Costs within this share are equal: of the uncut model's cost when choosing fewer parts, of their own when choosing shorter
+# seams.
 EQUAL = 0.01
 
 ASKED, BY_PLAN = "asked for", "by the plan"
 LEAST_PARTS = "the fewest parts, cost alike to the least"
 PRINTABLE = "the least cost of what can be printed well"
-Price = tuple[float, float]  # what parts take to print: seconds, and mm of filament
+Price = tuple[float, float]  # printing time of the parts, s, and filament, mm
 Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 
 
 class ParetoFront:
-    """The best node met for every number of cuts: of those whose cost is alike to the least the one with the shortest seams;
-    where seams cost nothing the cheapest one."""
+    """The best node for every number of cuts: among those within tolerance of the least cost, the one with the shortest seams;
+    the cheapest if seams cost nothing.
+    """
 
     def __init__(self, start: Node) -> None:
         self._start = len(start.cuts)
-        self._alike: dict[int, list[Node]] = {self._start: [start]}
+        self._by_count: dict[int, list[Node]] = {self._start: [start]}
         self._equal = EQUAL if start.terms.seam_mm > 0.0 else 0.0
 
     def offer(self, node: Node) -> None:
-        """Take note of a node and of all that led to it from the start."""
+        """Add a node and all nodes on its path from the start."""
         for step in node.path[self._start :]:
-            held = self._alike.setdefault(len(step.cuts), [])
+            held = self._by_count.setdefault(len(step.cuts), [])
             if step not in held:
                 most_mm2 = min(alternative.cost_mm2 for alternative in (step, *held)) * (1.0 + self._equal)
                 held[:] = [alternative for alternative in (*held, step) if alternative.cost_mm2 <= most_mm2]
 
     def replace(self, node: Node, alternative: Node) -> None:
-        """Put another node, alike in cost, in the place of one."""
-        self._alike[len(node.cuts)] = [alternative]
+        """Replace a node by an alternative of about equal cost."""
+        self._by_count[len(node.cuts)] = [alternative]
 
     @property
     def nodes(self) -> list[Node]:
-        """The nodes by their number of cuts."""
-        return [self._best(count) for count in sorted(self._alike)]
+        """The best nodes by ascending number of cuts."""
+        return [self._best(count) for count in sorted(self._by_count)]
 
     def up_to(self, parts: int) -> Node:
-        """The node of the most parts up to a number, or of the fewest where all have more."""
-        return self._best(max((count for count in self._alike if count < parts), default=self._start))
+        """The node with the most parts up to a number, or with the fewest if all have more."""
+        return self._best(max((count for count in self._by_count if count < parts), default=self._start))
 
     def _best(self, count: int) -> Node:
-        alike = self._alike[count]
+        alike = self._by_count[count]
         if self._equal <= 0.0 or len(alike) == 1:
             return alike[0]
         return min(alike, key=lambda node: sum(seam.length_mm for seam in node.seams))
 
 
 def front_row(node: Node) -> FrontRow:
-    """A node with what it costs, the cuts apart. Every area counts once in the area that needs support."""
+    """The front row of a node, with its cost split into terms. Every area counts once in the area that needs support."""
     scars_mm2, over_mm2 = sum(cut.cut_cost.seam_mm2 for cut in node.cuts), 0.0
     seam_mm = sum((seam.length_mm for seam in node.seams), 0.0)
     if node.terms.need is not None:
@@ -75,7 +77,7 @@ def front_row(node: Node) -> FrontRow:
 
 
 def _excess_mm2(node: Node) -> float:
-    """By how much what needs support on the parts cut off counts more than its area."""
+    """Extra cost of area that needs support on the parts cut off, beyond the area itself, mm2."""
     total_mm2 = 0.0
     for whole, base in zip(node.path, node.planes, strict=False):
         before = whole.remainder
@@ -85,7 +87,7 @@ def _excess_mm2(node: Node) -> float:
 
 
 def price_rows(rows: Sequence[FrontRow], parts: Mapping[int, Sequence[Part]], price: Pricing) -> list[FrontRow]:
-    """Rows with what their parts take to print. parts: of the places of rows that get a price."""
+    """Rows with time and filament of their parts. parts: parts of the rows to price, by position."""
     places = list(parts)
     prices = parallel_map(lambda k: price(parts[places[k]]), len(places))
     known = dict(zip(places, prices, strict=True))
@@ -93,46 +95,48 @@ def price_rows(rows: Sequence[FrontRow], parts: Mapping[int, Sequence[Part]], pr
 
 
 def with_price(row: FrontRow, price: Price | None) -> FrontRow:
-    """A row with what its parts take to print, as it is where that is not known."""
+    """A row with time and filament of its parts, unchanged if they are unknown."""
     return row if price is None else replace(row, time_s=price[0], filament_mm=price[1])
 
 
-def pays(rows: Sequence[FrontRow | Node]) -> list[bool]:
-    """Whether each row, or node, of ever more parts costs less than all with fewer parts: nobody takes the others."""
+def pareto_optimal(rows: Sequence[FrontRow | Node]) -> list[bool]:
+    """Pareto-optimal rows or nodes, given by ascending number of parts: whether each costs less than all with fewer parts."""
     return [all(row.cost_mm2 < fewer.cost_mm2 for fewer in rows[:place]) for place, row in enumerate(rows)]
 
 
 @dataclass(frozen=True)
 class Weights:
-    """What a second of printing and a mm of filament count beside surface that is blemished, mm2."""
+    """Exchange rates of a second of printing and a mm of filament against blemished area, mm2."""
 
     second_mm2: float = 0.0
     filament_mm2: float = 0.0
 
     @classmethod
     def of(cls, profile: Profile) -> "Weights":
-        """What they count by a profile; without support nothing, for then they are no reason to leave a model whole."""
+        """Exchange rates of a profile; zero without support, since time and filament would then be no reason against cuts."""
         search = profile.search.effective
         return cls() if profile.process.support != "auto" else cls(search.second_mm2, 1e-3 * search.metre_mm2)
 
     def of_print(self, time_s: float, filament_mm: float) -> float:
-        """What a print counts by its time and filament."""
+        """Cost of a print's time and filament, mm2."""
         return self.second_mm2 * time_s + self.filament_mm2 * filament_mm
 
     def of_row(self, row: FrontRow) -> float | None:
-        """The same of a row of a front; None where its time counts and is not known."""
+        """Cost of a row's time and filament, mm2; None if they count but are unknown."""
         if not self:
             return 0.0
         return None if row.time_s is None else self.of_print(row.time_s, row.filament_mm or 0.0)
 
     def __bool__(self) -> bool:
-        """Whether anything of it counts."""
+        """Whether time or filament counts."""
         return self.second_mm2 > 0.0 or self.filament_mm2 > 0.0
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The place of a row in a front and why it is taken; note: what the row with the fewest scars would save, and its price."""
+    """The position of the chosen row in a front and the reason; note: the saving and the price of the row with the fewest
+    blemishes.
+    """
 
     place: int
     reason: str
@@ -140,24 +144,24 @@ class Choice:
 
 
 def charge_mm2(rows: Sequence[FrontRow], weights: Weights, least_saving: float) -> float:
-    """The charge for each part beyond those of the first row: a share of what that costs with its time; nothing where time counts
-    nothing, as without support, or where no row has a time."""
+    """Charge for each part beyond those of the first row: a share of its cost including time; 0 if time does not count, as
+    without support, or if no row has a time.
+    """
     timed = [row for row in rows if row.time_s is not None]
     return least_saving * (timed[0].cost_mm2 + (weights.of_row(timed[0]) or 0.0)) if weights and timed else 0.0
 
 
 def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0) -> Choice:
-    """The row whose cost, with its time and filament and a charge for every further part, is least. rows: by their number of
-    parts.
+    """Choose the row with the least cost, including time, filament and a charge for every further part. rows: by ascending number
+    of parts.
 
-    weights: what time and filament count. least_saving: the charge, as a share of what the first row costs with its time. Where
-    any row has a time, those without cannot be printed, and those that are not sound are not taken. Where none has, and where
-    time counts nothing, as without support, there is no charge: the row of the fewest parts is taken whose cost is alike to the
-    least.
+    weights: exchange rates of time and filament. least_saving: the charge, as a share of the first row's cost including time. If
+    any row has a time, rows without one cannot be printed, and unsound rows are not chosen. If none has, or time does not count,
+    as without support, there is no charge: the choice is the row with the fewest parts within tolerance of the least cost.
     """
-    paying = [place for place, good in enumerate(pays(rows)) if good and (place == 0 or rows[place].sound)]
-    timed = [place for place in paying if rows[place].time_s is not None]
-    places, first = timed or paying, (timed or paying)[0]
+    pareto_optimal_rows = [place for place, good in enumerate(pareto_optimal(rows)) if good and (place == 0 or rows[place].sound)]
+    timed = [place for place in pareto_optimal_rows if rows[place].time_s is not None]
+    places, first = timed or pareto_optimal_rows, (timed or pareto_optimal_rows)[0]
     totals = {place: rows[place].cost_mm2 + (weights.of_row(rows[place]) or 0.0) for place in places}
     charge = charge_mm2([rows[place] for place in places], weights, least_saving)
     limit_mm2 = min(rows[place].cost_mm2 for place in places) + EQUAL * rows[first].cost_mm2
@@ -173,11 +177,11 @@ def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0
         reason = "the least cost with its time"
     else:
         reason = f"more parts would save less than {100.0 * least_saving:g} % each"
-    return Choice(taken, reason, _given_up(rows[scars], rows[taken]) if taken != scars else ())
+    return Choice(taken, reason, _savings_notes(rows[scars], rows[taken]) if taken != scars else ())
 
 
-def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
-    """What the row with the fewest scars would save and cost beside the one that is taken."""
+def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
+    """A note on what the row with the fewest blemishes would save and cost, compared with the chosen one."""
     saved_mm2, longer_s = taken.cost_mm2 - fewest_scars.cost_mm2, (fewest_scars.time_s or 0.0) - (taken.time_s or 0.0)
     more_mm = (fewest_scars.filament_mm or 0.0) - (taken.filament_mm or 0.0)
     parts = fewest_scars.parts

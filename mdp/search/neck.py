@@ -1,7 +1,7 @@
-"""Neck: near a plane, the one that a model is thinnest at: whose rim is shorter than that of every plane close to it.
+"""Neck: the plane of locally minimal rim length near a given plane.
 
-Towards the end of a model rims get shorter, too, down to nothing: that is no neck. At a neck the rim grows on both sides of the
-plane, and however the plane is tilted.
+Towards the end of a model rims shrink to nothing as well, but that is not a neck. At a neck the rim grows on both sides of the
+plane, and for every tilt.
 """
 
 from collections.abc import Iterator
@@ -17,19 +17,19 @@ from mdp.plane import Plane
 from mdp.sweep.crossing import sum_chords
 from mdp.sweep.sweep import Remainder, gains
 
-REACH_SHARE, REACH_DEG = 0.15, 25.0  # how far a neck is looked for: of the diagonal of what is cut, and tilted by so much
+REACH_SHARE, REACH_DEG = 0.15, 25.0  # search range for necks: share of the diagonal of the mesh, and tilt
 RISE = 0.02  # share by which a rim must grow on either side
-OFFSETS, RINGS = 48, 3  # of the first look: planes along each direction, and rings of directions around the first
-MOST_TRIED, APART = 3, 0.3  # of the necks of the first look that are refined; how far apart those are, a share of the reach
-LEAST_MM, LEAST_DEG = 0.005, 0.02  # finer, nobody cuts
-MOST_STEPS, LEAST_GAIN = 60, 1e-6  # of the refinement; by what share a rim must be shorter to be gone to
+OFFSETS, RINGS = 48, 3  # planes along each direction and rings of directions around the first, in the initial scan
+MOST_TRIED, APART = 3, 0.3  # necks of the initial scan that are refined, and their least distance as a share of the reach
+LEAST_MM, LEAST_DEG = 0.005, 0.02  # resolution; finer differences do not matter
+MOST_STEPS, LEAST_GAIN = 60, 1e-6  # steps of the refinement, and least relative reduction of the rim for a step
 NOTHING_RISKY = -2.0  # below the cosine of any face
-NEAR_MM = 1e-6  # corners nearer to a plane count as above it, or rims along edges would be lost
+NEAR_MM = 1e-6  # corners nearer to a plane count as above it; otherwise rims along edges would be lost
 
 
 @dataclass(frozen=True, eq=False)
 class _Surface:
-    """Vertices, and the faces near a plane on which a rim is seen, with their normals and areas."""
+    """Vertices, and the faces near a plane on which a rim counts, with their normals and areas."""
 
     vertices: Floats
     faces: Ints
@@ -37,8 +37,8 @@ class _Surface:
     areas_mm2: Floats
 
     def rim_mm(self, plane: Plane) -> float:
-        """The length of a plane's rim where it is seen."""
-        faces = self.faces, self.normals, self.areas_mm2, self.areas_mm2  # any weights above 0: only the length is asked for
+        """Visible length of a plane's rim, mm."""
+        faces = self.faces, self.normals, self.areas_mm2, self.areas_mm2  # any positive weights: only the length is used
         return float(sum_chords(faces, self._heights_mm(plane), plane.normal, 0.0).length_mm)
 
     def _heights_mm(self, plane: Plane) -> Floats:
@@ -47,7 +47,7 @@ class _Surface:
         return heights
 
     def centre_mm(self, plane: Plane) -> Floats:
-        """(3,) the middle of a plane's rim."""
+        """(3,) centre of a plane's rim, mm."""
         a, b, c = (self._heights_mm(plane) > 0.0)[self.faces.T]
         near = self.vertices[self.faces[(a != b) | (b != c)]].reshape(-1, 3)
         middle = 0.5 * (near.min(axis=0) + near.max(axis=0))
@@ -56,39 +56,38 @@ class _Surface:
 
 
 def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float) -> Plane | None:
-    """The plane of the shortest rim among the necks near a plane; None: there is none, or the plane misses the mesh.
+    """The plane of the shortest rim among the necks near a plane; None if there is none, or if the plane misses the mesh.
 
-    seen: (m,) above 0 for the faces on which a rim counts. The middle of the neck's rim is at most reach_mm from the plane and
-    its normal at most REACH_DEG from the plane's.
+    seen: (m,) positive for faces on which a rim counts. The centre of the neck's rim is at most reach_mm from the plane and its
+    normal at most REACH_DEG from the plane's.
     """
     heights = plane.heights_mm(mesh.vertices)
     if heights.max() <= 0.0 or heights.min() >= 0.0:
         return None
-    surface = _near(mesh, seen, heights, reach_mm)
+    surface = _surface_near(mesh, seen, heights, reach_mm)
     if surface.rim_mm(plane) <= 0.0:
         return None
     centre = surface.centre_mm(plane)
-    shorter = sorted(_first_look(mesh, seen, plane.normal, centre, reach_mm), key=lambda pair: pair[0])
-    begins = _apart(surface, [begin for _, begin in shorter], APART * reach_mm)
-    necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS) for begin in begins]
+    shorter = sorted(_coarse_scan(mesh, seen, plane.normal, centre, reach_mm), key=lambda pair: pair[0])
+    begins = _distinct(surface, [begin for _, begin in shorter], APART * reach_mm)
+    necks = [_refine(surface, begin, 2.0 * reach_mm / OFFSETS) for begin in begins]
     allowed = [neck for neck in necks if _is_neck(surface, neck, plane, reach_mm)]
     return min(allowed, key=surface.rim_mm, default=None)
 
 
-def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surface:
-    """The part of a mesh that a plane of the search can meet: all of it but what lies far above and below."""
+def _surface_near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float) -> _Surface:
+    """The part of a mesh that any plane of the search can meet, without faces far above and below."""
     wide_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     far_mm = 2.0 * reach_mm + wide_mm * sin(radians(REACH_DEG))
     around = heights[mesh.faces]
     kept = (around.min(axis=1) <= far_mm) & (around.max(axis=1) >= -far_mm) & (seen > 0.0)
     faces = mesh.faces[kept]
-    faces.setflags(write=False)  # as the mesh's own are: the kernel of rims is compiled once for both
+    faces.setflags(write=False)  # read-only like the mesh's own, so the kernel for rims is compiled once for both
     return _Surface(mesh.vertices, faces, mesh.normals[kept], mesh.areas_mm2[kept])
 
 
-def _first_look(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_mm: float) -> Iterator[tuple[float, Plane]]:
-    """Planes whose rim is shorter than those of their neighbours along their normal, with their rims: a sweep along each
-    direction."""
+def _coarse_scan(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_mm: float) -> Iterator[tuple[float, Plane]]:
+    """Planes with a locally minimal rim along their normal, and its length, from a sweep along each direction."""
     step_mm, directions = 2.0 * reach_mm / OFFSETS, np.vstack([normal, *map(partial(_ring, normal), range(1, RINGS + 1))])
     remainder = Remainder(mesh, np.zeros(len(mesh.faces), dtype=np.bool_), np.where(seen > 0.0, 1.0, 0.0))
     swept = gains(remainder, directions, step_mm, NOTHING_RISKY)
@@ -102,8 +101,8 @@ def _first_look(mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach_
             yield float(rims[k]), Plane(direction, float(offsets_mm[k]))
 
 
-def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plane]:
-    """The first planes whose rims have their middles so far from each other: neighbouring directions find the same neck."""
+def _distinct(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plane]:
+    """The first planes whose rims have centres at least that far apart, since neighbouring directions find the same neck."""
     taken: list[tuple[Floats, Plane]] = []
     for plane in planes:
         centre = surface.centre_mm(plane)
@@ -115,22 +114,22 @@ def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plan
 
 
 def _ring(normal: Floats, number: int) -> Floats:
-    """(k, 3) directions around one; those of the last ring lie as far from it as the reach."""
+    """(k, 3) directions in a ring around a normal; the last ring is at the edge of the range."""
     return _leaning(normal, radians(REACH_DEG * number / RINGS), pi * np.arange(6 * number) / (3 * number))
 
 
 def _leaning(normal: Floats, tilt_rad: float, turns_rad: Floats) -> Floats:
-    """(k, 3) directions that lean away from one by an angle, each to another (k,) side."""
+    """(k, 3) directions that lean from a normal by an angle, each to one of (k,) sides, radians."""
     aside, across = frame_across(normal)
     sides = np.cos(turns_rad)[:, None] * aside + np.sin(turns_rad)[:, None] * across
     leaning: Floats = cos(tilt_rad) * normal + sin(tilt_rad) * sides
     return leaning
 
 
-def _refined(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
-    """The plane of the shortest rim that is reached downhill: moved, or tilted about the middle of its rim, ever less.
+def _refine(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
+    """Pattern search for a shorter rim: shift the plane, or tilt it about the centre of its rim, with shrinking steps.
 
-    What goes on downhill for long is on its way to an end of the model: it is left where it is, and is no neck.
+    A plane that keeps moving is on its way to an end of the model: it is returned as it is, and is not a neck.
     """
     least, step_deg = surface.rim_mm(plane), REACH_DEG / RINGS
     for _ in range(MOST_STEPS):
@@ -147,7 +146,7 @@ def _refined(surface: _Surface, plane: Plane, step_mm: float) -> Plane:
 
 
 def _around(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Iterator[Plane]:
-    """Planes one step away."""
+    """The planes one step away."""
     yield Plane(plane.normal, plane.offset_mm + step_mm)
     yield Plane(plane.normal, plane.offset_mm - step_mm)
     normals = _leaning(plane.normal, radians(step_deg), pi * (np.arange(8) - 2) / 4)
@@ -156,17 +155,17 @@ def _around(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) ->
 
 
 def _is_neck(surface: _Surface, neck: Plane, plane: Plane, reach_mm: float) -> bool:
-    """Whether a plane lies within reach and its rim grows on both sides, before it gets shorter again."""
+    """Whether a plane lies within reach and its rim grows on both sides before it shrinks again."""
     tilt_deg = np.degrees(atan2(float(np.linalg.norm(np.cross(neck.normal, plane.normal))), float(neck.normal @ plane.normal)))
     away_mm = abs(float(plane.heights_mm(surface.centre_mm(neck)[None])[0]))
     if tilt_deg > REACH_DEG - LEAST_DEG or away_mm > reach_mm:
         return False
     least, step_mm = surface.rim_mm(neck), 2.0 * reach_mm / OFFSETS
-    return all(_rises(surface, neck, side * step_mm, least) for side in (-1.0, 1.0))
+    return all(_rim_grows(surface, neck, side * step_mm, least) for side in (-1.0, 1.0))
 
 
-def _rises(surface: _Surface, neck: Plane, step_mm: float, least: float) -> bool:
-    """Whether the rim grows by RISE within the reach one way, before it gets shorter than the neck's."""
+def _rim_grows(surface: _Surface, neck: Plane, step_mm: float, least: float) -> bool:
+    """Whether the rim grows by RISE within the reach on one side before it becomes shorter than the neck's."""
     for k in range(1, ceil(OFFSETS / 2) + 1):
         rim = surface.rim_mm(Plane(neck.normal, neck.offset_mm + k * step_mm))
         if rim < least * (1.0 - 1e-9):

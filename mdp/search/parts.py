@@ -1,4 +1,6 @@
-"""Parts of a node: its solids in print order, each at a pose, so that the table turns little, and the decomposition they are."""
+"""Parts of a node: its solids in print order, each with a pose so that the table turns little, and the decomposition made of
+them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,23 +19,23 @@ from mdp.sweep.crossing import NO_RIM
 from mdp.zone import NOWHERE, ZonesOnModel
 from profiles.machine import Machine
 
-MOST_FEATHERED = 0.1  # share of a seam; more is reported
-MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
+MOST_FEATHERED = 0.1  # share of a seam; a larger one is reported
+MOST_FOLDED = 1e-2  # share of the volume; the reader resolves larger overlaps
 
 
 def one_piece(mesh: Mesh, machine: Machine, zones: ZonesOnModel = NOWHERE) -> Part:
-    """A model as it stands, uncut, with its zones; what needs support of it is not worked out."""
+    """A model as it stands, uncut, with its zones; without the faces that need support."""
     pose = level(machine)
     whole = Part(1, mesh, PLATFORM, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
     return replace(whole, no_seam=zones.no_seam, no_support=zones.no_support, support=zones.support, modifiers=zones.modifiers)
 
 
 def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
-    """Parts in print order: what remains first, then the cuts, last one first."""
+    """Parts in print order: the remainder first, then the cuts in reverse order."""
     machine, clearance = problem.machine, problem.settings.clearance
     bases = [PLATFORM, *reversed(node.planes)]
     pieces = [node.piece, *(node.places.piece(cut.part) for cut in reversed(node.cuts))]
-    before = node.path[::-1]  # for each part but the first the node that it was cut off
+    before = node.path[::-1]  # for each part but the first, the node that it was cut off from
 
     def allowed(position: int, near_turn_deg: float | None = None) -> list[Pose]:
         base, mesh = bases[position], pieces[position].mesh
@@ -70,7 +72,7 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
                 seam_mm=seams[position].length_mm,
                 feather_share=seams[position].feather_share,
                 needing=None if needs is None else risky,
-                needing_upright=upright,  # those of cuts are not the model's
+                needing_upright=upright,  # faces created by cuts are not the model's
                 no_seam=zones.no_seam.among(piece.sources),
                 no_support=zones.no_support.among(piece.sources),
                 modifiers=zones.modifiers,
@@ -83,7 +85,9 @@ def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
 def decomposition_of(
     problem: Problem, name: str, parts: tuple[Part, ...], front: Sequence[FrontRow], notes: Sequence[str] = ()
 ) -> Decomposition:
-    """The decomposition of a model into some parts; front: its rows, that of the parts marked; notes: beside those on parts."""
+    """The decomposition of a model into given parts. front: its rows, with the chosen one marked; notes: in addition to those
+    about parts.
+    """
     mesh, root = problem.mesh, problem.root.remainder
     folded = folded_mm3(mesh, parts)
     return Decomposition(
@@ -105,28 +109,26 @@ def decomposition_of(
 
 
 def notes_of_search(decomposition: Decomposition) -> tuple[str, ...]:
-    """The notes of a decomposition that do not tell of its own parts."""
+    """The notes of a decomposition that are not about its parts."""
     own = _notes_of_parts(decomposition.folded_mm3, decomposition.parts)
     return tuple(note for note in decomposition.notes if note not in own)
 
 
 def folded_mm3(mesh: Mesh, parts: Sequence[Part]) -> float:
-    """Volume by which the parts differ from a mesh whose surface passes through itself a little, 0 for others.
+    """Difference between the parts' volume and that of a mesh that slightly intersects itself, mm3; 0 for others.
 
-    A mesh's volume counts a place as often as the surface winds around it, inside out places less than once; a cut counts it
-    once or not at all.
+    A mesh's volume counts a point as often as the surface winds around it, negatively if inside out; a cut counts it once or not
+    at all.
     """
     difference = abs(mesh.volume_mm3 - sum(part.volume_mm3 for part in parts))
     return difference if VOLUME_TOLERANCE * mesh.volume_mm3 < difference <= MOST_FOLDED * mesh.volume_mm3 else 0.0
 
 
 def _notes_of_parts(folded: float, parts: Sequence[Part]) -> list[str]:
-    """That the surface passes through itself, and the parts that end in thin edges along much of their seam."""
+    """Notes on self-intersections, and on parts with feather edges along much of their seam."""
     notes = []
     if folded > 0:
-        notes.append(
-            f"the surface passes through itself: {folded:.3g} mm³ that it winds around twice or inside out are counted once"
-        )
+        notes.append(f"the surface intersects itself: {folded:.3g} mm³ enclosed twice or inside out are counted once")
     for part in parts:
         if part.feather_share > MOST_FEATHERED:
             share = f"{part.feather_share:.0%} of its seam is a feather edge"

@@ -1,6 +1,6 @@
-"""Plan file: a decomposition as a small TOML file that a person can read, change and use again.
+"""Plan file: a decomposition as a small TOML file that a user can read, edit and use again.
 
-docs/plan.md has an example and explains every key. A file of planes by hand needs no sha256, and a part may leave out `normal` or
+docs/plan.md has an example and explains every key. A hand-written file of planes needs no sha256, and a part may omit `normal` or
 `offset_mm`: the search completes it.
 """
 
@@ -18,18 +18,19 @@ from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
 
-VERSION = 1  # of what a plan's keys mean
-GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
-ZONE_KINDS = ("keep", "no_seam", "no_support", "support")  # as mdp.zone.Zones has them
+VERSION = 1  # version of the meaning of a plan's keys
+GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # resolution of a sha256; shifted, since coordinates lie on whole and half micrometres
+ZONE_KINDS = ("keep", "no_seam", "no_support", "support")  # as in mdp.zone.Zones
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "modifier", "front")
-MOST_MM = 1e5  # fifty times what any printer makes (mdp.read.MOST_MM)
+MOST_MM = 1e5  # fifty times the size of a printable model (mdp.read.MOST_MM)
 ROW_FIGURES = ("support_area_mm2", "seam_mm", "stairs_mm2", "cost_mm2")
 
 
 @dataclass(frozen=True)
 class PlannedPart:
-    """The base plane of a part, its normal of length 1; None: to be found by the search. limbs_mm: a point on each piece above
-    the plane that the part is; none: it is all that lies above. remark: a comment for the reader."""
+    """The base plane of a part, its normal of length 1; None for a value that the search must find. limbs_mm: a point on each
+    piece above the plane that belongs to the part; empty if everything above does. remark: a comment for the reader.
+    """
 
     normal: Vector | None
     offset_mm: float | None
@@ -44,7 +45,7 @@ class PlannedPart:
 
     @property
     def plane(self) -> Plane | None:
-        """The plane where it is given whole."""
+        """The plane if it is complete, else None."""
         if self.normal is None or self.offset_mm is None:
             return None
         return Plane(np.array(self.normal), self.offset_mm, np.array(self.limbs_mm) if self.limbs_mm else None)
@@ -52,9 +53,10 @@ class PlannedPart:
 
 @dataclass(frozen=True)
 class PlanFile:
-    """What a file holds. name: the file's; sha256: of the model it was made of, "": made by hand for any; orientation: rows of
-    the rotation that laid the model down before it was cut, None: it stands as in its file; parts: in print order, without
-    part 1; front: one row for every number of parts; settings: of single parts, part 1 too."""
+    """The content of a plan file. name: the file's name; sha256: hash of its model, "" if it was written by hand for any model;
+    orientation: rows of the rotation applied to the model before cutting, None if there is none; parts: in print order, without
+    part 1; front: one row for every number of parts; settings: of single parts, including part 1.
+    """
 
     name: str
     model: str = ""
@@ -66,7 +68,7 @@ class PlanFile:
     settings: tuple[PartSettings, ...] = ()
 
     def row(self, most_parts: int) -> tuple[PlannedPart, ...]:
-        """The parts, from the second on, of the row with the most parts up to a number. Raises PlanError."""
+        """The parts, from the second, of the row with the most parts up to a number. Raises PlanError."""
         rows = {row.parts: planned_parts(row) for row in self.front} | {len(self.parts) + 1: self.parts}
         allowed = [count for count in rows if count <= most_parts]
         if not allowed:
@@ -79,12 +81,12 @@ NO_PLAN = PlanFile("")
 
 
 def height_range(low_mm: float, high_mm: float) -> Zone:
-    """The box of all that lies between two heights."""
+    """A zone between two heights that is unbounded in x and y."""
     return Zone((-MOST_MM, -MOST_MM, low_mm), (MOST_MM, MOST_MM, high_mm))
 
 
 def mesh_sha256(mesh: Mesh) -> str:
-    """A word for the faces of a mesh and its vertices to the micrometre, the same on every machine."""
+    """A hash of a mesh's faces and of its vertices to the micrometre, equal on every machine."""
     vertices = np.floor(mesh.vertices / GRID_MM + GRID_SHIFT).astype("<i8")
     return sha256(vertices.tobytes() + mesh.faces.astype("<i4").tobytes()).hexdigest()
 
@@ -106,7 +108,7 @@ def plan_of(
 
 
 def planned_parts(row: FrontRow) -> tuple[PlannedPart, ...]:
-    """The parts of a row of a front from the second on, in print order."""
+    """The parts of a front row from the second, in print order."""
     return tuple(map(PlannedPart.of, reversed(row.planes)))
 
 

@@ -1,4 +1,4 @@
-"""Plan reading: a plan's file, each value checked; an error names the file, the key, the value and what is allowed."""
+"""Plan reading: the file of a plan with each value checked; an error names the file, the key, the value and what is allowed."""
 
 import os
 from collections.abc import Sequence
@@ -23,27 +23,27 @@ from profiles.toml_text import read_toml
 PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
 BOX_KEYS = ("min_mm", "max_mm", "axes", "room")
 ZONE_KEYS = (*BOX_KEYS, "colour", "point_mm", "angle_deg")
-MESH_ZONES = ("no_support", "support")  # kinds that may be a mesh, too
+MESH_ZONES = ("no_support", "support")  # kinds that may also be a mesh
 MODIFIER_KEYS = (*BOX_KEYS, "z_mm", "mesh", "process")
 ROW_KEYS = ("planes", *ROW_FIGURES)
-MOST_BYTES = 10_000_000  # far more than the workbench writes; a file as large is refused unread
-MOST_ZONES = 1000  # of a kind: every face is asked for each
+MOST_BYTES = 10_000_000  # far more than the workbench writes; a larger file is refused unread
+MOST_ZONES = 1000  # of a kind; every face is tested against each
 MODIFIER_VOLUMES = {"a box": set(BOX_KEYS), "a height range z_mm": {"z_mm"}, "a mesh": {"mesh"}}
-MOST_MODIFIERS = 100  # each of them makes another pass over the layers
+MOST_MODIFIERS = 100  # each adds a pass over the layers
 
 
 def read_plan(path: Path) -> PlanFile:
     """The plan of a file. Raises PlanError with one sentence that names the file, the key, its value and what is allowed."""
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise PlanError(f"plan {path} has more than {MOST_BYTES} bytes: it is no plan")
+            raise PlanError(f"plan {path} has more than {MOST_BYTES} bytes: it is not a plan")
         table = read_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise PlanError(f"plan {path} cannot be read: {reason(error)}") from None
     except UnicodeDecodeError as error:
         raise PlanError(f"plan {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
     except ValueError as error:
-        raise PlanError(f"plan {path} is no TOML: {error}") from None
+        raise PlanError(f"plan {path} is not TOML: {error}") from None
     try:
         return _plan(path.name, path.parent, table)
     except PlanError as error:
@@ -59,7 +59,7 @@ def _plan(name: str, folder: Path, table: dict[str, Any]) -> PlanFile:
     own = {number: _process(part, f"part {number}: ") for number, part in tables if part.get("process")}
     settings = tuple(PartSettings(part=number, process=process) for number, process in own.items())
     if parts and parts[0] != PlannedPart(None, None):
-        raise PlanError("part 1 stands on the platform and has no plane: put an empty [[part]] before the first plane")
+        raise PlanError("part 1 stands on the build plate and has no plane: put an empty [[part]] before the first plane")
     kinds: dict[str, Any] = {
         kind: tuple(_zone(folder, values, kind, f"{kind} {number}: ") for number, values in enumerate(zones, start=1))
         for kind, zones in ((kind, _list(table, kind, MOST_ZONES)) for kind in ZONE_KINDS)
@@ -109,7 +109,7 @@ def _row(table: dict[str, Any], number: int) -> FrontRow:
 
 
 def _row_plane(numbers: Any, key: str) -> Plane:
-    """A plane by its four numbers and three more for each of its limbs."""
+    """A plane from its four numbers, and three more for each of its limbs."""
     limbs = (len(numbers) - 4) // 3 if isinstance(numbers, list) else 0
     values = _numbers(numbers, key, 4 + 3 * min(max(limbs, 0), MOST_JOINED))
     points = [_vector(values[at : at + 3], key) for at in range(4, len(values), 3)]
@@ -198,7 +198,7 @@ def _painted(values: dict[str, Any], where: str) -> Painted:
 
 
 def _rotation(table: dict[str, Any], key: str) -> tuple[Vector, Vector, Vector]:
-    """The rows of a rotation; key: where it stands, its last word the table's key."""
+    """The rows of a rotation. key: name for messages, whose last word is the table's key."""
     given = table[key.split()[-1]]
     rows = tuple(_vector(row, key) for row in (given if isinstance(given, list) else [given]))
     matrix = np.array(rows)
@@ -220,7 +220,7 @@ def _list(table: dict[str, Any], key: str, most: int) -> list[dict[str, Any]]:
 def _only(table: dict[str, Any], allowed: Sequence[str], where: str) -> None:
     for key in table:
         if key not in allowed:
-            raise PlanError(f"{where}{_show(key)} is no key of a plan: {', '.join(allowed)} are allowed")
+            raise PlanError(f"{where}{_show(key)} is not a key of a plan: {', '.join(allowed)} are allowed")
 
 
 def _text(table: dict[str, Any], key: str) -> str:
@@ -261,9 +261,9 @@ def _is_number(value: Any) -> bool:
 
 
 def _show(value: Any) -> str:
-    """A value as it may stand in a message: short, on one line."""
+    """A value in a form for messages: short, on one line."""
     try:
         text = "missing" if value is None else repr(value)
-    except ValueError:  # Python writes no number of thousands of digits
+    except ValueError:  # Python refuses to write a number of thousands of digits
         return "a number of thousands of digits"
     return text if len(text) <= 60 else text[:60] + "..."

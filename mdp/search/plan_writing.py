@@ -1,4 +1,4 @@
-"""Plan writing: a plan as the text of its file, with remarks for a reader."""
+"""Plan writing: the text of a plan file, with comments for the reader."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,9 @@ from mdp.zone import AnyZone, Grown, MeshVolume, Modifier, Painted, Zone
 
 
 def plan_text(plan: PlanFile, folder: Path | None = None) -> str:
-    """The content of a plan's file. folder: where it will lie; None: anywhere, the files that it names have whole paths."""
+    """The content of a plan file. folder: the folder in which it will be; None if unknown, so the files that it names have
+    absolute paths.
+    """
     document = tomlkit.document()
     count = len(plan.parts) + 1
     document.add(tomlkit.comment(f"How a model is cut into {count} part{'s' * (count > 1)}, in print order; use it with --plan."))
@@ -45,7 +47,7 @@ def _zone_values(zone: AnyZone, folder: Path | None) -> dict[str, Any]:
         return {"point_mm": list(zone.point_mm), "angle_deg": zone.angle_deg}
     if isinstance(zone, MeshVolume):
         return {"mesh": _path_from(folder, zone.file)}
-    assert isinstance(zone, Zone)  # triangles are only what a model's own file marks
+    assert isinstance(zone, Zone)  # triangles only come from marks in a model's own file
     leaning = {} if zone.axes is None else {"axes": [list(axis) for axis in zone.axes]}
     room = {} if zone.room is None else {"room": _inline(_zone_values(zone.room, folder))}
     return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm), **leaning, **room}
@@ -101,7 +103,7 @@ def _part_table(part: PlannedPart, process: Mapping[str, Any]) -> tomlkit.items.
 
 
 def _numbers(plane: Plane) -> list[float]:
-    """A plane in a row: its normal, its offset, and the points of its limbs."""
+    """A plane in a front row: its normal, its offset, and the points of its limbs."""
     limbs_mm = [] if plane.limbs_mm is None else plane.limbs_mm.ravel().tolist()
     return [*plane.normal.tolist(), plane.offset_mm, *limbs_mm]
 

@@ -1,7 +1,7 @@
-"""Polish: the sequence of cuts that a search ends with, made shorter and better, off the grid of candidates; never worse.
+"""Polish: improve the final sequence of cuts of a search, with fewer cuts and off the grid of candidates; never worse.
 
-Cuts that save nothing any more are left out, every plane is moved as long as the forecast of what stays risky falls and the
-plane may still be cut, and where that made room further cuts are added. What counts is the cost after cutting it all again.
+Cuts that no longer save anything are dropped, every plane is moved while the forecast cost falls and the plane stays feasible,
+and further cuts are added where there is room. The result is judged by its cost after cutting again.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,18 +27,20 @@ from mdp.search.neck import find_neck
 from mdp.search.problem import Problem
 from mdp.sweep.limbs import limb_mesh
 
-STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are about 4.5 apart
+# in offset steps, and degrees: the grid's directions are about 4.5 apart
+STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))
 ROUNDS = 4  # moves by one step before the next smaller one
-TRIES = 2  # moved planes that are cut before one stays where it is
+TRIES = 2  # moved planes that are cut before a plane stays where it is
 ENOUGH = 1e-3  # a move that saves a smaller share of the risky area is not worth a cut
 SAME_MM2 = 1e-6
-PARTNER_COSINE, PARTNER_MM = cos(radians(20.0)), 5.0  # two planes so near to each other's image are meant to be it
-NECK_REACH = 0.06  # of the model's diameter: how far from a plane necks are sought
-TRADE_OFF = 4.0  # of further cuts, as the beam's second slot
+# two planes this close to each other's mirror image are meant to be symmetric
+PARTNER_COSINE, PARTNER_MM = cos(radians(20.0)), 5.0
+NECK_REACH = 0.06  # of the model's diameter: search range for necks around a plane
+TRADE_OFF = 4.0  # of further cuts, as in the beam's second slot
 
 
 def polish(problem: Problem, node: Node) -> Node:
-    """The node with its cuts polished and, where there is room, further ones."""
+    """The node with its cuts polished, and with further cuts if there is room."""
     best = refine_planes(problem, _drop_cuts(problem, node))
     longer = _add_cuts(problem, best)
     if longer is not best:
@@ -47,14 +49,15 @@ def polish(problem: Problem, node: Node) -> Node:
 
 
 def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Node:
-    """The node with its planes as a person would lay them, as far as it stays alike in cost: at necks, along the model's large
-    flats, and more symmetric about its mirror planes; planes that lean a little across a mirror stand upright on it, and of two
-    that are nearly each other's image one becomes it."""
+    """Move a node's planes to where a designer would put them, if the cost stays about equal: to necks, along large flats, and
+    symmetric about mirror planes. Planes that lean slightly across a mirror become square to it, and of two nearly symmetric
+    planes one becomes the other's mirror image.
+    """
     most_mm2 = node.cost_mm2 * (1.0 + EQUAL)
     best = node
     of_mirrors = [partial(change, mirror=mirror) for change, mirror in product((_stand_upright, _pair), mirrors)]
     along = [partial(_align, problem)] if problem.terms.stair_weight > 0.0 else []
-    for change in (partial(_at_neck, problem), *along, *of_mirrors):
+    for change in (partial(_move_to_neck, problem), *along, *of_mirrors):
         for position in range(len(problem.start.cuts), len(best.planes)):
             for planes in change(best, position):
                 changed = None if problem.late() else problem.replay(best.path[position], planes)
@@ -64,8 +67,8 @@ def make_regular(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Nod
     return best
 
 
-def _at_neck(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]:
-    """The planes from a position on, the first of them moved to the neck near it."""
+def _move_to_neck(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]:
+    """The planes from a position, the first of them moved to a nearby neck."""
     here, *later = last.planes[position:]
     node, face = last.path[position], _cut_face(last.path[position + 1])
     mesh, seen = node.remainder.mesh, node.seam_weights
@@ -79,7 +82,7 @@ def _at_neck(problem: Problem, last: Node, position: int) -> Iterator[list[Plane
 
 
 def _align(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]:
-    """The planes from a position on, the first of them turned to where its part shows fewer stairs on large flats."""
+    """The planes from a position, the first of them turned so that its part shows less stair-stepping on large flats."""
     here, *later = last.planes[position:]
     middle = _cut_face(last.path[position + 1]).mean(axis=0)
     for normal in problem.flats.beside(here.normal, problem.least_z):
@@ -87,7 +90,7 @@ def _align(problem: Problem, last: Node, position: int) -> Iterator[list[Plane]]
 
 
 def _stand_upright(last: Node, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
-    """The planes from a position on, the first of them upright on a mirror where it nearly is."""
+    """The planes from a position, the first of them made square to a mirror, if it nearly is."""
     here, *later = last.planes[position:]
     upright = mirror.upright(here, _cut_face(last.path[position + 1]).mean(axis=0))
     if upright is not None:
@@ -95,7 +98,9 @@ def _stand_upright(last: Node, position: int, mirror: Mirror) -> Iterator[list[P
 
 
 def _pair(last: Node, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
-    """The planes from a position on, one that is nearly the first one's image made its image, or the other way round."""
+    """The planes from a position, with a nearly symmetric plane replaced by the mirror image of the first, or the other way
+    round.
+    """
     here, *later = last.planes[position:]
     vertices = last.path[position].remainder.mesh.vertices
     image = _image(mirror, here, vertices)
@@ -106,7 +111,7 @@ def _pair(last: Node, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
 
 
 def _image(mirror: Mirror, plane: Plane, vertices: Floats) -> Plane:
-    """A plane's mirror image; its limbs are named by the vertices above it that are nearest to the images of their points."""
+    """A plane's mirror image; its limbs are given by the vertices above it nearest to the images of their points."""
     image = mirror.image(plane)
     if image.limbs_mm is None:
         return image
@@ -118,7 +123,7 @@ def _image(mirror: Mirror, plane: Plane, vertices: Floats) -> Plane:
 
 
 def _drop_cuts(problem: Problem, best: Node) -> Node:
-    """The node without the cuts that save nothing, the one made first tried first."""
+    """Drop the cuts that save nothing, trying the earliest first."""
     position = len(problem.start.cuts)
     while position < len(best.planes) and not problem.late():
         before, planes = best.path[position], best.planes[position:]
@@ -133,14 +138,14 @@ def _drop_cuts(problem: Problem, best: Node) -> Node:
 
 
 def refine_planes(problem: Problem, best: Node) -> Node:
-    """The node with every plane moved to where the cost is less, the one cut first moved first; nothing else is changed."""
+    """Refine all planes of a node in turn by local search on their offset and tilt, in the order of the cuts."""
     enough_mm2 = ENOUGH * problem.model.risky_mm2
     for position in range(len(problem.start.cuts), len(best.planes)):
         if problem.late():
             break
         before = best.path[position]
         surface = Forecast.of(before.remainder, before.terms)
-        ever_better = list(_climb(problem, surface, best, position))
+        ever_better = list(_local_search(problem, surface, best, position))
         for planes in ever_better[: -TRIES - 1 : -1]:
             if problem.late() or before.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
                 break
@@ -152,7 +157,7 @@ def refine_planes(problem: Problem, best: Node) -> Node:
 
 
 def _add_cuts(problem: Problem, node: Node) -> Node:
-    """The node after further cuts, the best one at a time, while they save something."""
+    """Add further cuts, the best one at a time, while they reduce the cost."""
     while not problem.full(node) and not problem.late():
         table = problem.table(node)
         ranked = rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
@@ -163,10 +168,12 @@ def _add_cuts(problem: Problem, node: Node) -> Node:
     return node
 
 
-def _climb(problem: Problem, surface: Forecast, last: Node, position: int) -> Iterator[list[Plane]]:
-    """Ever better planes from a position on, the first of them moved, the best ones last. surface: before the cut there."""
+def _local_search(problem: Problem, surface: Forecast, last: Node, position: int) -> Iterator[list[Plane]]:
+    """Local search on the plane at a position: ever better planes from there, the best ones last. surface: forecast before that
+    cut.
+    """
     here, *later = last.planes[position:]
-    classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own
+    classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own classes
     reach = surface.reach([here, *later])
     least_mm2 = surface.left_mm2([here, *later], classes, reach)
     pivots = _pivots(_cut_face(last.path[position + 1]))
@@ -183,8 +190,9 @@ def _climb(problem: Problem, surface: Forecast, last: Node, position: int) -> It
 
 
 def _neighbours(problem: Problem, plane: Plane, pivots: Floats, share: float, turn_deg: float) -> Iterator[Plane]:
-    """The planes next to one: shifted both ways by a share of the offset step, leaning four ways about the first pivot with and
-    without a shift, and about the others without one."""
+    """The neighbours of a plane: shifted both ways by a share of the offset step, leaning to four sides about the first pivot
+    with and without a shift, and about the other pivots without one.
+    """
     step_mm = share * problem.settings.offset_step_mm
     yield from (replace(plane, offset_mm=plane.offset_mm + shift) for shift in (-step_mm, step_mm))
     ((aside, across),) = framed(plane.normal[None], problem.axes)[1]
@@ -197,8 +205,9 @@ def _neighbours(problem: Problem, plane: Plane, pivots: Floats, share: float, tu
 
 
 def _pivots(corners: Floats) -> Floats:
-    """(3, 3) the middle of the corners of a cut face, the corner that is farthest from it, and the one farthest from that: a
-    plane that ends in a concave edge stays there when it leans about it."""
+    """(3, 3) pivots: the centre of a cut face's corners, the corner farthest from it, and the corner farthest from that one: a
+    plane that ends in a concave edge stays there when it leans about it.
+    """
     middle = corners.mean(axis=0)
     one = corners[int(np.argmax(np.round(np.linalg.norm(corners - middle, axis=1), 6)))]
     other = corners[int(np.argmax(np.round(np.linalg.norm(corners - one, axis=1), 6)))]
@@ -206,7 +215,7 @@ def _pivots(corners: Floats) -> Floats:
 
 
 def _cut_face(node: Node) -> Floats:
-    """(n, 3) corners of a node's last cut face, of a limb's those of its section."""
+    """(n, 3) corners of a node's last cut face; for a limb, those of its section."""
     base, points = node.base, node.remainder.mesh.vertices
     if base.limbs_mm is not None and node.parent is not None:
         return passing_places(limb_mesh(node.parent.remainder, base), base)

@@ -1,4 +1,4 @@
-"""Problem: what one search holds fixed, which planes may cut a node, and what a cut makes of it."""
+"""Problem: the constants of a search, the feasibility of planes at a node, and the node after a cut."""
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
@@ -13,7 +13,7 @@ from mdp.cut import Solid, below, cut, mesh_of, solid_of
 from mdp.directions.flats import Flats
 from mdp.directions.orientation import diameter_mm
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, standing, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, PLATE_TOLERANCE_MM, standing, threshold
 from mdp.plane import Plane
 from mdp.pose import Pose
 from mdp.ranking.candidates import (
@@ -25,7 +25,7 @@ from mdp.ranking.candidates import (
     count_rejected,
     directions,
     lost_mm2,
-    platform_disc,
+    plate_disc,
     residual_mm2,
     score_candidates,
     seam_mm2,
@@ -40,15 +40,15 @@ from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
 from profiles.profile import Profile
 
-SIZE_MM = 100.0  # of a model on which a seam counts as wide as search.seam_mm
+SIZE_MM = 100.0  # size of the model for which a seam counts as wide as search.seam_mm
 FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
 
 
 class Problem:
-    """Settings, machine and bounds of a search, its root, and how many candidates were looked at.
+    """Settings, machine and bounds of a search, its root, and the number of evaluated candidates.
 
-    start: the node that the search goes on from, the root unless a person's planes have cut that already. place_mm: (3,) what
-    moves the model, which lies about the turn axis here, to its place on the plate: what the machine reaches depends on it.
+    start: the node from which the search starts: the root, or the node after the user's planes. place_mm: (3,) shift of the
+    model, centred about the turn axis here, to its place on the plate, on which the machine's reach depends.
     """
 
     def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
@@ -74,9 +74,9 @@ class Problem:
         self.root = self.start = Node(solid, self.terms, SeamPlaces.of(mesh, solid, settings, self.zones))
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
-        self.platform_disc = platform_disc(mesh, settings)
+        self.plate_disc = plate_disc(mesh, settings)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
-        # Gains are shares of the risky area without the faces on the platform, which no cut can save, but as published with them.
+        # Gains are shares of the risky area without faces on the plate, which no cut can save; as published, with them.
         published, risky = settings.method == "published", self.root.remainder.risky
         counted = risky if published else risky & ~standing(self.root.remainder.mesh)
         savable_mm2 = float(self.root.remainder.mesh.areas_mm2[counted].sum())
@@ -89,8 +89,9 @@ class Problem:
 
     @cached_property
     def limits(self) -> Bounds:
-        """The bounds of the sampled directions, where stairs count also of those along the model's flats; a plane by hand needs
-        but those of its own."""
+        """The bounds of the sampled directions and, if stair-stepping counts, of those along the model's flats. Computed lazily:
+        a user's plane needs only its own bounds.
+        """
         sampled = directions(self.settings) @ self.axes
         if self.terms.stair_weight > 0.0:
             sampled = np.concatenate([sampled, self.flats.directions(self.least_z)])
@@ -98,7 +99,7 @@ class Problem:
 
     @property
     def axes(self) -> Floats:
-        """(3, 3) rows: the axes of a frame that turns about z with the model; on the paper's terms those of the workpiece."""
+        """(3, 3) rows: axes of a frame that turns about z with the model; on the paper's terms those of the workpiece frame."""
         return np.eye(3) if self.terms.need is None else self.terms.need.axes
 
     @cached_property
@@ -108,16 +109,16 @@ class Problem:
 
     @property
     def least_z(self) -> float:
-        """The least z of a part's printing direction: the table tilts no further."""
+        """Least z of a part's printing direction, from the greatest tilt of the table."""
         return sin(radians(self.settings.least_elevation_deg))
 
     def begin(self) -> None:
-        """Have the time limit count from now on."""
+        """Start the clock of the time limit."""
         limit_s = self.settings.time_limit_s
         self._ends_s = inf if limit_s is None else perf_counter() + limit_s
 
     def stop(self) -> None:
-        """Have everything that asks whether it is late leave off."""
+        """Make everything that checks late() stop."""
         self._ends_s = -inf
 
     @property
@@ -130,17 +131,18 @@ class Problem:
         return perf_counter() >= self._ends_s
 
     def continues(self, stage: int) -> bool:
-        """Whether there is a stage after a number of them."""
+        """Whether a stage follows after the given number of stages."""
         cuts = len(self.start.cuts) + stage
         return self.model.risky_mm2 > 0 and cuts < self.settings.most_parts - 1 and not self.late()
 
     def full(self, node: Node) -> bool:
-        """Whether a node has as many parts as are allowed."""
+        """Whether a node has the greatest allowed number of parts."""
         return len(node.cuts) >= self.settings.most_parts - 1
 
     def table(self, node: Node, large: bool = False, described: bool = False, limits: Bounds | None = None) -> CandidateTable:
-        """The scored candidates of a node; large: also those that gain enough only for a part of the preferred volume; described:
-        with what no cut can save, for features; limits: of some directions in place of all."""
+        """The scored candidates of a node. large: also those that gain enough only for a part of the preferred volume; described:
+        also the area that no cut can save, for features; limits: bounds of some directions instead of all.
+        """
         limits = self.limits if limits is None else limits
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
         unavoidable = None
@@ -154,7 +156,7 @@ class Problem:
         return CandidateTable(scored, node, self.model, self.least_gain_mm2, partial(self.is_weak, node))
 
     def count_rejected(self) -> dict[Reason, int]:
-        """How many of the root's candidates each reason takes."""
+        """The number of the root's candidates rejected for each reason."""
         scored, is_weak = self._root_scored or self.table(self.root).scored, partial(self.is_weak, self.root)
         return count_rejected(scored, self.least_gain_mm2, is_weak)
 
@@ -166,15 +168,16 @@ class Problem:
 
     def bounds_along(self, directions: Floats) -> Bounds:
         """The bounds of (k, 3) directions."""
-        return bounds_of(directions, self.mesh, self.profile, self.platform_disc, self.zones.keep)
+        return bounds_of(directions, self.mesh, self.profile, self.plate_disc, self.zones.keep)
 
     def limb_sums(self, node: Node, planes: Sequence[Plane]) -> LimbSums:
-        """What cutting off the limbs of planes would do to a node. Nothing is cut."""
+        """Sums over the limbs of planes at a node, without cutting."""
         return sum_limbs(node.remainder, planes, threshold(self.terms.angle_deg), sqrt(self.settings.least_interface_mm2))
 
     def check(self, node: Node, plane: Plane, limits: Bounds) -> tuple[Reason, float]:
-        """Whether a plane that lies on no grid can cut a node, and how thin the thinnest sliver is that it would leave; limits:
-        those of its direction. Of limbs it is not checked whether the rest would float, and whether the head passes clear."""
+        """Whether a plane off the grid can cut a node, and the thickness of the thinnest sliver that it would leave. limits:
+        bounds of its direction. For limbs, floating pieces and clearance of the head are not checked.
+        """
         if plane.limbs_mm is None:
             step_mm = self.step_mm(plane.offset_mm)
             checked = check(node.remainder, limits, step_mm, np.zeros(1, np.int32), np.array([plane.offset_mm]))
@@ -199,11 +202,11 @@ class Problem:
         return (Reason.FRAGILE if sliver_mm < limits.fragile_mm else Reason.FEASIBLE), sliver_mm
 
     def is_weak(self, node: Node, plane: Plane) -> bool:
-        """Whether what lies above a plane could break off while it is printed."""
+        """Whether the part above a plane could break off while it is printed."""
         return self.settings.nozzle_load_n > 0.0 and self.stress_mpa(node, plane) > self.bearable_mpa
 
     def stress_mpa(self, node: Node, plane: Plane) -> float:
-        """The stress at the base of what lies above a plane when the nozzle pushes its top."""
+        """Stress at the base of the part above a plane when the nozzle pushes its top, MPa."""
         remainder, fragment_mm = node.remainder, sqrt(self.settings.least_interface_mm2)
         if plane.limbs_mm is None:
             stress = stress_per_newton(remainder.mesh, plane, fragment_mm)
@@ -212,9 +215,9 @@ class Problem:
         return self.settings.nozzle_load_n * stress
 
     def cut(self, node: Node, plane: Plane, cost: CutCost | None = None) -> Node | None:
-        """The node after a cut; None when nothing is cut off or no pose serves the part.
+        """The node after a cut; None if nothing is cut off or no pose works for the part.
 
-        cost: what the cut costs for ever, where that is known.
+        cost: final cost of the cut, if known.
         """
         if plane.limbs_mm is not None:
             return self._cut_limbs(node, plane)
@@ -231,11 +234,11 @@ class Problem:
         return child
 
     def cut_row(self, table: CandidateTable, row: int) -> Node | None:
-        """The node after the cut of a row of a node's table."""
+        """The node after the cut of a row in a node's table."""
         return self.cut(table.node, table.plane(row), table.scored.cost(row))
 
     def _cut_limbs(self, node: Node, plane: Plane) -> Node | None:
-        """The node after limbs are cut off; None where something would float or the head would hit what stands."""
+        """The node after limbs are cut off; None if a piece would float or the head would hit a standing part."""
         if not self.is_clear(node, plane):
             return None
         limbs, rest = cut(node.solid, plane)
@@ -244,21 +247,21 @@ class Problem:
         return Node(rest, self.terms, node.places, node, plane, self._cost(node, plane))
 
     def is_clear(self, node: Node, plane: Plane) -> bool:
-        """Whether there is a pose at which the head clears what stands beside the limbs of a plane."""
+        """Whether there is a pose at which the head clears the parts beside the limbs of a plane."""
         if not self.settings.clearance:
             return True
         poses = allowed_poses(self.machine, plane.normal, node.corners_cut(plane) + self.place_mm)
         return next(self.clear_poses(node, plane, poses), None) is not None
 
     def clear_poses(self, node: Node, plane: Plane, poses: Sequence[Pose]) -> Iterator[Pose]:
-        """Those of some poses at which the head clears what stands while the limbs that a plane cuts off a node are printed."""
+        """The poses at which the head clears all standing parts while the limbs that a plane cuts off a node are printed."""
         mesh, limb = node.remainder.mesh, limb_faces(node.remainder, plane)
         corners = mesh.vertices[mesh.faces]
         stands = corners[(plane.heights_mm(mesh.vertices) > 0.0)[mesh.faces].any(axis=1) & ~limb]
         return (pose for pose in poses if passes_clear(self.machine, pose, (corners[limb], stands), plane.offset_mm))
 
     def _cost(self, node: Node, plane: Plane) -> CutCost:
-        """What a cut costs for ever."""
+        """The final cost of a cut."""
         swept: Gains | LimbSums
         if plane.limbs_mm is None:
             step_mm = self.step_mm(plane.offset_mm)
@@ -271,12 +274,12 @@ class Problem:
         return CutCost(*(float(cost.ravel()[place]) for cost in costs))
 
     def step_mm(self, offset_mm: float) -> float:
-        """Step of a grid of offsets that an offset lies on, near that of the candidates' grid."""
+        """Step of a grid that contains the offset, close to the step of the candidates' grid."""
         step_mm, size_mm = self.settings.offset_step_mm, abs(offset_mm)
         return size_mm / max(1, round(size_mm / step_mm)) or step_mm
 
     def replay(self, node: Node, planes: Sequence[Plane]) -> Node | None:
-        """The node after cutting with the planes in turn; None when one of them may not or cannot be cut."""
+        """The node after cutting with the planes in turn; None if one of them is infeasible."""
         for plane in planes:
             child = self.cut(node, plane) if self.allowed(node, plane) else None
             if child is None:
@@ -286,10 +289,11 @@ class Problem:
 
 
 def _floats(rest: Solid, plane: Plane) -> bool:
-    """Whether a piece of what is left after limbs are cut off hangs in the air. A piece that begins exactly in the plane does
-    not: where a face of the solid lies in the plane, the union keeps apart what touches there."""
+    """Whether a piece of the remainder floats after limbs are cut off. A piece that begins exactly in the plane does not: where a
+    face of the solid lies in the plane, the union keeps touching pieces separate.
+    """
     for piece in rest.decompose():
-        if piece.volume() > 0.0 and piece.bounding_box()[2] > PLATFORM_TOLERANCE_MM:
+        if piece.volume() > 0.0 and piece.bounding_box()[2] > PLATE_TOLERANCE_MM:
             lowest_mm = float(plane.heights_mm(mesh_of(piece).vertices).min())
             if abs(lowest_mm) > BASE_TOLERANCE_MM:
                 return True
@@ -297,12 +301,12 @@ def _floats(rest: Solid, plane: Plane) -> bool:
 
 
 def with_search(profile: Profile, **settings: object) -> Profile:
-    """The profile with other settings of the search."""
+    """The profile with changed search settings."""
     return profile.model_copy(update={"search": profile.search.model_copy(update=settings)})
 
 
 def without_limits(machine: Machine) -> Machine:
-    """A machine whose rotary axes, if it has any, turn as far as one likes."""
+    """The machine with unlimited rotary axes, if it has any."""
     if not machine.tilts:
         return machine
     wide = {"limits_deg": (-1e6, 1e6), "budget_deg": None}

@@ -1,9 +1,9 @@
-"""Search: from a mesh to its ordered parts, by a beam of cuts that is polished, as published in 2020, or as a plan says.
+"""Search: from a mesh to its ordered parts, by a polished beam of cuts, as published in 2020, or by a plan.
 
-Otherwise than published: the best node ever seen is the result, the search goes on while any node has a useful child, a
-candidate that can no longer beat it is dropped (what a cut leaves risky above its plane is never repaired later, so that sum
-bounds all descendants), two orders of the same cuts take one slot, the slots of the beam differ in what they look for
-(beam), and the best results are polished off the grid of candidates (polish).
+Differences to the published search: the result is the best node ever seen; the search continues while any node has a useful
+child; a candidate that can no longer beat the best is dropped (risky area above a cut's plane is never repaired later, so its sum
+bounds all descendants); different orders of the same cuts take one slot; the slots of the beam use different trade-offs (beam);
+and the best results are polished off the grid of candidates (polish).
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +34,7 @@ from mdp.search.front import (
     Weights,
     choose,
     front_row,
-    pays,
+    pareto_optimal,
     price_rows,
     with_price,
 )
@@ -48,22 +48,22 @@ from profiles.messages import key_name, option, phrase
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
-NEARLY_BEST = 1.02  # times the beam's best that cuts of single limbs may cost to be polished
+NEARLY_BEST = 1.02  # cost limit, relative to the beam's best, for polishing the result with single limbs
 
 
-# Called before the first stage and after each one with the number of stages done, the number of nodes in the beam, the cost of
-# the best node as a share of the model's, and a function that returns that node as a row of the front.
+# Called before the first stage and after each one, with the number of completed stages, the number of nodes in the beam, the cost
+# of the best node as a share of the model's, and a function that returns the best node as a front row.
 OnStage = Callable[[int, int, float, Callable[[], FrontRow]], None]
 
 
 @dataclass(frozen=True)
 class SearchRequest:
-    """What a caller asks for beside the profile.
+    """The options of a search besides the profile.
 
-    plan: planes that are cut first and stay, and zones; parts: the most parts, where not as many as pay are wanted; price: the
-    time and filament that parts take to print, for the rows of the front and the choice between them: without it a search for
-    one part does nothing. on_phase is called with a description of each phase outside the stages; on_record with the record of
-    the search, the content of an .npz file.
+    plan: planes that are cut first and stay, and zones; parts: greatest number of parts, None for the cheapest; price: time and
+    filament of parts, for the rows of the front and the choice between them; without it a search for one part does nothing.
+    on_phase is called with a description of each phase outside the stages; on_record with the record of the search, the content
+    of an .npz file.
     """
 
     plan: PlanFile = NO_PLAN
@@ -76,7 +76,7 @@ class SearchRequest:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the model stays in one part and no front is wanted."""
+        """Whether the model stays in one piece and no front is needed."""
         return self.parts == 1 and self.price is None and self.on_record is None
 
 
@@ -84,19 +84,18 @@ ANY_PARTS = SearchRequest()
 
 
 def decompose(mesh: Mesh, name: str, profile: Profile, request: SearchRequest = ANY_PARTS) -> Decomposition:
-    """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible.
-
-    Raises PlanError for a plane by hand that cannot be cut.
+    """Find the parts of a closed mesh standing on the build plate; one part if nothing is risky or no cut is feasible. Raises
+    PlanError for an infeasible user-defined plane.
     """
     began, plan, parts = perf_counter(), request.plan, request.parts
     if parts is not None:
         check_part_count(parts)
         profile = with_search(profile, most_parts=max(parts, profile.search.most_parts))
-    if request.is_whole:  # what tells cuts apart need not be measured
+    if request.is_whole:  # terms that only compare cuts are not needed
         profile = with_search(profile, hidden_seam_share=1.0, feature_mm2=0.0, feature_weight=1.0, simplify_faces=0)
     lifted, problem = on_pedestal(mesh, profile.search.pedestal_mm), None
     check_plan(plan, lifted, name)
-    if plan.parts or profile.search.time_limit_s is not None:  # refused at once, or on time; else a copy is searched before
+    if plan.parts or profile.search.time_limit_s is not None:  # refused at once, or on time; otherwise a copy is searched first
         problem = _measure(lifted, profile, request)
     if parts is not None and parts <= len(plan.parts):
         raise PlanError(f"{option('parts', parts)}: the planes by hand of {plan.name} alone make {len(plan.parts) + 1} parts")
@@ -104,7 +103,7 @@ def decompose(mesh: Mesh, name: str, profile: Profile, request: SearchRequest = 
     if request.on_record is None:
         copy = coarse_copy(mesh, profile, plan.zones, request.on_phase)
     if copy is not None:
-        with suppress(PlanError):  # of a plane by hand that cuts the mesh and not its copy
+        with suppress(PlanError):  # a user's plane may cut the mesh but not its copy
             copy_began, own = perf_counter(), with_search(profile, simplify_faces=0)
             on_copy = _measure(on_pedestal(copy, profile.search.pedestal_mm), own, request)
             found = _search(on_copy, name, request, copy_began)
@@ -116,7 +115,7 @@ def decompose(mesh: Mesh, name: str, profile: Profile, request: SearchRequest = 
 
 
 def _measure(mesh: Mesh, profile: Profile, request: SearchRequest) -> Problem:
-    """The problem of a mesh, cut by a person's planes. Raises PlanError."""
+    """The problem of a mesh, cut by the user's planes. Raises PlanError."""
     request.on_phase(f"measuring overhangs and seams of {len(mesh.faces):,} faces")
     problem = Problem(mesh, profile, request.plan.zones)
     problem.start = cut_by_hand(problem, request.plan)
@@ -124,7 +123,7 @@ def _measure(mesh: Mesh, profile: Profile, request: SearchRequest) -> Problem:
 
 
 def _search(problem: Problem, name: str, request: SearchRequest, began: float) -> Decomposition:
-    """The parts of a problem's mesh. began: when the search did, by perf_counter."""
+    """The parts of a problem's mesh. began: start of the search, by perf_counter."""
     best, front, rounds, trace = problem.start, ParetoFront(problem.start), 0, None
     if request.on_record is not None:
         trace = Trace(name, problem.model, problem.start.signature, problem.start.cost_mm2)
@@ -146,13 +145,14 @@ def _search(problem: Problem, name: str, request: SearchRequest, began: float) -
 def _take(
     problem: Problem, front: ParetoFront, best: Node, request: SearchRequest
 ) -> tuple[tuple[Part, ...], list[FrontRow], tuple[str, ...]]:
-    """The parts of a front to take, the front's rows with theirs marked, and notes on the choice: of at most the wanted number of
-    parts, else the cheapest one, with its time where seconds cost anything; best: the one to take where seams cost nothing. Rows
-    that are not sound get no time, so they are taken only where a person asks for them."""
+    """Choose among a front: the parts, the front's rows with the chosen one marked, and notes. With request.parts, the row with
+    at most that many parts; otherwise the cheapest one, including time if seconds have a cost. best: the choice if seams cost
+    nothing. Unsound rows get no time, so they are chosen only on request.
+    """
     nodes, price, paying = front.nodes, request.price, dict[int, tuple[Part, ...]]()
     rows = [front_row(node) for node in nodes]
     if price is not None:
-        paying = {place: make_parts(problem, nodes[place]) for place, good in enumerate(pays(rows)) if good}
+        paying = {place: make_parts(problem, nodes[place]) for place, good in enumerate(pareto_optimal(rows)) if good}
         by_hand = len(problem.start.cuts)
         sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, problem.profile, by_hand)}
         rows = [replace(row, sound=place in sound or place not in paying) for place, row in enumerate(rows)]
@@ -161,7 +161,8 @@ def _take(
     if request.parts is not None:
         choice = Choice(nodes.index(front.up_to(request.parts)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
-        place = next(place for place, node in enumerate(nodes) if len(node.cuts) == len(best.cuts))  # it, or its equal in cost
+        # this node, or its equal in cost
+        place = next(place for place, node in enumerate(nodes) if len(node.cuts) == len(best.cuts))
         choice = Choice(place, "the least risky area")
     node, row = nodes[choice.place], rows[choice.place]
     parts = paying.get(choice.place) or make_parts(problem, node)
@@ -172,7 +173,7 @@ def _take(
 
 
 def _feature_notes(node: Node) -> list[str]:
-    """The bores that the cuts of parts pass askew, those of the part printed second first."""
+    """Notes on the bores that cuts pass askew, in print order of the parts."""
     notes = []
     for number, (whole, plane) in enumerate(reversed(list(zip(node.path, node.planes, strict=False))), start=2):
         before = whole.remainder
@@ -184,7 +185,7 @@ def _feature_notes(node: Node) -> list[str]:
 
 
 def _search_beam(problem: Problem, request: SearchRequest, trace: Trace | None) -> tuple[Node, ParetoFront, int]:
-    """The best node of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
+    """Search with a beam: the best node with polished finalists, the front, and the number of stages."""
     beam, stage = Beam(problem, ranker_named(request.ranker), trace), 0
     try:
         _begin(problem, request)
@@ -205,7 +206,7 @@ def _search_beam(problem: Problem, request: SearchRequest, trace: Trace | None) 
 
 
 def _polish_finalists(problem: Problem, beam: Beam, limbs: Sequence[Node], report: Callable[[Node], None]) -> Node:
-    """The best of a beam, of a search for single limbs, and of their polished finalists."""
+    """The best node among the beam, the search for single limbs, and their polished finalists."""
     best = beam.best
     finalists = beam.finalists() if problem.settings.polish and problem.model.risky_mm2 > 0 else []
     for node in limbs:
@@ -222,8 +223,9 @@ def _polish_finalists(problem: Problem, beam: Beam, limbs: Sequence[Node], repor
 
 
 def _polish_rows(problem: Problem, front: ParetoFront) -> None:
-    """Move the planes of the rows of a front that may be taken to where they cost less, after a beam of two or more; then to
-    necks, along flats, and symmetric where the model is."""
+    """Refine the planes of the front's Pareto-optimal rows, after a beam of width two or more; then move them to necks, along
+    flats, and to symmetric positions.
+    """
     for node in _paying(problem, front) if problem.settings.beam_width > 1 else ():
         front.offer(refine_planes(problem, node))
     cut = _paying(problem, front)
@@ -233,13 +235,15 @@ def _polish_rows(problem: Problem, front: ParetoFront) -> None:
 
 
 def _paying(problem: Problem, front: ParetoFront) -> list[Node]:
-    """The nodes of a front that the search has cut and that cost less than all with fewer cuts."""
+    """The nodes of a front that the search has cut and that are Pareto-optimal."""
     nodes = front.nodes
-    return [node for node, good in zip(nodes, pays(nodes), strict=True) if good and len(node.cuts) > len(problem.start.cuts)]
+    return [
+        node for node, good in zip(nodes, pareto_optimal(nodes), strict=True) if good and len(node.cuts) > len(problem.start.cuts)
+    ]
 
 
 def _begin(problem: Problem, request: SearchRequest) -> None:
-    """Tell that a search begins, where there is anything to search; its time limit counts from then on."""
+    """Report the start of a search if there is anything to search, and start its time limit."""
     if problem.continues(0):
         request.on_stage(0, 1, 1.0, partial(front_row, problem.start))
         problem.begin()
@@ -250,7 +254,7 @@ def _report(problem: Problem, request: SearchRequest, stage: int, beam: int, bes
 
 
 def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> list[str]:
-    """What a person should know of the outcome, of the zones, and of rows of the plan that were found without its planes."""
+    """Notes on the outcome, on zones without effect, and on the plan's front if it was searched again."""
     zones, plan, notes = problem.zones, request.plan, list[str]()
     if problem.model.risky_mm2 <= 0 and parts == 1:
         notes.append("no face needs support: the model is printed as one part")
@@ -266,34 +270,34 @@ def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> l
         notes.append(f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}")
     if zones.no_seam.anywhere and problem.terms.seam_mm <= 0.0:
         notes.append(
-            f"[[no_seam]] keeps no cut away where seams cost nothing ({key_name('search.objective')}, "
+            f"[[no_seam]] has no effect on cuts, since seams cost nothing ({key_name('search.objective')}, "
             f"{key_name('search.seam_mm')})"
         )
     if zones.no_support.anywhere and problem.terms.need is None:
         objective = key_name("search.objective")
-        notes.append(f'[[no_support]] changes no cut where all that overhangs counts ({objective} = "risky")')
+        notes.append(f'[[no_support]] has no effect on cuts, since every overhang counts ({objective} = "risky")')
     if plan.front:
-        again = "planes by hand have the others found anew, for every number of parts"
+        again = "with planes by hand, the search finds the other planes again for every number of parts"
         notes.append(f"the [[front]] of {plan.name} is not kept: {again}")
     return notes
 
 
 def check_part_count(parts: int) -> None:
-    """Raise PlanError for a number of parts that cannot be."""
+    """Raise PlanError for an invalid number of parts."""
     if not 1 <= parts <= MOST_PARTS:
         raise PlanError(f"{option('parts')} is {parts}: 1 to {MOST_PARTS} is allowed")
 
 
 def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
-    """That there are fewer parts than were wanted, where there are."""
+    """A note that there are fewer parts than requested, if so."""
     return (f"{option('parts', wanted)}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
 
 
 def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest) -> Decomposition:
-    """The parts of a closed mesh by the planes of a plan, without a search; request.parts: the most parts of the row taken.
+    """The parts of a closed mesh by the planes of a plan, without a search. request.parts: greatest number of parts of the row.
 
-    The rows of the front are those of the plan, its own parts in place of the row of their number, the one that is cut measured
-    anew. Raises PlanError for a plan of another model and for a plane that cannot be cut.
+    The front consists of the plan's rows; the plan's own parts replace the row with their number, and the row that is cut is
+    measured again. Raises PlanError for a plan of another model and for an infeasible plane.
     """
     began, plan, wanted = perf_counter(), request.plan, request.parts
     if wanted is not None:
@@ -304,14 +308,14 @@ def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest)
             missing = "normal" if part.normal is None else "offset_mm"
             raise PlanError(
                 f"plan {plan.name}: part {number} has no {missing}: "
-                f"{phrase('found by the search', f'decompose --planes {plan.name} has it found')}"
+                f"{phrase('found by the search', f'decompose --planes {plan.name} finds it')}"
             )
     mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     check_plan(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)
     node = cut_by_hand(problem, plan)
     rows = {len(row.planes): _as_planned(row) for row in plan.front}
-    own = request.plan.parts  # a person may have changed them: they are the row of their number where they can be cut
+    own = request.plan.parts  # the user may have changed them: they replace the row of their number if they can be cut
     known = rows.get(len(own))
     if own != plan.parts and all(part.plane is not None for part in own) and (known is None or planned_parts(known) != own):
         with suppress(PlanError):
@@ -327,16 +331,16 @@ def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest)
 
 
 def _as_planned(row: FrontRow) -> FrontRow:
-    """A row as a plan has it: its planes and what they cost."""
+    """A row of a plan's front: its planes and their costs."""
     return FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2, stairs_mm2=row.stairs_mm2)
 
 
 def _priced(
     problem: Problem, plan: PlanFile, rows: Sequence[FrontRow], chosen: tuple[Part, ...], price: Pricing
 ) -> list[FrontRow]:
-    """The rows of a plan's front with their prices, those that cannot be cut again or are not sound as they are."""
+    """The rows of a plan's front with time and filament; rows that cannot be cut again or are unsound stay as they are."""
     parts: dict[int, Sequence[Part]] = {}
-    for place, (row, good) in enumerate(zip(rows, pays(rows), strict=True)):
+    for place, (row, good) in enumerate(zip(rows, pareto_optimal(rows), strict=True)):
         with suppress(PlanError):
             if row.chosen:
                 parts[place] = chosen

@@ -1,8 +1,9 @@
-"""Trial: planes tried one after the other, quickly enough to be moved by hand: figures of every cut, or why not.
+"""Trial cuts: planes tried one after the other, fast enough for moving them by hand, with figures for every cut or the reason why
+it is impossible.
 
-The figures of all parts are summed over the model's surface without a cut. Whether a plane may cut what those cut before it
-have left is asked of what they have left, so all but the last are cut for that: at leisure, one after the other, and those that a
-trial has in common with the one before not again. While a plane is dragged, the cuts before it stay the same.
+The figures of all parts are summed over the model's surface without cutting. Whether a plane is feasible depends on the remainder
+after the cuts before it, so all cuts but the last are made for that: in the background, one after the other, and those shared
+with the previous trial are reused. While a plane is dragged, the cuts before it stay the same.
 """
 
 from bisect import bisect_left
@@ -12,11 +13,11 @@ from math import inf
 
 import numpy as np
 
-from mdp.clearance import lowest_body, places_met
+from mdp.clearance import collision_points, lowest_body
 from mdp.cost.forecast import Forecast, PartForecast
 from mdp.cut import Solid, above, below, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, UP
+from mdp.overhang import PLATE_TOLERANCE_MM, UP
 from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
 from mdp.pose import poses, rotation, shift
@@ -31,20 +32,21 @@ from mdp.zone import NO_ZONES, Zone, Zones
 from profiles.frozen import Vector
 from profiles.profile import Profile
 
-MOST_TRIED = 16  # places for a plane that the sweep finds nothing against
-APART_SHARE = 0.01  # of the model's height along the plane's normal: how far the next one is from those that were rejected;
-# once a place is found, those passed over on the way to it are searched by bisection
-MOST_PLACES = 20  # of an obstacle that are marked
+MOST_TRIED = 16  # feasible positions of a plane, by the sweep, that are tried
+# of the model's height along the plane's normal: distance from rejected positions to the next one that is tried;
+APART_SHARE = 0.01
+# once a position is feasible, those skipped before it are searched by bisection
+MOST_PLACES = 20  # points marked on an obstacle
 
 Key = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Touch:
-    """The head at the place where one of its bodies would touch the table, in the workpiece frame.
+    """The head at the point where one of its bodies would touch the table, in the workpiece frame.
 
     tip_mm: the tip; rotation: rows of the rotation from the workpiece frame to the machine's; body: its name; touched_mm: the
-    place on the table.
+    point on the table.
     """
 
     body: str
@@ -55,7 +57,9 @@ class Touch:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """places_mm: of the workpiece frame, where what a plane is rejected for lies; touch: the head that would meet the table."""
+    """The cause of a plane's rejection. places_mm: its points in the workpiece frame; touch: the head that would meet the
+    table.
+    """
 
     places_mm: tuple[Vector, ...] = ()
     touch: Touch | None = None
@@ -63,9 +67,11 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Trial:
-    """parts: those that could be cut off, from the second in print order on, None for the others. rejected: why the part of this
-    number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can. unchecked:
-    how many parts, from the second on, have not been looked at yet: they may still be rejected, the figures stand."""
+    """Result of a trial. parts: the parts from the second in print order, None for those that cannot be cut off. rejected_part,
+    rejected: the number of the part that cannot be cut and the reason, "" if all can; obstacle: where; support_area_mm2, seam_mm:
+    totals over all parts, if all can be cut. unchecked: number of parts, from the second, that have not been checked yet: they
+    may still be rejected, but the figures are final.
+    """
 
     parts: tuple[PartForecast | None, ...]
     rejected_part: int = 0
@@ -77,22 +83,24 @@ class Trial:
 
 
 class Trials:
-    """The trials of one model."""
+    """Trials on one model."""
 
     def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
-        """A closed mesh standing on the platform. How much less a seam counts where it is hidden is in no figure of a trial, and
-        takes longer to work out than all else: here all seams count alike."""
+        """mesh: a closed mesh standing on the build plate. All seams count in full here: the reduction for hidden seams affects
+        none of a trial's figures, and takes longer to compute than all the rest.
+        """
         lifted = on_pedestal(mesh, profile.search.pedestal_mm)
         self._problem = problem = Problem(lifted, with_search(profile, hidden_seam_share=1.0), zones)
         self._node = root = problem.root  # after the cuts of the last trial
         self._surface = Forecast.of(root.remainder, problem.terms, root.seam_weights)
-        self._keys: list[Key] = []  # of the planes of these cuts as they were asked for
+        self._keys: list[Key] = []  # of the planes of these cuts, as they were given
 
     def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
-        """Try the base planes of the parts from the second on, in print order. most_cuts: the most cuts that are made; where
-        more are needed, parts are left unchecked."""
+        """Try the base planes of the parts from the second, in print order. most_cuts: limit on the number of cuts made; parts
+        beyond it stay unchecked.
+        """
         order = planes[::-1]
-        self._keep_alike(order)
+        self._keep_common_cuts(order)
         known = len(self._keys)
         rejected = self._cut_off(order[known : int(min(known + most_cuts, len(order) - 1))])
         done = len(self._keys)
@@ -108,13 +116,14 @@ class Trials:
         return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=max(len(order) - 1 - done, 0))
 
     def warm(self) -> None:
-        """Have ready what the first trial needs of the whole model."""
+        """Precompute what the first trial needs of the whole model."""
         low, high = (float(z) for z in self._problem.mesh.bounds_mm[:, 2])
         self.attempt((Plane(UP, 0.5 * (low + high)),), 0)
 
     def neck(self, planes: Sequence[Plane], number: int, reach_mm: float) -> Plane | None:
-        """The neck near the plane of the part of a number, of what the parts printed after it leave; None: there is none, or
-        those cannot be cut off. planes as in attempt."""
+        """The neck near the plane of a part, on the remainder after later parts are cut off; None if there is none or those cuts
+        are impossible. planes: as in attempt.
+        """
         if not self._cut_later(planes, number):
             return None
         plane = planes[number - 2]
@@ -122,8 +131,9 @@ class Trials:
         return None if neck is None else replace(neck, limbs_mm=plane.limbs_mm)
 
     def nearest(self, planes: Sequence[Plane], number: int) -> Plane | None:
-        """The plane of the part of a number at the nearest place along its normal where all planes can be cut, else leaning by a
-        few degrees; None: there is none among MOST_TRIED places. planes as in attempt."""
+        """The plane of a part at the nearest position along its normal where all planes are feasible, or else leaning by a few
+        degrees; None if there is none among MOST_TRIED positions. planes: as in attempt.
+        """
         if not self.attempt(planes).rejected:
             return planes[number - 2]
         if not self._cut_later(planes, number):
@@ -144,17 +154,17 @@ class Trials:
         return None
 
     def _can_take(self, planes: Sequence[Plane], number: int, plane: Plane) -> bool:
-        """Whether all planes can be cut with another one for the part of a number."""
+        """Whether all planes are feasible with another plane for one part."""
         return not self.attempt((*planes[: number - 2], plane, *planes[number - 1 :])).rejected
 
     def _cut_later(self, planes: Sequence[Plane], number: int) -> bool:
-        """Cut off the parts printed after that of a number; whether that can be done."""
+        """Cut off the parts printed after a given part; returns whether that is possible."""
         later = planes[number - 1 :][::-1]
-        self._keep_alike(later)
+        self._keep_common_cuts(later)
         return self._cut_off(later[len(self._keys) :]) is None
 
-    def _keep_alike(self, order: Sequence[Plane]) -> None:
-        """Forget the cuts from the first on that is not one of these."""
+    def _keep_common_cuts(self, order: Sequence[Plane]) -> None:
+        """Drop the cuts from the first one that differs from these planes."""
         alike = 0
         while alike < min(len(order), len(self._keys)) and self._keys[alike] == _key(order[alike]):
             alike += 1
@@ -162,20 +172,20 @@ class Trials:
         del self._keys[alike:]
 
     def _cut_off(self, planes: Sequence[Plane]) -> Rejection | None:
-        """Make further cuts, or say why one of them cannot be made."""
+        """Make further cuts, or return the rejection of one."""
         reached = try_planes(self._problem, self._node, planes)
         self._node = reached.node if isinstance(reached, Rejection) else reached
         self._keys += map(_key, planes[: len(self._node.cuts) - len(self._keys)])
         return reached if isinstance(reached, Rejection) else None
 
     def _named(self, order: Sequence[Plane]) -> list[Plane]:
-        """Planes in the order of their cuts, their limbs named by vertices where they can be."""
+        """Planes in the order of their cuts, with their limbs named by vertices where possible."""
         made = self._node.planes[: len(order)]
         others = [(plane, name_limbs(self._node, plane)) for plane in order[len(made) :]]
         return [*made, *(plane if isinstance(named, Rejection) else named for plane, named in others)]
 
     def _look(self, plane: Plane) -> Rejection | None:
-        """Why a plane cannot cut what is left. Only limbs are cut off for that: what they leave may float."""
+        """The rejection of a plane at the current node, or None. Only limbs are actually cut, since their remainder may float."""
         if plane.limbs_mm is None:
             return rejection(self._problem, self._node, plane)
         child = try_planes(self._problem, self._node, [plane])
@@ -183,7 +193,7 @@ class Trials:
 
 
 def _are_near(plane: Plane, other: Plane, apart_mm: float) -> bool:
-    """Whether two planes have the same normal and lie less than apart_mm from each other."""
+    """Whether two planes have the same normal and lie less than apart_mm apart."""
     return abs(plane.offset_mm - other.offset_mm) < apart_mm and np.array_equal(plane.normal, other.normal)
 
 
@@ -193,7 +203,7 @@ def _key(plane: Plane) -> Key:
 
 
 def obstacle_of(problem: Problem, rejected: Rejection, plane: Plane) -> Obstacle | None:
-    """Where a plane that may not cut a node is in the way; None where that is not known."""
+    """The obstacle that makes a plane infeasible at a node; None if unknown."""
     named = name_limbs(rejected.node, plane)
     if isinstance(named, Rejection):
         return None
@@ -204,15 +214,15 @@ def obstacle_of(problem: Problem, rejected: Rejection, plane: Plane) -> Obstacle
 
 
 def _places_against(problem: Problem, rejected: Rejection, plane: Plane) -> Sequence[Floats]:
-    """The places that speak against a plane; none where that is not known."""
+    """Points that show why a plane is infeasible; empty if unknown."""
     node = rejected.node
     match rejected.reason:
         case Reason.PLATFORM:
-            centre, radius = problem.platform_disc
+            centre, radius = problem.plate_disc
             across = plane.normal[:2] / max(float(np.hypot(*plane.normal[:2])), 1e-12)
             return [np.array([*(centre + radius * across), 0.0])]
         case Reason.FLOATING:
-            return _lowest(below(node.solid, plane), UP, PLATFORM_TOLERANCE_MM)
+            return _lowest(below(node.solid, plane), UP, PLATE_TOLERANCE_MM)
         case Reason.INTERFACE:
             return _lowest(above(node.solid, plane), plane.normal, plane.offset_mm + COPLANAR_MM)
         case Reason.FRAGILE:
@@ -224,17 +234,17 @@ def _places_against(problem: Problem, rejected: Rejection, plane: Plane) -> Sequ
         case Reason.WEAK:
             section = passing_places(node.remainder.mesh, plane)
             return [0.5 * (section.min(axis=0) + section.max(axis=0))]
-        case Reason.STANDING:  # what asks for a higher tip than the limbs beside it have
+        case Reason.STANDING:  # parts that require a higher tip than the limbs beside them
             corners, limb = node.remainder.mesh.vertices[node.remainder.mesh.faces], limb_faces(node.remainder, plane)
             for pose in poses(problem.machine, plane.normal)[:1]:
-                return list(places_met(problem.machine, pose, (corners[limb], corners[~limb]), plane.offset_mm))
+                return list(collision_points(problem.machine, pose, (corners[limb], corners[~limb]), plane.offset_mm))
         case Reason.REACH:
             return _outside(problem, node.corners_cut(plane), plane)
     return []
 
 
 def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
-    """The head at the lowest place of what is cut off, at the pose that needs least."""
+    """The head at the lowest point of the part to be cut off, at the pose that needs the least height."""
     machine = problem.machine
     options = [(*lowest_body(machine, pose), pose) for pose in poses(machine, plane.normal)]
     printed = node.corners_cut(plane)
@@ -247,7 +257,9 @@ def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
 
 
 def _sliver(mesh: Mesh, plane: Plane) -> list[Floats]:
-    """The place of the surface nearly level with a plane that it comes nearest to on the solid's side: there a sliver is left."""
+    """The point of the surface nearly level with a plane that is nearest to it on the solid's side, where a sliver would be
+    left.
+    """
     cosines, heights = mesh.normals @ plane.normal, plane.heights_mm(mesh.vertices)[mesh.faces]
     outward = np.where(cosines > 0.0, 1.0, -1.0)[:, None] * heights
     outward[(np.abs(cosines) <= SLIVER_COSINE)[:, None] | (outward < 0.0)] = np.inf
@@ -256,13 +268,13 @@ def _sliver(mesh: Mesh, plane: Plane) -> list[Floats]:
 
 
 def _lowest(solid: Solid, upward: Floats, base_mm: float) -> list[Floats]:
-    """The lowest place, along a direction, of every piece of a solid that does not reach down to its base."""
+    """The lowest point, along a direction, of every piece of a solid that does not reach its base."""
     bodies = [mesh_of(piece).vertices for piece in solid.decompose() if piece.volume() > 0.0]  # the others are voids
     return [vertices[int(np.argmin(vertices @ upward))] for vertices in bodies if (vertices @ upward).min() > base_mm]
 
 
 def _outside(problem: Problem, points: Floats, plane: Plane) -> list[Floats]:
-    """The places of a part that the axes do not reach, the farthest for each axis and side."""
+    """The points of a part out of the axes' reach, the farthest one for each axis and side."""
     machine, outside = problem.machine, []
     for pose in poses(machine, plane.normal)[:1] if len(points) else []:
         reached = (points + problem.place_mm) @ rotation(machine, pose).T + shift(machine, pose)

@@ -1,8 +1,8 @@
-"""Descent: the way straight down a surface, as water takes it, and what it comes to (numba kernels).
+"""Steepest descent on a surface, and how it ends (numba kernels).
 
-The way follows the steepest slope through faces, along edges where both sides slope towards them, and from vertex to vertex: it
-is one of the shape, the same however that is cut into triangles. So is whether a hanging place begins in mid-air, which it does
-where it holds a bottom of the surface that lies deeper than DIP_MM below all ways out of it.
+The path follows the steepest slope through faces, along edges where both sides slope towards them, and from vertex to vertex: it
+depends on the shape but not on its triangulation. So does the verdict whether a patch is a floating start, which it is if it
+contains a local minimum deeper than DIP_MM below all paths out of it.
 """
 
 from typing import NamedTuple
@@ -13,27 +13,27 @@ from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 from mdp.topology.edges import LinkedFaces
 
-ANCHOR_MM = 1.0  # a ridge that goes down less than this is no anchor: it hangs in the air itself
-ROUNDING_MM = 1e-6  # of a way down just as deep, and of bottoms that are as low
-ANCHORED, LOOSE = 0, -1  # what a way down comes to, if not to a patch, whose number is above 0
-SAFE = 0  # the number of faces that belong to no patch
-LEVEL = 1e-6  # slope of a face that water does not leave
-ASIDE = 1e-9  # a way that leaves an edge by less runs along it
-END = 1e-7  # share of an edge that is its end
-MOST_STEPS = 1000  # over faces, about a vertex or down; never reached by a sound mesh
-DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
+ANCHOR_MM = 1.0  # a ridge that goes down less than this is not an anchor but an overhang
+ROUNDING_MM = 1e-6  # tolerance on the depth of a descent, and on the height of minima
+ANCHORED, LOOSE = 0, -1  # verdicts on a descent; a positive verdict is the number of the patch that it ends on
+SAFE = 0  # number of faces that belong to no patch
+LEVEL = 1e-6  # slope below which a face counts as level
+ASIDE = 1e-9  # a path that leaves an edge by less runs along it
+END = 1e-7  # share of an edge that counts as its end
+MOST_STEPS = 1000  # over faces, around a vertex or down; never reached on a valid mesh
+DIP_MM = 0.05  # a quarter of a usual layer: invisible in a print
 UNSEEN = -1  # no vertex
-Pool = tuple[Ints, Ints]  # from which bottom, one with a way out, each vertex was seen, UNSEEN else, and room (n,)
+Pool = tuple[Ints, Ints]  # for each vertex, the minimum with a way out from which it was visited, or UNSEEN; and a queue (n,)
 Vector = tuple[float, float, float]
 
 
 class Underside(NamedTuple):
-    """The overhanging faces of a surface along a direction (3,), in a frame across it (2, 3).
+    """The overhanging faces of a surface along a direction (3,), with a frame across it (2, 3).
 
-    heights (n,) of the vertices; cosines (m,) of the faces' normals with the direction; the height up to which the surface rests
-    on something. Connected overhanging faces are a patch, numbered from 1: number (m,) is that of each face, the faces of patch p
-    are faces[starts[p] : starts[p + 1]]; held (k,): whether an anchor holds it, UNKNOWN until that is worked out; waiting (k,):
-    a queue of patches. point: (3,) mm, the current place of the descent, which writes it.
+    heights (n,) of the vertices; cosines (m,) of the faces' normals with the direction; base_mm, the height up to which the
+    surface rests on something. Connected overhanging faces are a patch, numbered from 1: number (m,) is that of each face, the
+    faces of patch p are faces[starts[p] : starts[p + 1]]; held (k,): whether an anchor holds a patch, UNKNOWN until computed;
+    waiting (k,): a queue of patches. point: (3,) mm, the current point of the descent.
     """
 
     surface: LinkedFaces
@@ -52,8 +52,9 @@ class Underside(NamedTuple):
 
 @helper
 def descend(under: Underside, f: int, corner: int, share: float, own: int) -> int:
-    """The way down a face from a place on its edge: ANCHORED where it goes ANCHOR_MM deep, to the base or to what has solid
-    beneath it; the number of the patch on which it ends before, LOOSE where that is the own one or none."""
+    """Steepest descent on a face from a point on its edge: ANCHORED if it goes ANCHOR_MM deep, to the base or to solid beneath;
+    the number of the patch on which it ends before, LOOSE if that is the patch `own` or none.
+    """
     surface, heights = under.surface, under.heights
     height = _put(under, f, corner, share)
     deep = max(height - ANCHOR_MM + ROUNDING_MM, under.base_mm)
@@ -73,7 +74,7 @@ def descend(under: Underside, f: int, corner: int, share: float, own: int) -> in
                 continue
         v = _lower_end(under, f, corner, share)
         g = f
-        while g >= 0 and heights[v] > deep:  # from vertex to vertex, as far as edges are steeper than faces
+        while g >= 0 and heights[v] > deep:  # from vertex to vertex, while edges are steeper than faces
             f = g
             g, w = _steepest(under, f, v)
             if g < 0:
@@ -95,26 +96,26 @@ def corner_of(surface: LinkedFaces, f: int, v: int) -> int:
 
 @helper
 def outflow(under: Underside, f: int, corner: int) -> float:
-    """How fast water on a face runs out over the edge that begins at a corner; below 0: away from it."""
+    """Flow of water on a face out over the edge that begins at a corner; negative if away from the edge."""
     vertices, faces, normals, d = under.surface.vertices, under.surface.faces, under.surface.normals, under.direction
     a, b = faces[f, corner], faces[f, (corner + 1) % 3]
     x, y, z = vertices[0, b] - vertices[0, a], vertices[1, b] - vertices[1, a], vertices[2, b] - vertices[2, a]
     p, q, r = _across((x, y, z), (normals[0, f], normals[1, f], normals[2, f]))
     size = p * p + q * q + r * r
-    # at right angles to the normal, so that the direction itself will do
+    # at right angles to the normal, so the direction itself can be used
     return -(d[0] * p + d[1] * q + d[2] * r) / np.sqrt(size) if size > 0.0 else 0.0
 
 
 @no_nrt
 def _across(edge: Vector, normal: Vector) -> Vector:
-    """The vector in a face's plane across an edge and out of the face."""
+    """The vector in a face's plane that is square to an edge and points out of the face."""
     (x, y, z), (nx, ny, nz) = edge, normal
     return y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
 
 
 @no_nrt
 def _put(under: Underside, f: int, corner: int, share: float) -> float:
-    """Go to a place on the edge that begins at a corner; its height."""
+    """Move to a point on the edge that begins at a corner; returns its height."""
     a, b = under.surface.faces[f, corner], under.surface.faces[f, (corner + 1) % 3]
     for axis in range(3):
         begin = under.surface.vertices[axis, a]
@@ -124,7 +125,9 @@ def _put(under: Underside, f: int, corner: int, share: float) -> float:
 
 @helper
 def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int, float]:
-    """The edge, by the corner it begins at, over which water at a point leaves a face, and where on it; -1: none."""
+    """The edge, by its first corner, over which the descent from a point leaves a face, and the share of the edge there; -1 if
+    there is none.
+    """
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     nx, ny, nz = normals[0, f], normals[1, f], normals[2, f]
     cosine = nx * d[0] + ny * d[1] + nz * d[2]
@@ -146,8 +149,9 @@ def _leave(surface: LinkedFaces, d: Floats, point: Floats, f: int) -> tuple[int,
 
 @no_nrt
 def _lower_end(under: Underside, f: int, corner: int, share: float) -> int:
-    """The vertex where water goes on: the end of an edge at which it is, or else the lower one; of a face with no way out its
-    lowest corner."""
+    """The next vertex of the path: the end of an edge at which it is, or else the lower end; for a face without an exit, its
+    lowest corner.
+    """
     faces, heights = under.surface.faces, under.heights
     if corner < 0:
         v = faces[f, 0]
@@ -162,8 +166,7 @@ def _lower_end(under: Underside, f: int, corner: int, share: float) -> int:
 
 @helper
 def _turn(surface: LinkedFaces, first: int, f: int, v: int, forward: bool) -> tuple[int, bool]:
-    """The next face around a vertex after one of them, -1 when all were seen; at an open edge the other way round from the
-    first."""
+    """The next face around a vertex, -1 after the last; at an open edge the direction is reversed from the first face."""
     corner = corner_of(surface, f, v)
     g = surface.neighbours[f, corner if forward else (corner + 2) % 3]
     if g < 0 and forward:
@@ -174,7 +177,9 @@ def _turn(surface: LinkedFaces, first: int, f: int, v: int, forward: bool) -> tu
 
 @helper
 def _steepest(under: Underside, first: int, v: int) -> tuple[int, int]:
-    """Where water leaves a vertex: a face and the vertex itself, or a face and the other end of its edge; -1: nowhere."""
+    """The steepest exit from a vertex: a face and the vertex itself, or a face and the other end of its edge; -1 if there is
+    none.
+    """
     surface, best, way, end = under.surface, LEVEL, -1, v
     f, forward = first, True
     for _ in range(MOST_STEPS):
@@ -196,7 +201,7 @@ def _steepest(under: Underside, first: int, v: int) -> tuple[int, int]:
 
 @no_nrt
 def _slope(under: Underside, v: int, w: int) -> float:
-    """How steep it goes down from one vertex to another."""
+    """Downward slope from one vertex to another."""
     length = 0.0
     for axis in range(3):
         length += (under.surface.vertices[axis, w] - under.surface.vertices[axis, v]) ** 2
@@ -211,7 +216,7 @@ def _is_others(under: Underside, f: int, own: int) -> bool:
 
 @no_nrt
 def _end_at_vertex(under: Underside, first: int, v: int, own: int) -> int:
-    """What a way comes to that ends at a vertex: a patch about it, or else the solid beneath a pit."""
+    """Verdict for a path that ends at a vertex: the number of a patch around it, or else ANCHORED above a pit."""
     f, forward, pit = first, True, False
     for _ in range(MOST_STEPS):
         if _is_others(under, f, own):
@@ -225,7 +230,7 @@ def _end_at_vertex(under: Underside, first: int, v: int, own: int) -> int:
 
 @no_nrt
 def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool, base_mm: float) -> bool:
-    """Whether a patch has a bottom in the air."""
+    """Whether a patch is a floating start: it contains a local minimum above the base."""
     for f in patch:
         for k in range(3):
             v = surface.faces[f, k]
@@ -237,7 +242,7 @@ def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool
 
 @no_nrt
 def _is_bottom(surface: LinkedFaces, heights: Floats, v: int) -> bool:
-    """Whether no vertex next to one lies lower."""
+    """Whether a vertex is a local minimum: no neighbour lies lower."""
     at, end = surface.starts[v], surface.starts[v + 1]
     while at < end and heights[surface.around[at]] >= heights[v]:
         at += 1
@@ -246,8 +251,9 @@ def _is_bottom(surface: LinkedFaces, heights: Floats, v: int) -> bool:
 
 @no_nrt
 def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool, base_mm: float) -> bool:
-    """Whether what hangs together with a bottom and lies no higher than DIP_MM above it goes on below it or to the base. If so,
-    it has been seen, as far as one had to look."""
+    """Whether the region connected with a minimum, up to DIP_MM above it, continues below it or to the base. If so, its vertices
+    are marked as visited, as far as they were searched.
+    """
     seen, queue = pool
     low = heights[bottom] - ROUNDING_MM
     seen[bottom], queue[0] = bottom, bottom
@@ -256,7 +262,7 @@ def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool,
         v = queue[at]
         for k in range(surface.starts[v], surface.starts[v + 1]):
             w = surface.around[k]
-            other = seen[w]  # another bottom as low, which has a way out
+            other = seen[w]  # another equally low minimum, which has a way out
             known = other != UNSEEN and other != bottom and abs(heights[other] - heights[bottom]) <= ROUNDING_MM
             if known or heights[w] < low or heights[w] <= base_mm:
                 return True

@@ -1,4 +1,4 @@
-"""Need: the faces of a surface that require support along a direction, for the search and for the slicer."""
+"""Support need: the faces of a surface that require support along a direction, for the search and for the slicer."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -9,7 +9,7 @@ from mdp.directions.orientation import azimuth_rad
 from mdp.directions.unit_vectors import AXES, framed, spread
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, PLATE_TOLERANCE_MM, UP, Mask, threshold
 from mdp.pose import about
 from mdp.support_need.over_air import find_over_air
 from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Limits, classify
@@ -17,18 +17,20 @@ from mdp.topology.edges import LinkedFaces, flat_places, link
 from mdp.zone import NOWHERE, UNMARKED, Marked, ZonesOnModel
 from profiles.process import Process
 
-MADE_BY_A_CUT = -1  # the source of a face that a cut laid open
-NO_SUPPORT_WEIGHT = 100.0  # of an area that needs support where a person wants none
-MOST_CACHED = 256  # single directions whose classes are cached; a polished plane comes back to the same few again and again
+MADE_BY_A_CUT = -1  # source of a face created by a cut
+NO_SUPPORT_WEIGHT = 100.0  # weight of area that needs support where the user wants none
+MOST_CACHED = 256  # single directions whose classes are cached; polishing returns to the same few planes again and again
 LEVEL_LAYERS = 2.0  # a patch no higher than this is printed as one bridge
 NO_BASE_MM = -np.inf
 COARSE = spread(37, 0.0)  # directions over the half sphere, some 24 degrees apart
-LEANS = 3  # coarse directions nearest to a direction; support that leans reaches what lies beneath along any of them
-FEW = 16  # directions that are kept singly
+LEANS = 3  # number of coarse directions nearest to a direction; slanted support can reach the solid below along any of them
+FEW = 16  # directions that are cached one by one
 
 
 def limits_of(process: Process, base_mm: float) -> Limits:
-    """What carries itself with a process. base_mm: height along the direction up to which a surface rests on something."""
+    """Limits of self-supporting overhangs for a process. base_mm: height along the direction up to which a surface rests on
+    something.
+    """
     return Limits(
         risky_below=threshold(process.self_supporting_angle_deg),
         base_mm=base_mm,
@@ -40,19 +42,19 @@ def limits_of(process: Process, base_mm: float) -> Limits:
     )
 
 
-def needs_support(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
-    """(m,) False for the faces of a part, in its part frame, that overhang but carry themselves."""
-    limits = limits_of(process, PLATFORM_TOLERANCE_MM if on_platform else BASE_TOLERANCE_MM)
+def needs_support(mesh: Mesh, process: Process, on_plate: bool) -> Mask:
+    """(m,) False for faces of a part, in its part frame, that overhang but support themselves."""
+    limits = limits_of(process, PLATE_TOLERANCE_MM if on_plate else BASE_TOLERANCE_MM)
     return _needing_upright(link(mesh), limits)
 
 
 @dataclass(frozen=True, eq=False)
 class SupportNeed:
-    """The faces of a whole model that need support, for all directions a search asks for.
+    """The faces of a whole model that need support, for any direction of a search.
 
-    weight: how many times an area over air counts, which support can only be given by leaning or from support of other parts;
-    enforced: (m,) faces that a person wants supported where they overhang, also where they carry themselves; no_support: where an
-    area that needs it counts NO_SUPPORT_WEIGHT times, for it would hang.
+    weight: weight of area over air, which only slanted support or support on other parts can reach; enforced: (m,) faces that the
+    user wants supported wherever they overhang, even if they support themselves; no_support: zones in which area that needs
+    support weighs NO_SUPPORT_WEIGHT, since it would sag.
     """
 
     surface: LinkedFaces
@@ -66,13 +68,14 @@ class SupportNeed:
 
     @classmethod
     def of(cls, mesh: Mesh, process: Process, weight: float, zones: ZonesOnModel = NOWHERE) -> "SupportNeed":
-        """The need of a model that stands on the platform."""
+        """The support need of a model that stands on the build plate."""
         axes = about(UP, azimuth_rad(mesh)).T
         return cls(link(mesh), process, weight, axes, zones.support.touched(mesh), zones.no_support)
 
     def pieces(self, mesh: Mesh, sources: Ints) -> "ModelPieces":
-        """The faces of what was cut from the model, and of which of its own they are pieces. manifold3d may number a few more
-        than the model has: they count as made by a cut."""
+        """The faces of a piece cut from the model, and the source face of each. manifold3d may number a few more faces than the
+        model has: they count as created by a cut.
+        """
         sources = np.where(sources < len(self.surface.faces), sources, np.int32(MADE_BY_A_CUT))
         if not self.no_support.anywhere:
             return ModelPieces(self, sources)
@@ -81,13 +84,14 @@ class SupportNeed:
 
     @cached_property
     def upright(self) -> Mask:
-        """(m,) False for the faces that overhang printed straight up but carry themselves. Support stands on the platform."""
-        limits = limits_of(self.process, PLATFORM_TOLERANCE_MM)
+        """(m,) False for faces that overhang when printed straight up, but support themselves. Support stands on the plate."""
+        limits = limits_of(self.process, PLATE_TOLERANCE_MM)
         return _needing_upright(self.surface, limits, self.axes) | self.enforced
 
     def along(self, directions: Floats) -> Classes:
-        """(k, m) for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, valid for the faces that are
-        risky along it. Later cuts do not count: the class of a face depends on nothing but face and direction."""
+        """(k, m) class for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, valid for faces that
+        are risky along the direction. A class depends only on face and direction, not on later cuts.
+        """
         if len(directions) > FEW:
             return self._looked_up(self._tables, directions)
         rows = [self._looked_up(self._rows, direction[None]) for direction in directions]
@@ -116,8 +120,9 @@ class SupportNeed:
 
     @cached_property
     def _over_air(self) -> Classes:
-        """(37, m) which faces are over air along each of the coarse directions, turned with the model, flat places as a whole: of
-        their faces what cuts leave remembers but one."""
+        """(37, m) whether each face lies over air along each coarse direction, turned with the model. Flat regions are decided as
+        a whole, since one face represents them in pieces cut from the model.
+        """
         over_air = np.zeros((len(COARSE), len(self.surface.faces)), np.uint8)
         surface = self.surface, flat_places(self.surface)
         in_threads(find_over_air, len(COARSE), surface, framed(COARSE @ self.axes, self.axes), over_air)
@@ -125,7 +130,7 @@ class SupportNeed:
 
 
 def _needing_upright(surface: LinkedFaces, limits: Limits, axes: Floats = AXES) -> Mask:
-    """(m,) False for the faces that overhang straight up but carry themselves."""
+    """(m,) False for faces that overhang straight up, but support themselves."""
     classes = np.full((1, len(surface.faces)), NEEDS_SUPPORT, np.uint8)
     in_threads(classify, 1, surface, framed(UP[None], axes), limits, classes)
     needing: Mask = np.not_equal(classes[0], CARRIES_ITSELF)
@@ -134,8 +139,9 @@ def _needing_upright(surface: LinkedFaces, limits: Limits, axes: Floats = AXES) 
 
 @dataclass(frozen=True, eq=False)
 class ModelPieces:
-    """What a model's faces need, and (m,) of which of them each face of something cut from it is a piece, below 0: a cut laid it
-    open. counts: (m,) how many times an area on each counts that needs support; None: once."""
+    """A model's support need, and (m,) the source face in the model of each face of a piece cut from it; negative if created by a
+    cut. counts: (m,) weight of each face's area that needs support; None: 1.
+    """
 
     need: SupportNeed
     sources: Ints
@@ -143,10 +149,10 @@ class ModelPieces:
 
     @property
     def upright(self) -> Mask:
-        """(m,) False for the faces that carry themselves printed straight up."""
+        """(m,) False for faces that support themselves when printed straight up."""
         return (self.sources < 0) | self.need.upright[self.sources]
 
     def along(self, direction: Floats) -> Classes:
-        """(m,) the classes of the faces along a unit direction."""
+        """(m,) class of each face along a unit direction."""
         row = self.need.along(direction[None])[0]
         return np.where(self.sources < 0, np.uint8(NEEDS_SUPPORT), row[self.sources])

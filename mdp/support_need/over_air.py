@@ -1,8 +1,8 @@
-"""Over air: which faces have, along a direction, nothing of the solid beneath them (a numba kernel).
+"""Overhangs over air: which faces have nothing of the solid beneath them along a direction (a numba kernel).
 
-Support leans, so a few directions spread evenly stand for those between them. For each a grid of cells across it keeps the lowest
-surface that looks up; a place is over air where none in its cell lies lower than itself. Flat places are asked as a whole, at the
-places of a raster, and look up as a whole, so that it does not matter how they are cut into triangles.
+Support can be slanted, so a few evenly spread directions represent those between them. For each direction, a grid of cells across
+it stores the lowest upward-facing surface; a point is over air if no surface in its cell lies below it. Flat regions are decided
+as a whole, by samples on a raster, so that the result does not depend on their triangulation.
 """
 
 import numpy as np
@@ -14,25 +14,26 @@ from mdp.support_need.patches import Classes
 from mdp.topology.edges import LinkedFaces
 
 CELLS = 96  # of a grid along its longer side
-LEAST_COSINE = 0.05  # of a surface that looks up and the direction
-RASTER = 0.5  # cells between two samples of flat places
-ASIDE = 0.29  # of the raster's step: where in it these places lie, so that they are on no edge of a cell
-FEW_SAMPLES = 8.0  # on a flat place that is too small for the raster
-MOST = 0.55  # share of a flat place over air that makes all of it; half of it often is, up to rounding
+LEAST_COSINE = 0.05  # between an upward-facing surface and the direction
+RASTER = 0.5  # cells between two samples of a flat region
+ASIDE = 0.29  # offset of the samples within the raster's step, so that none lies on the edge of a cell
+FEW_SAMPLES = 8.0  # fewest samples on a flat region; smaller regions are measured by area
+MOST = 0.55  # share of a flat region over air above which the whole region counts; exactly half, up to rounding, is common
 TINY = 1e-9  # twice the area of a face seen edge-on, in cells
 
 
-# Rows of the figures of all flat places (6, m): lowest and highest point, the number of samples and of those over air; where
-# there are too few samples, the area, and the area over air by points of the faces.
-LOW, HIGH, SAMPLED, AIRY, AREA, AIRY_AREA = range(6)
+# Rows of the figures of all flat regions (6, m): lowest and highest point, number of samples and of samples over air; for regions
+# with few samples, the area, and the area over air by points of the faces.
+LOW, HIGH, SAMPLED, UNOCCLUDED, AREA, UNOCCLUDED_AREA = range(6)
 
 
 @kernel
 def find_over_air(
     begin_row: int, end_row: int, flat: tuple[LinkedFaces, Ints], framed: tuple[Floats, Floats], out: Classes
 ) -> None:
-    """Which faces that look down are over air, 0 or 1, for each direction, with the frames across them (k, m). flat: a surface
-    and its flat_places (m,); each is one or the other as a whole."""
+    """For each direction, with the frame across it, set (k, m) to 1 for downward-facing faces over air, else 0. flat: a surface
+    and its flat_places (m,); each region is decided as a whole.
+    """
     (surface, places), (directions, frames) = flat, framed
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     seen, count = table(vertices.shape[1], 3), len(faces)
@@ -49,22 +50,22 @@ def find_over_air(
                 _lay(seen, faces[f], counts[LOW, places[f]], counts[HIGH, places[f]], lowest)
         for f in range(count):
             if facing[f] < 0.0:
-                sampled, airy = _sample(seen, faces[f], lowest, 1e-3 * cell)
+                sampled, unoccluded = _sample(seen, faces[f], lowest, 1e-3 * cell)
                 counts[SAMPLED, places[f]] += sampled
-                counts[AIRY, places[f]] += airy
+                counts[UNOCCLUDED, places[f]] += unoccluded
         for f in range(count):
             if facing[f] < 0.0 and counts[SAMPLED, places[f]] < FEW_SAMPLES:
                 counts[AREA, places[f]] += surface.areas_mm2[f]
-                counts[AIRY_AREA, places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
+                counts[UNOCCLUDED_AREA, places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
         for f in range(count):
             p = places[f]
-            part, of = (AIRY_AREA, AREA) if counts[SAMPLED, p] < FEW_SAMPLES else (AIRY, SAMPLED)
+            part, of = (UNOCCLUDED_AREA, AREA) if counts[SAMPLED, p] < FEW_SAMPLES else (UNOCCLUDED, SAMPLED)
             out[row, f] = int(counts[part, p] > MOST * counts[of, p])
 
 
 @no_nrt
 def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Floats) -> None:
-    """How low and how high the flat places reach."""
+    """Fill the lowest and highest points of the flat regions."""
     for p in range(counts.shape[1]):
         counts[LOW, p], counts[HIGH, p] = np.inf, -np.inf
     for f in range(len(faces)):
@@ -75,15 +76,15 @@ def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Floats) -> No
 
 
 @no_nrt
-def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
-    """Whether nothing in the cell of a place that looks up lies lower."""
+def _is_unoccluded(lowest: Floats, x: float, y: float, z: float) -> bool:
+    """Whether no upward-facing surface in the cell of a point lies below it."""
     return bool(lowest[int(y) * (CELLS + 2) + int(x)] > z)
 
 
 @no_nrt
 def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> tuple[int, int]:
-    """How many places of a raster lie on a face, and how many of them over air."""
-    a, b, c, sampled, airy = face[0], face[1], face[2], 0, 0
+    """The number of raster samples on a face, and of those over air."""
+    a, b, c, sampled, unoccluded = face[0], face[1], face[2], 0, 0
     ux, uy, uz = seen[b, 0] - seen[a, 0], seen[b, 1] - seen[a, 1], seen[b, 2] - seen[a, 2]
     vx, vy, vz = seen[c, 0] - seen[a, 0], seen[c, 1] - seen[a, 1], seen[c, 2] - seen[a, 2]
     twice = ux * vy - uy * vx
@@ -103,27 +104,27 @@ def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> tuple[
                 x = (i + ASIDE) * RASTER
                 z = seen[a, 2] + slope_x * (x - seen[a, 0]) + slope_y * (y - seen[a, 1])
                 sampled += 1
-                airy += int(_is_airy(lowest, x, y, z - slack_mm))
-    return sampled, airy
+                unoccluded += int(_is_unoccluded(lowest, x, y, z - slack_mm))
+    return sampled, unoccluded
 
 
 @no_nrt
 def _share_over_air(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> float:
-    """The share of a small face over air, by its middle and places near its corners."""
-    airy = 0
+    """Share of a small face over air, from its centre and points near its corners."""
+    unoccluded = 0
     for k in range(4):
         x, y, z = 0.0, 0.0, 0.0
         for corner in range(3):
             share = (1.0 if k == 3 else (2.0 if k == corner else 0.5)) / 3.0
             v = face[corner]
             x, y, z = x + share * seen[v, 0], y + share * seen[v, 1], z + share * seen[v, 2]
-        airy += int(_is_airy(lowest, x, y, z - slack_mm))
-    return 0.25 * airy
+        unoccluded += int(_is_unoccluded(lowest, x, y, z - slack_mm))
+    return 0.25 * unoccluded
 
 
 @helper
 def _see(vertices: Floats, d: Floats, frame: Floats, seen: Floats) -> float:
-    """Fill the places of the vertices in cells across the direction and their heights in mm; the size of a cell, mm."""
+    """Fill the positions of the vertices in cells across the direction and their heights, mm; returns the size of a cell, mm."""
     low, high = floats(2, np.inf), floats(2, -np.inf)
     for v in range(len(seen)):
         x, y, z = vertices[0, v], vertices[1, v], vertices[2, v]
@@ -140,8 +141,9 @@ def _see(vertices: Floats, d: Floats, frame: Floats, seen: Floats) -> float:
 
 @no_nrt
 def _lay(seen: Floats, face: Ints, least: float, most: float, lowest: Floats) -> None:
-    """Lay a face into the cells that it touches of the grid of lowest surfaces, as high as its plane is at their middles, within
-    the extent of its flat place."""
+    """Lower the grid of lowest surfaces by a face: in each cell that it touches, by the height of its plane at the cell's centre,
+    within the extent of its flat region.
+    """
     a, b, c = face[0], face[1], face[2]
     ax, ay, bx, by, cx, cy = seen[a, 0], seen[a, 1], seen[b, 0], seen[b, 1], seen[c, 0], seen[c, 1]
     twice = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)

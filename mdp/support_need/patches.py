@@ -1,12 +1,12 @@
-"""Patches: the connected places that overhang along a direction, which sides of their rims anchor a line over them, and which of
-them carry themselves (numba kernels).
+"""Patches: connected overhangs along a direction, the sides of their rims that anchor bridging lines, and whether they support
+themselves (numba kernels).
 
-A patch carries itself when it is too small to matter, when it nowhere reaches further than two line widths from its anchors, or
-when lines over it reach from anchor to anchor, all in one direction and short enough; not so where it begins in mid-air, at a
-local minimum. All that is asked of the shape, never of its triangles: however a surface is cut into faces, it needs the same.
+A patch supports itself if it is negligibly small, if no point of it is further than two line widths from its anchors, or if
+parallel lines of limited length reach from anchor to anchor; not if it is a floating start, a local minimum. All criteria depend
+on the shape and not on its triangulation.
 
-A side is anchored where the solid goes down beside it, far enough to hold a line, or less far to the underside of something that
-is itself held by an anchor: a ledge beneath the end of a deck hides no pillar.
+A side is anchored where the solid beside it continues downward far enough to hold a line, or less far to the underside of
+something that is itself held by an anchor: a ledge beneath the end of a deck does not hide a pillar.
 """
 
 from typing import NamedTuple
@@ -34,21 +34,23 @@ from mdp.support_need.spans import ROUNDING_MM as SPAN_ROUNDING_MM
 from mdp.topology.edges import LinkedFaces
 
 Classes = NDArray[np.uint8]
-CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2  # classes of faces, the dearer the higher
-NARROW = 2.0  # line widths from an anchor that lines hold on to their neighbours
-UNNUMBERED = -1  # faces that belong to no patch yet
-ROUNDING_MM, ROUNDING_MM2 = 1e-6, 1e-6  # of a patch just as high or as large as it may be
-STEP_MM = 0.5  # between the places of a side at which one looks down
-END_MM = 0.01  # of a side, within which the first and the last of them lie
-SHORT_MM = 0.1  # a side no longer has only one
-HALVINGS = 6  # until the end of an anchor between two of them is found
+CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2  # classes of faces, in ascending cost
+NARROW = 2.0  # line widths from an anchor within which lines hold on to their neighbours
+UNNUMBERED = -1  # faces that are not in a patch yet
+ROUNDING_MM, ROUNDING_MM2 = 1e-6, 1e-6  # tolerances on the height and area of a patch
+STEP_MM = 0.5  # between the sample points of a side
+END_MM = 0.01  # distance of the first and the last sample point from the ends of a side
+SHORT_MM = 0.1  # a side up to this length has a single sample point
+HALVINGS = 6  # bisection steps to locate the end of an anchor between two sample points
 UNKNOWN, HELD, UNHELD = 0, 1, 2  # what is known of a patch
 
 
 class Limits(NamedTuple):
-    """risky_below: cosine of normal and direction below which a face overhangs; base_mm: height along the direction up to which
-    the surface rests on something; level_mm: a patch no higher than this is a level bridge, others are arches; how far these
-    reach; width_mm of a line; least_mm2: a smaller patch, seen along the direction, holds itself."""
+    """Limits of self-supporting overhangs. risky_below: cosine of normal and direction below which a face overhangs; base_mm:
+    height along the direction up to which the surface rests on something; level_mm: greatest height of a level bridge, higher
+    patches are arches; bridge_mm, arch_mm: greatest spans of both; width_mm: line width; least_mm2: a smaller patch, projected
+    along the direction, supports itself.
+    """
 
     risky_below: float
     base_mm: float
@@ -63,8 +65,7 @@ class Limits(NamedTuple):
 def classify(
     begin_row: int, end_row: int, surface: LinkedFaces, framed: tuple[Floats, Floats], limits: Limits, out: Classes
 ) -> None:
-    """For each of k directions, with the frames across them, put CARRIES_ITSELF where it holds among the classes of the faces,
-    (k, m)."""
+    """For each of k directions, with the frame across it, set the class (k, m) of self-supporting faces to CARRIES_ITSELF."""
     (directions, frames), count, size = framed, surface.normals.shape[1], surface.vertices.shape[1]
     number, faces, starts, held, waiting = (
         ints(count, 0),
@@ -91,7 +92,7 @@ def classify(
 
 @no_nrt
 def _find_risky(under: Underside, risky_below: float, risky: Ints) -> int:
-    """List the faces that overhang and rest on nothing, UNNUMBERED, all others SAFE; how many there are."""
+    """List the faces that overhang and rest on nothing and mark them UNNUMBERED, all others SAFE; returns their number."""
     many = 0
     for f in range(len(under.cosines)):
         under.number[f] = SAFE
@@ -103,7 +104,7 @@ def _find_risky(under: Underside, risky_below: float, risky: Ints) -> int:
 
 @no_nrt
 def _find_patches(under: Underside, risky: Ints) -> int:
-    """Number all overhanging faces, those alike that hang together; how many patches there are."""
+    """Number the overhanging faces by connected patch; returns the number of patches."""
     neighbours, number, faces, own, size, at = under.surface.neighbours, under.number, under.faces, 0, 0, 0
     for seed in risky:
         if number[seed] == UNNUMBERED:
@@ -124,7 +125,7 @@ def _find_patches(under: Underside, risky: Ints) -> int:
 
 @helper
 def _measure(under: Underside, own: int) -> tuple[float, float, float]:
-    """The area of a patch seen along the direction, how high it is and how long its rim."""
+    """Area of a patch projected along the direction, its height, and the length of its rim."""
     corners, heights = under.surface.faces, under.heights
     area, low, high, around = 0.0, np.inf, -np.inf, 0.0
     for f in under.faces[under.starts[own] : under.starts[own + 1]]:
@@ -147,7 +148,7 @@ def _carries_itself(under: Underside, own: int, pool: Pool, limits: Limits) -> b
     reach_mm = NARROW * limits.width_mm
     longest_mm = limits.bridge_mm if rise_mm <= limits.level_mm + ROUNDING_MM else limits.arch_mm
     if area_mm2 > max(reach_mm, 0.5 * (longest_mm + SPAN_ROUNDING_MM)) * around_mm + ROUNDING_MM2:
-        return False  # no rim is long enough for a place of that size to lie near it, or for lines that short
+        return False  # the rim is too short for every point of such an area to lie near it, or for lines of that length
     patch, may_be_narrow = under.faces[under.starts[own] : under.starts[own + 1]], area_mm2 <= reach_mm * around_mm + ROUNDING_MM2
     for at_best in (True, False):
         if not at_best and begins_in_air(under.surface, under.heights, patch, pool, under.base_mm):
@@ -161,7 +162,7 @@ def _carries_itself(under: Underside, own: int, pool: Pool, limits: Limits) -> b
 
 @helper
 def _is_narrow(under: Underside, patch: Ints, sides: Sides, reach_mm: float) -> bool:
-    """Whether no place of a patch lies further than that from the nearest anchor."""
+    """Whether no point of a patch lies further than reach_mm from the nearest anchor."""
     todo, triangle, nearest = table(DEEP, 6), floats(6, 0.0), 0
     for f in patch:
         for corner in range(3):
@@ -174,14 +175,14 @@ def _is_narrow(under: Underside, patch: Ints, sides: Sides, reach_mm: float) -> 
 
 @no_nrt
 def _is_rim(under: Underside, f: int, corner: int) -> bool:
-    """Whether a patch ends at the edge of its face that begins at a corner."""
+    """Whether the edge that begins at a corner of a patch's face is a rim edge."""
     g = under.surface.neighbours[f, corner]
     return bool(g < 0 or under.number[g] == SAFE)
 
 
 @helper
 def _seen_along(under: Underside, v: int) -> tuple[float, float]:
-    """A vertex seen along the direction."""
+    """A vertex projected along the direction."""
     vertices, frame = under.surface.vertices, under.frame
     x: float = vertices[0, v] * frame[0, 0] + vertices[1, v] * frame[0, 1] + vertices[2, v] * frame[0, 2]
     y: float = vertices[0, v] * frame[1, 0] + vertices[1, v] * frame[1, 1] + vertices[2, v] * frame[1, 2]
@@ -190,8 +191,9 @@ def _seen_along(under: Underside, v: int) -> tuple[float, float]:
 
 @helper
 def _find_sides(under: Underside, own: int, at_best: bool) -> Sides:
-    """The sides of a patch seen along the direction, cut where anchors end. at_best: anchored wherever the solid goes down beside
-    them at all: found at once, and most patches cannot do with these either."""
+    """The sides of a patch projected along the direction, split where anchors end. at_best: a side counts as anchored if the
+    solid goes down beside it at all; this is fast, and already excludes most patches.
+    """
     faces, count = under.faces[under.starts[own] : under.starts[own + 1]], 0
     for f in faces:
         for corner in range(3):
@@ -234,7 +236,7 @@ def _length(under: Underside, f: int, corner: int) -> float:
 
 @helper
 def _count_samples(under: Underside, f: int, corner: int) -> int:
-    """At how many places of an edge of the rim one looks down: both its ends and no further than STEP_MM apart."""
+    """Number of sample points on a rim edge: its ends, and points at most STEP_MM apart."""
     g = under.surface.neighbours[f, corner]
     if not _may_anchor(under, f, corner) or _rests(under, g):
         return 1
@@ -244,7 +246,7 @@ def _count_samples(under: Underside, f: int, corner: int) -> int:
 
 @helper
 def _share(under: Underside, f: int, corner: int, k: int, samples: int) -> float:
-    """Where on an edge the place k lies at which one looks down; those at its ends a little within it."""
+    """Position of sample point k as a share of an edge; those at the ends lie slightly inside."""
     if samples == 1:
         return 0.5
     inside = END_MM / _length(under, f, corner)
@@ -260,7 +262,7 @@ def _rests(under: Underside, f: int) -> bool:
 
 @helper
 def _may_anchor(under: Underside, f: int, corner: int) -> bool:
-    """Whether the surface beyond an edge of a patch's rim goes down from it or rests on the base."""
+    """Whether the surface beyond a rim edge of a patch goes down from it or rests on the base."""
     surface, g = under.surface, under.surface.neighbours[f, corner]
     if g < 0:
         return False
@@ -270,7 +272,7 @@ def _may_anchor(under: Underside, f: int, corner: int) -> bool:
 
 @helper
 def _find_change(under: Underside, f: int, corner: int, low: float, high: float) -> float:
-    """Where between two places of an edge an anchor ends or begins."""
+    """The share of an edge, between two sample points, at which an anchor ends or begins."""
     first = _is_anchored(under, f, corner, low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -283,14 +285,14 @@ def _find_change(under: Underside, f: int, corner: int, low: float, high: float)
 
 @helper
 def _is_anchored(under: Underside, f: int, corner: int, share: float) -> bool:
-    """Whether a place of a patch's rim is an anchor."""
+    """Whether a point on a patch's rim is an anchor."""
     end = _look_down(under, f, corner, share)
     return end == ANCHORED or (end > 0 and _is_held(under, end))
 
 
 @helper
 def _look_down(under: Underside, f: int, corner: int, share: float) -> int:
-    """What the way down beyond a place of a patch's rim comes to."""
+    """Verdict on the descent beyond a point on a patch's rim."""
     if not _may_anchor(under, f, corner):
         return LOOSE
     surface, g = under.surface, under.surface.neighbours[f, corner]
@@ -300,10 +302,10 @@ def _look_down(under: Underside, f: int, corner: int, share: float) -> int:
 
 
 @helper
-def _is_held(under: Underside, asked: int) -> bool:
-    """Whether a patch has an anchor somewhere, or rests on another one that has."""
-    if under.held[asked] == UNKNOWN:
-        under.waiting[0], under.held[asked] = asked, UNHELD
+def _is_held(under: Underside, start: int) -> bool:
+    """Whether a patch has an anchor somewhere, or rests on a patch that has one."""
+    if under.held[start] == UNKNOWN:
+        under.waiting[0], under.held[start] = start, UNHELD
         at, count, held = 0, 1, False
         while at < count and not held:
             patch = under.waiting[at]
@@ -320,7 +322,7 @@ def _is_held(under: Underside, asked: int) -> bool:
                             under.waiting[count], under.held[end] = end, UNHELD
                             count += 1
             at += 1
-        for k in range(count if held else 0):  # the others stay unknown: the visit of none of them was finished
+        for k in range(count if held else 0):  # the others stay unknown, since none of their visits was completed
             under.held[under.waiting[k]] = UNKNOWN
-        under.held[asked] = HELD if held else UNHELD
-    return bool(under.held[asked] == HELD)
+        under.held[start] = HELD if held else UNHELD
+    return bool(under.held[start] == HELD)

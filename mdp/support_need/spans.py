@@ -1,9 +1,9 @@
-"""Spans: whether straight lines over a hanging place, all in one direction, reach from anchor to anchor and are short enough, or
-no part of it is far from its anchors.
+"""Spans: whether parallel lines of limited length can bridge an overhang from anchor to anchor, and whether every point of it is
+close to an anchor.
 
-One definition for the search's patches of the surface and for the slicer's bridges (slicer.overhangs): where lines cross the
-sides, and how much of their length may be loose or too long. Each chooses the directions and lines that it can afford, and what
-holds a line: in the search the sides of the rim that are anchors, in the slicer the layer below.
+Shared by the search, for patches of the surface, and the slicer, for bridges (slicer.overhangs): where lines cross the sides, and
+how much of their length may be loose or too long. Each caller chooses its directions and lines, and its anchors: in the search
+the anchored sides of the rim, in the slicer the layer below.
 """
 
 from typing import NamedTuple
@@ -14,20 +14,22 @@ from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.mesh import Floats, Ints
 
-TURNS = 8  # directions tried over half a turn, besides those of the place's own sides: the search asks for thousands of places
-BINS = 36  # of directions of the sides, over half a turn
-BESIDE = 0.37  # of a bin: where in the first one the direction 0 lies; usual angles lie at no end of a bin
-LINES = 24  # over a place at most; else one every line width
-MOST_LOOSE = 0.2  # share of the ends of lines that lie on no anchor, beyond which lines need not be drawn
-TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place
-ROUNDING_MM = 0.05  # a span may seem longer by this than it was drawn
-FINE_MM = 0.1  # between two places that are tested, neither of them too far from an anchor
-NEAR_ROUNDING_MM = 1e-6  # a place just as far from a side as it may be
-DEEP = 64  # halvings of a triangle, one within the other
+TURNS = 8  # directions tried over half a turn, besides those of the patch's sides: the search tests thousands of patches
+BINS = 36  # bins for the directions of the sides, over half a turn
+BESIDE = 0.37  # of a bin: position of direction 0 in the first one, so that common angles lie at no end of a bin
+LINES = 24  # greatest number of lines over a patch, otherwise one per line width
+MOST_LOOSE = 0.2  # greatest share of loose line ends
+TOLERATED = 0.02  # greatest share of the lines' length with a loose end, as at corners of a patch
+ROUNDING_MM = 0.05  # tolerance on the length of a span
+FINE_MM = 0.1  # between two tested points, neither too far from an anchor
+NEAR_ROUNDING_MM = 1e-6  # tolerance on the distance from a side
+DEEP = 64  # nested halvings of a triangle
 
 
 class Sides(NamedTuple):
-    """The rim of a hanging place seen along the direction, mm: ends (n, 4) x, y, x, y, and which sides are anchors (n,)."""
+    """The rim of an overhang projected along the direction, mm: ends (n, 4) x, y, x, y, and whether each side is an anchor
+    (n,).
+    """
 
     ends: Floats
     anchored: Ints
@@ -35,7 +37,7 @@ class Sides(NamedTuple):
 
 @helper
 def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> bool:
-    """Whether lines of one direction span a place of that area, none longer than that; they lie a line width apart or further."""
+    """Whether parallel lines, at least a line width apart and none too long, bridge a patch of the given area."""
     if longest_mm <= 0.0 or len(sides.anchored) == 0:
         return False
     angles = _angles(sides.ends)
@@ -43,7 +45,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
         cos, sin = np.cos(angles[a]), np.sin(angles[a])
         across_mm, loose_mm = _across(sides, cos, sin)
         if (
-            area_mm2 <= 0.5 * (longest_mm + ROUNDING_MM) * across_mm  # else the mean line is too long
+            area_mm2 <= 0.5 * (longest_mm + ROUNDING_MM) * across_mm  # otherwise the mean line is too long
             and loose_mm <= MOST_LOOSE * across_mm
             and _spans_along(sides, cos, sin, longest_mm, width_mm)
         ):
@@ -53,7 +55,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
 
 @helper
 def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
-    """How far the sides reach across lines at an angle, all together and those that are no anchors."""
+    """Extent of the sides across lines at an angle: of all sides, and of those that are not anchors."""
     ends, whole, loose = sides.ends, 0.0, 0.0
     for e in range(len(ends)):
         reach = abs((ends[e, 3] - ends[e, 1]) * cos - (ends[e, 2] - ends[e, 0]) * sin)
@@ -64,7 +66,7 @@ def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
 
 @helper
 def _angles(ends: Floats) -> Floats:
-    """Directions worth trying, radians: along and across the two that most of the sides run in, and others evenly."""
+    """Directions to try, radians: along and across the two most common directions of the sides, and evenly spread ones."""
     length, turned = floats(BINS, 0.0), floats(BINS, 0.0)
     for e in range(len(ends)):
         x, y = ends[e, 2] - ends[e, 0], ends[e, 3] - ends[e, 1]
@@ -89,7 +91,7 @@ def _angles(ends: Floats) -> Floats:
 
 @helper
 def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_mm: float) -> bool:
-    """Whether lines at an angle span the place. The middle line is tried first, it tells the most."""
+    """Whether lines at an angle bridge the patch. The middle line comes first, since it is the most informative."""
     ends, count = sides.ends, len(sides.anchored)
     low, high = np.inf, -np.inf
     for e in range(count):
@@ -111,9 +113,9 @@ def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_
 
 @no_nrt
 def line_across(ends: Floats, along: tuple[float, float], y: float, places: Floats, crossed: Ints) -> int:
-    """Fills in where, in rising order, and which sides (n, 4) a line crosses; returns how many.
+    """Fill in the positions at which a line crosses sides (n, 4), ascending, and the numbers of the sides; returns the count.
 
-    along: cosine and sine of its direction; y: its height in the frame turned by it; places: along it.
+    along: cosine and sine of the line's direction; y: its height in the frame turned by it; places: positions along it.
     """
     cos, sin = along
     count = 0
@@ -133,8 +135,9 @@ def line_across(ends: Floats, along: tuple[float, float], y: float, places: Floa
 
 @no_nrt
 def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Floats, nearest: int) -> int:
-    """An anchor within reach of a triangle (6,), x, y of its corners, all of which lies within reach of anchors; -1: some of it
-    does not. nearest: the anchor to try first; todo (DEEP, 6): room for triangles."""
+    """The last anchor used if every point of a triangle (6,), x, y of its corners, lies within reach of anchors; -1 otherwise.
+    nearest: the anchor to try first; todo (DEEP, 6): scratch space for triangles.
+    """
     count = 1
     for k in range(6):
         todo[0, k] = triangle[k]
@@ -159,7 +162,7 @@ def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Float
 
 @no_nrt
 def _halve(todo: Floats, at: int, split: int) -> None:
-    """Put the halves of a triangle in its place and the one after it, cut through the middle of an edge."""
+    """Replace a triangle by its halves, in its row and the next one, split at the middle of an edge."""
     a, b, c = 2 * split, 2 * ((split + 1) % 3), 2 * ((split + 2) % 3)
     for axis in range(2):
         middle = 0.5 * (todo[at, a + axis] + todo[at, b + axis])
@@ -169,7 +172,9 @@ def _halve(todo: Floats, at: int, split: int) -> None:
 
 @no_nrt
 def _anchor_near(sides: Sides, places: Floats, reach_mm: float, first: int) -> int:
-    """An anchored side within reach of places, x, y, x, y, and so of all between them, looked for from a side on; -1: none."""
+    """An anchored side within reach of all given points x, y, x, y, and so of all points between them, starting with side
+    `first`; -1 if there is none.
+    """
     count = len(sides.anchored)
     for k in range(count):
         e = (first + k) % count
@@ -184,7 +189,7 @@ def _anchor_near(sides: Sides, places: Floats, reach_mm: float, first: int) -> i
 
 @no_nrt
 def _is_near(ends: Floats, e: int, x: float, y: float, reach_mm: float) -> bool:
-    """Whether a place lies within reach of a side."""
+    """Whether a point lies within reach of a side."""
     ax, ay, bx, by = ends[e, 0], ends[e, 1], ends[e, 2] - ends[e, 0], ends[e, 3] - ends[e, 1]
     length = bx * bx + by * by
     share = ((x - ax) * bx + (y - ay) * by) / length if length > 0.0 else 0.0

@@ -1,5 +1,5 @@
 """Sweep: all offsets of one direction evaluated in one pass over the faces.
 
-`sweep.gains` says what each plane makes safe, `sweep.sweep` whether it can be cut; both take a `sweep.Remainder`, the solid
-laid out once.
+`sweep.gains` computes the savings of each plane, `sweep.sweep` its feasibility; both take a `sweep.Remainder`, the solid prepared
+once.
 """

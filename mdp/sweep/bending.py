@@ -1,11 +1,11 @@
-"""Bending: how much the base of what lies above a plane is stressed when its top is pushed sideways (a numba kernel).
+"""Bending: stress at the base of the part above a plane when its top is pushed sideways (a numba kernel).
 
-Every piece above the plane is a beam held at its section. A push F at its top, lever L above the plane, bends it there by
-M = F L. In the worst direction that stresses a point p of the section, from its centroid, by M |J^-1 p|, J the second moments of
-area: the general formula of unsymmetric bending. The moments are sums over the section's outline by Green's theorem.
+Every piece above the plane is a beam held at its section. A push F at its top, lever L above the plane, bends it there by M = F
+L. In the worst direction that stresses a point p of the section, from its centroid, by M |J^-1 p|, J the second moments of area:
+the general formula of unsymmetric bending. The moments are sums over the section's outline by Green's theorem.
 
-The surface above the plane falls into shells. One that bounds solid from outside encloses a positive volume between itself and
-the plane, the wall of a void or of a hole from below a negative one: it belongs to the piece in whose section its own lies.
+The surface above the plane consists of shells. An outer shell encloses a positive volume between itself and the plane; the wall
+of a void, or of a hole from below, encloses a negative one, and belongs to the piece whose section contains its own.
 """
 
 import numpy as np
@@ -22,14 +22,15 @@ from mdp.topology.components import join, root
 MOMENTS = AREA, X, Y, XX, YY, XY = 0, 1, 2, 3, 4, 5
 
 
-# The segments in which k faces cross the plane, x, y, x, y, the solid on the left of each seen from above (k, 4), and the shell
-# that each belongs to (k,).
+# Segments x, y, x, y in which k faces cross the plane, the solid on the left of each seen from above (k, 4), and the shell of
+# each (k,).
 Section = tuple[Floats, Ints]
 
 
 def stress_per_newton(mesh: Mesh, plane: Plane, fragment_mm: float, limb: Mask | None = None) -> float:
-    """The greatest stress at a plane, MPa for every newton that pushes the top of a piece above it sideways; infinite where a
-    piece hangs on nothing. Pieces lower than fragment_mm are fragments. limb: (n,) the vertices of the only pieces that count."""
+    """Greatest stress at a plane, MPa per newton that pushes the top of a piece above it sideways; infinite for a floating piece.
+    Pieces lower than fragment_mm are fragments. limb: (n,) vertices of the pieces that count, None for all.
+    """
     across = (mesh.vertices - mesh.vertices[0]) @ frame_across(plane.normal).T
     counted = np.zeros(0, np.bool_) if limb is None else limb
     return _most_stress(mesh.faces, plane.heights_mm(mesh.vertices), np.ascontiguousarray(across), fragment_mm, counted)
@@ -61,7 +62,7 @@ def _most_stress(faces: Ints, heights: Floats, across: Floats, fragment: float, 
 
 @helper
 def _find_shells(faces: Ints, heights: Floats) -> Ints:
-    """(n,) for vertices above 0 one that stands for all that edges above 0 join them with, -1 for the others."""
+    """(n,) a representative of the connected vertices above 0 for each vertex above 0, -1 for the others."""
     shells = ints(len(heights), -1)
     for v in range(len(heights)):
         if heights[v] > 0.0:
@@ -79,7 +80,7 @@ def _find_shells(faces: Ints, heights: Floats) -> Ints:
 
 @helper
 def _measure(faces: Ints, heights: Floats, across: Floats, shells: Ints) -> tuple[Floats, Section]:
-    """(n,) the volume between each shell and the plane, below 0 where the solid lies outside, and the section."""
+    """(n,) volume between each shell and the plane, negative if the solid lies outside, and the section."""
     volumes, count = floats(len(heights), 0.0), 0
     for f in range(len(faces)):
         shell, crosses = -1, False
@@ -105,7 +106,9 @@ def _measure(faces: Ints, heights: Floats, across: Floats, shells: Ints) -> tupl
 
 @no_nrt
 def _volume(faces: Ints, f: int, heights: Floats, across: Floats) -> float:
-    """What a face adds to the volume above the plane: its area seen along the normal times the heights of what lies above."""
+    """Contribution of a face to the volume above the plane: its area projected along the normal, times the height of the part of
+    it above.
+    """
     total, alone, above = 0.0, 0.0, 0
     for k in range(3):
         p, q, r = heights[faces[f, k]], heights[faces[f, k - 1]], heights[faces[f, k - 2]]
@@ -120,8 +123,9 @@ def _volume(faces: Ints, f: int, heights: Floats, across: Floats) -> float:
 
 @helper
 def _find_pieces(section: Section, volumes: Floats) -> None:
-    """Give the segments of every void to the piece around it, -1 where there is none: of the shells in whose section the void's
-    lies the one with the least."""
+    """Assign the segments of every void to the piece around it, -1 if there is none: the shell of least area whose section
+    contains the void's.
+    """
     segments, shells = section
     holders, areas, around = ints(len(volumes), UNKNOWN), floats(len(volumes), 0.0), ints(len(volumes), 0)
     for k in range(len(shells)):
@@ -138,7 +142,9 @@ def _find_pieces(section: Section, volumes: Floats) -> None:
 
 @no_nrt
 def _find_holder(section: Section, volumes: Floats, areas: Floats, around: Ints, own: int) -> int:
-    """The shell of positive volume and least area whose outline runs around the middle of a segment. around: zeros, (n,)."""
+    """The shell of positive volume and least area whose outline surrounds the middle of a segment. around: (n,) zeros,
+    scratch.
+    """
     segments, shells = section
     x, y = 0.5 * (segments[own, 0] + segments[own, 2]), 0.5 * (segments[own, 1] + segments[own, 3])
     for k in range(len(shells)):
@@ -157,7 +163,7 @@ def _find_holder(section: Section, volumes: Floats, areas: Floats, around: Ints,
 
 @kernel
 def section_moments(edges: Floats) -> Floats:
-    """The MOMENTS of a section about its frame's axes, mm2 to mm4. edges: as greatest_stress_per_moment has them."""
+    """The MOMENTS of a section about the axes of its frame, mm2 to mm4. edges: as in greatest_stress_per_moment."""
     moments = floats(len(MOMENTS), 0.0)
     for k in range(len(edges)):
         add_edge(edges[k], moments)
@@ -166,10 +172,10 @@ def section_moments(edges: Floats) -> Floats:
 
 @kernel
 def greatest_stress_per_moment(edges: Floats) -> float:
-    """The greatest stress in a section for each unit of a bending moment in the worst direction, 1/mm3: the inverse of its least
-    section modulus; infinite where it has no area.
+    """Greatest stress in a section per unit of bending moment in the worst direction, 1/mm3: the inverse of its least section
+    modulus; infinite if it has no area.
 
-    edges: (n, 4) of its outlines, x, y, x, y in mm, the section on the left of each.
+    edges: (n, 4) edges of its outlines, x, y, x, y in mm, the section on the left of each.
     """
     moments, greatest = section_moments(edges), 0.0
     for k in range(len(edges)):
@@ -179,7 +185,7 @@ def greatest_stress_per_moment(edges: Floats) -> float:
 
 @no_nrt
 def add_edge(edge: Floats, moments: Floats) -> None:
-    """Add what an edge, x, y, x, y, has of a section's MOMENTS."""
+    """Add the contribution of an edge, x, y, x, y, to a section's MOMENTS."""
     p, q, r, s = edge[0], edge[1], edge[2], edge[3]
     twice = p * s - r * q
     moments[AREA] += twice / 2.0
@@ -192,7 +198,7 @@ def add_edge(edge: Floats, moments: Floats) -> None:
 
 @no_nrt
 def stress_per_moment(moments: Floats, x: float, y: float) -> float:
-    """|J^-1 p| of a point p of a section, 1/mm3; infinite where the section has no second moments."""
+    """|J^-1 p| for a point p of a section, 1/mm3; infinite if the section has no second moments."""
     area = moments[AREA]
     if area <= 0.0:
         return np.inf

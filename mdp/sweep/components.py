@@ -1,16 +1,16 @@
-"""Components: whether the solid below each offset of a direction hangs together with the platform, and on what area each piece of
-the solid above it stands (kernels of the sweep).
+"""Components: whether the solid below each offset of a direction is connected to the build plate, and the contact area of each
+piece of the solid above it (kernels of the sweep).
 
 The surface below a rising plane gains a component at a vertex without a lower neighbour and components join only at a vertex
 whose lower neighbours form several runs around it (PL Morse theory, ties of height broken by number); all other vertices are
-regular and need no look. So the components form a merge tree: its leaves are the lowest vertices, and a vertex belongs to the
-leaf that walking down from it leads to. A lowest vertex around which solid lies beneath is the floor of a void or bowl, not a
-floating piece: it is joined to its anchor, the surface that a ray into the solid meets, which lies lower. Solids join only where
-surfaces join, so the count of pieces is exact for the solid, closed voids and handles included.
+regular and are skipped. So the components form a merge tree: its leaves are the local minima, and a vertex belongs to the leaf
+reached by descending from it. A local minimum with solid beneath it is the floor of a void or bowl, not a floating piece: it is
+joined to its anchor, the lower surface that a ray into the solid meets. Solids join only where surfaces join, so the count of
+pieces is exact for the solid, closed voids and handles included.
 
-From the top the leaves are the highest vertices, and of two components that join at a saddle on the way down the one of the
-higher leaf goes on. So every leaf is a piece of its own in one run of columns, and the sections of all pieces take one number for
-each column of each run. Only wanted columns with several pieces are looked at: a single piece stands on the whole section.
+From the top the leaves are the local maxima, and when two components join at a saddle on the way down, the one with the higher
+leaf continues. So every leaf is a separate piece in one run of columns, and the sections of all pieces take one number for each
+column of each run. Only the requested columns with several pieces are evaluated: a single piece stands on the whole section.
 """
 
 from typing import NamedTuple
@@ -21,19 +21,19 @@ from mdp.kernels.arrays import floats, int_table, ints, table
 from mdp.kernels.kernel import helper, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.sweep.crossing import OffsetGrid, column_over
 from mdp.sweep.facets import UNKNOWN, Layout
 from mdp.sweep.rays import ANY_FACE, first_hit
 from mdp.topology.components import root, singletons
 
-LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
+LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats, whatever the required interface
 
 
 class MergeTree(NamedTuple):
     """A merge tree of a surface along one direction under construction, from below or from above (up): cosines (n,) of the vertex
-    normals, the vertices that are not regular, (n,) the leaf that each vertex belongs to (-1: not known), and (n,) room for a
-    path."""
+    normals, the critical vertices, (n,) the leaf of each vertex (-1 if unknown), and (n,) scratch space for a path.
+    """
 
     layout: Layout
     grid: OffsetGrid
@@ -46,7 +46,9 @@ class MergeTree(NamedTuple):
 
 @no_nrt
 def find_critical(layout: Layout, heights: Floats, cosines: Floats, critical: Ints) -> int:
-    """Vertices that are not regular, or have no single ring of neighbours; returns how many. cosines: of vertex normals and d."""
+    """List the critical vertices: those that are not regular or have no single ring of neighbours; returns their number. cosines:
+    of vertex normals and direction.
+    """
     starts, neighbours, flatness, many = layout.starts, layout.neighbours, layout.flatness, 0
     for v in range(len(heights)):
         if abs(cosines[v]) >= flatness[v]:
@@ -64,20 +66,20 @@ def find_critical(layout: Layout, heights: Floats, cosines: Floats, critical: In
 
 @no_nrt
 def before(heights: Floats, a: int, b: int, up: bool) -> bool:
-    """Whether a comes before b: strictly lower, ties by number; the reverse for a sweep from the top (up)."""
+    """Whether vertex a comes before b: strictly lower, ties by number; the reverse for a sweep from the top (up)."""
     lower: bool = heights[a] < heights[b] or (heights[a] == heights[b] and a < b)
     return lower != up
 
 
 @helper
 def plant_tree(layout: Layout, grid: OffsetGrid, cosines: Floats, critical: Ints, up: bool) -> MergeTree:
-    """A merge tree of which nothing is known yet."""
+    """An empty merge tree."""
     return MergeTree(layout, grid, cosines, critical, ints(len(cosines), -1), ints(len(cosines), 0), up)
 
 
 @no_nrt
 def find_leaf(tree: MergeTree, v: int) -> int:
-    """The leaf of a vertex; labels all vertices on the way. The vertices that are leaves are labelled already."""
+    """The leaf of a vertex; also labels all vertices on the path. Leaves must be labelled already."""
     heights, starts, neighbours = tree.grid.heights, tree.layout.starts, tree.layout.neighbours
     leaf, path, up = tree.leaf, tree.path, tree.up
     length = 0
@@ -95,7 +97,7 @@ def find_leaf(tree: MergeTree, v: int) -> int:
 
 @helper
 def number_leaves(tree: MergeTree) -> Ints:
-    """Number the vertices at which components begin; returns them."""
+    """Number the leaves, the vertices at which components begin; returns them."""
     starts, neighbours = tree.layout.starts, tree.layout.neighbours
     leaves, size = ints(len(tree.critical), 0), 0
     for v in tree.critical:
@@ -110,9 +112,9 @@ def number_leaves(tree: MergeTree) -> Ints:
 
 @helper
 def anchor_of(layout: Layout, v: int) -> int:
-    """The face that a ray from a vertex into the solid meets; below 0: none."""
+    """The face that a ray from a vertex into the solid meets; -1 if none."""
     if layout.anchors[v] == UNKNOWN:
-        # Threads may look up the same vertex twice; the answer does not depend on the direction.
+        # Threads may look up the same vertex twice; the result does not depend on the direction.
         triangles, inward = layout.triangles, table(2, 3)
         for axis in range(3):
             inward[0, axis], inward[1, axis] = triangles.vertices[v, axis], -layout.vertex_normals[axis, v]
@@ -122,7 +124,7 @@ def anchor_of(layout: Layout, v: int) -> int:
 
 @helper
 def _anchor_beyond(tree: MergeTree, v: int) -> int:
-    """A vertex, passed before, of the face that a ray from the first one of a void into the solid meets; below 0: none."""
+    """A vertex, passed earlier, of the face that a ray from the first vertex of a void into the solid meets; -1 if none."""
     faces, heights, cosine = tree.layout.triangles.faces, tree.grid.heights, tree.cosines[v]
     face = anchor_of(tree.layout, v) if cosine != 0.0 and (cosine < 0.0) == tree.up else -1
     if face < 0:
@@ -136,8 +138,9 @@ def _anchor_beyond(tree: MergeTree, v: int) -> int:
 
 @helper
 def join_leaves(tree: MergeTree, leaves: Ints) -> Ints:
-    """(j, 3): two leaves whose components join, and the vertex at which they do: a saddle, or through solid the first of a
-    void."""
+    """(j, 3) joins: two leaves whose components join, and the vertex where they do, a saddle or, through solid, the first vertex
+    of a void.
+    """
     starts, neighbours, most, size = tree.layout.starts, tree.layout.neighbours, len(leaves), 0
     for v in tree.critical:
         most += starts[v + 1] - starts[v]
@@ -161,7 +164,7 @@ def join_leaves(tree: MergeTree, leaves: Ints) -> Ints:
 
 @helper
 def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
-    """The first column that is not below each join."""
+    """(j,) first column that is not below each join."""
     columns = ints(len(joins), 0)
     for k in range(len(joins)):
         columns[k] = min(column_over(grid.heights[joins[k, 2]]), grid.columns)
@@ -170,18 +173,18 @@ def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
 
 @no_nrt
 def _stands_on(tree: MergeTree, v: int) -> bool:
-    """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
+    """Whether a neighbour further down also stands on the plate, so that v's component stands there already."""
     layout = tree.layout
     for at in range(layout.starts[v], layout.starts[v + 1]):
         w = layout.neighbours[at]
-        if layout.triangles.vertices[w, 2] <= PLATFORM_TOLERANCE_MM and before(tree.grid.heights, w, v, False):
+        if layout.triangles.vertices[w, 2] <= PLATE_TOLERANCE_MM and before(tree.grid.heights, w, v, False):
             return True
     return False
 
 
 @helper
 def count_pieces(tree: MergeTree, pieces: Ints) -> None:
-    """Components below each offset that do not reach the platform, by a tree from below."""
+    """Count the components below each offset that do not reach the plate, by a tree from below."""
     heights, n, standing = tree.grid.heights, tree.grid.columns, tree.layout.standing
     leaves = number_leaves(tree)
     joins, size = join_leaves(tree, leaves), len(leaves)
@@ -198,7 +201,7 @@ def count_pieces(tree: MergeTree, pieces: Ints) -> None:
 
 @helper
 def _count(begun: Ints, standing_from: Ints, joins: Ints, columns: Ints, pieces: Ints) -> None:
-    """Join leaves in the order of the offsets and count the components that hang free."""
+    """Join leaves in the order of the offsets and count the floating components."""
     size, n = len(begun), len(pieces)
     parent, stands = singletons(size), ints(size, 0)
     birth, _ = counting_sort(begun, n + 2)
@@ -225,10 +228,10 @@ def _count(begun: Ints, standing_from: Ints, joins: Ints, columns: Ints, pieces:
 
 @helper
 def find_contact_areas(tree: MergeTree, fragment: float, wanted: Ints, contact_area: Floats) -> None:
-    """Lower each offset's contact area, given as its section, to the least section of a piece above it that is at least
+    """Reduce each offset's contact area, initially its section, to the least section of a piece above it that is at least
     `fragment` steps high, by a tree from above.
 
-    Only at the wanted (n,) offsets.
+    Only at the requested (n,) offsets.
     """
     grid, corners = tree.grid, tree.layout.faces.corners
     heights, n, points = grid.heights, grid.columns, tree.layout.faces.points
@@ -253,7 +256,7 @@ def find_contact_areas(tree: MergeTree, fragment: float, wanted: Ints, contact_a
         top = i if p >= max(q, r) else (j if q >= r else k)
         leaf = int(tree.leaf[top])
         if leaf < 0:
-            leaf = find_leaf(tree, int(np.int64(top)))  # of the type that other calls have: one compilation serves all
+            leaf = find_leaf(tree, int(np.int64(top)))  # same type as in other calls, so that one compilation serves all
         for column in range(first, last):
             if several[column] < several[column + 1]:
                 piece = leaf
@@ -268,7 +271,7 @@ def find_contact_areas(tree: MergeTree, fragment: float, wanted: Ints, contact_a
 
 @helper
 def _find_lifetimes(leaves: Ints, joins: Ints, grid: OffsetGrid) -> tuple[Ints, Ints, Ints]:
-    """For every leaf: the column below which it begins, the one below which it has gone, and the leaf it goes into."""
+    """For every leaf: the column below which it begins, the column below which it has ended, and the leaf that it joins."""
     heights, n, size = grid.heights, grid.columns, len(leaves)
     begun, ended, elder, parent = ints(size, 0), ints(size, 0), singletons(size), singletons(size)
     for leaf in range(size):
@@ -287,7 +290,7 @@ def _find_lifetimes(leaves: Ints, joins: Ints, grid: OffsetGrid) -> tuple[Ints, 
 
 @helper
 def _count_several(begun: Ints, ended: Ints, wanted: Ints) -> Ints:
-    """(n + 1,) how many of the wanted columns before each have several pieces above them."""
+    """(n + 1,) number of requested columns before each column that have several pieces above them."""
     n = len(wanted)
     pieces, several = ints(n + 1, 0), ints(n + 1, 0)
     for leaf in range(len(begun)):
@@ -303,7 +306,7 @@ def _count_several(begun: Ints, ended: Ints, wanted: Ints) -> Ints:
 
 @no_nrt
 def _section(points: Floats, face: tuple[int, int, int], grid: OffsetGrid, column: int, ends: Floats) -> float:
-    """A face's share of the area within the section's outline: half the triangle of its crossing segment and the origin."""
+    """A face's share of the area within the section's outline: half the parallelogram of its crossing segment and the origin."""
     (i, j, k), heights, d = face, grid.heights, grid.direction
     for v, w in ((i, j), (j, k), (k, i)):
         if (heights[v] > column) != (heights[w] > column):

@@ -1,13 +1,13 @@
 """Cylinders: bores, pins and rounded corners of a model, fitted to its faces.
 
-A cylinder in a mesh is a row of flat strips. Every edge between two strips runs along the axis, and from its fold and the widths
-of the strips follows the radius: strips of the same width w that fold by an angle t lie on a circle of radius w / (2 sin(t /
+A cylinder in a mesh is a row of flat strips. Every edge between two strips runs along the axis, and the radius follows from its
+fold and the widths of the strips: strips of the same width w that fold by an angle t lie on a circle of radius w / (2 sin(t /
 2)).
 
         strip     edge
-      ________ . ________           edges of one strip that are parallel and tell of the same
+      ________ . ________           parallel edges of one strip that give the same
      /    w     t        \\          radius belong to one cylinder; a least-squares circle through
-    /                     \\         all of them (Kasa 1976) tells whether it is one
+    /                     \\         all of them (Kasa 1976) verifies it
 """
 
 from collections.abc import Sequence
@@ -23,26 +23,27 @@ from mdp.plane import Plane
 from mdp.topology.components import connected_components
 from mdp.topology.edges import opposites
 
-# Cosines of the angles by which two strips fold: a cylinder of eight sides does by 45 degrees, one of 900 by 0.4.
+# Cosines of the fold angles between strips: 45 degrees for a cylinder with eight sides, 0.4 for one with 900.
 LEAST_FOLD, MOST_FOLD = cos(radians(0.4)), cos(radians(46.0))
 PARALLEL = cos(radians(1.0))
-SAME_RADIUS = 1.25  # greatest ratio of two radii told by edges of one strip: strips are as wide as each other to a quarter
+SAME_RADIUS = 1.25  # greatest ratio of two radii given by edges of one strip: strips differ in width by at most a quarter
 LEAST_ASKEW = 0.05  # sine of some 3 degrees
-TOUCHED_MM = 0.05  # a plane that reaches no further into a cylinder leaves it as it is
-MOST_FACES = 200  # of a strip; one that is cut by other bores has some, a wall or a plate many
-TURNED_MM2 = 500.0  # of a turned body: one so large counts as a bore does when it is cut askew, a larger one more
+TOUCHED_MM = 0.05  # a plane that cuts no further into a cylinder leaves it intact
+MOST_FACES = 200  # of a strip; a strip cut by other bores has several, a wall or a plate many
+TURNED_MM2 = 500.0  # area of a turned body that counts like a bore when it is cut askew; larger ones count more
 SMOOTH = cos(radians(20.0))  # of the folds between the pieces of a bent pipe, and beside a band of a round surface
 SHORT = 0.15  # of the radius: a hole in a thin sheet is shorter, too, but its rims are sharp
-FEWEST = 4  # edges between strips: fewer are a chamfer or a fillet of three facets
+FEWEST = 4  # edges between strips: fewer are a chamfer, or a fillet of three facets
 OFF_CIRCLE = 0.02  # of the radius: the corners of a cylinder lie on it up to the rounding of a file
-LEAST_TURN_DEG = 100.0  # that the strips go around: a quarter is a rounded edge, which needs no fit
-LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = 0.7, 25.0, 6.0  # of screws, bearings, pegs; what is larger is the model's shape
+LEAST_TURN_DEG = 100.0  # covered by the strips: a quarter turn is a rounded edge, which needs no fit
+LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = 0.7, 25.0, 6.0  # of screws, bearings, pegs; larger ones are the model's shape
 
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
-    """A bore, a pin, or a whole turned body: unit axis (3,), the middle of it (3,), radius, half its length, whether the material
-    lies around it, (k,) its faces, and how many times it counts that it is cut askew."""
+    """A bore, a pin, or a whole turned body: unit axis (3,), its centre (3,), radius, half its length, whether the material
+    surrounds it, (k,) its faces, and the weight of cutting it askew.
+    """
 
     axis: Floats
     middle: Floats
@@ -53,18 +54,18 @@ class Cylinder:
     weight: float = 1.0
 
     def is_crossed(self, plane: Plane) -> bool:
-        """Whether a plane cuts it more askew than a layer would show."""
+        """Whether a plane cuts the cylinder visibly askew."""
         return crossed_by([self], plane) > LEAST_ASKEW
 
     def reaches_below(self, plane: Plane) -> bool:
-        """Whether something of it lies below a plane."""
+        """Whether any of the cylinder lies below a plane."""
         cosine = abs(float(plane.normal @ self.axis))
         reach_mm = self.half_mm * cosine + self.radius_mm * float(np.sqrt(max(1.0 - cosine * cosine, 0.0)))
         return float(plane.normal @ self.middle) - plane.offset_mm < reach_mm
 
     @property
     def in_words(self) -> str:
-        """What it is and how wide.
+        """Its kind and diameter in words.
 
         >>> Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, 5.0, True, np.zeros(0, np.int32)).in_words
         'a bore of 8 mm'
@@ -75,8 +76,9 @@ class Cylinder:
 
 @dataclass(frozen=True, eq=False)
 class _Folds:
-    """Edges between strips, one row each: the strips on both sides (e, 2), a face of each (e, 2), unit direction (e, 3), middle
-    (e, 3) and the radius that each tells."""
+    """Edges between strips, one row each: the strips on both sides (e, 2), a face of each (e, 2), unit direction (e, 3), centre
+    (e, 3) and the radius that each gives.
+    """
 
     strips: Indices
     faces: Indices
@@ -86,8 +88,8 @@ class _Folds:
 
 
 def crossings(cylinders: Sequence[Cylinder], directions: Floats, offsets_mm: Floats) -> Floats:
-    """(k, n) how many cylinders planes at (k, n) offsets along (k, 3) directions cut askew: each counts its weight times the sine
-    of the angle between axis and direction, for cut across its axis it stays round.
+    """(k, n) weighted number of cylinders cut askew by planes at (k, n) offsets along (k, 3) directions: each counts its weight
+    times the sine of the angle between axis and direction, since a cut square to its axis keeps it round.
 
     >>> upright = Cylinder(np.array([0.0, 0, 1]), np.zeros(3), 4.0, 5.0, True, np.zeros(0, np.int32))
     >>> crossings([upright], np.array([[1.0, 0, 0], [0, 0, 1]]), np.array([[3.9, 4.1], [4.9, 5.1]])).tolist()
@@ -104,13 +106,14 @@ def crossings(cylinders: Sequence[Cylinder], directions: Floats, offsets_mm: Flo
 
 
 def crossed_by(cylinders: Sequence[Cylinder], plane: Plane) -> float:
-    """The same for one plane."""
+    """Weighted number of cylinders that one plane cuts askew, see crossings."""
     return float(crossings(cylinders, plane.normal[None], np.array([[plane.offset_mm]]))[0, 0])
 
 
 def spoiled_by_cuts(mesh: Mesh) -> tuple[Cylinder, ...]:
-    """What cuts of a closed mesh should not pass askew: its bores, and the turned body that is hardly less than all of it. Pins
-    are left out: the arms and struts of a model look the same, and those are where it is cut."""
+    """The cylinders that cuts of a closed mesh should not pass askew: its bores, and the turned body that makes up nearly all of
+    it. Pins are left out: the arms and struts of a model look the same, and are where it is cut.
+    """
     bores = tuple(cylinder for cylinder in find_cylinders(mesh) if cylinder.is_bore)
     body = find_revolution(mesh)
     if body is None or not body.is_all:
@@ -120,10 +123,10 @@ def spoiled_by_cuts(mesh: Mesh) -> tuple[Cylinder, ...]:
 
 
 def find_cylinders(mesh: Mesh) -> tuple[Cylinder, ...]:
-    """The cylinders of a closed mesh, the first faces first."""
+    """The cylinders of a closed mesh, ordered by first face."""
     neighbours = opposites(mesh.faces).reshape(-1, 3) // 3
     strips, folds = _folds(mesh, neighbours)
-    label = connected_components(len(folds.radius_mm), *_alike(folds))
+    label = connected_components(len(folds.radius_mm), *_matching_folds(folds))
     order = np.argsort(label, kind="stable")
     rows = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     fitted = (_fit(mesh, strips, folds, row) for row in rows if len(row) >= FEWEST)
@@ -135,7 +138,7 @@ def find_cylinders(mesh: Mesh) -> tuple[Cylinder, ...]:
 
 
 def _is_band(mesh: Mesh, neighbours: Ints, cylinder: Cylinder) -> bool:
-    """Whether a short one is but a band of a round surface, which goes on smoothly at its rims."""
+    """Whether a short cylinder is only a band of a round surface, which continues smoothly at its rims."""
     if 2.0 * cylinder.half_mm > SHORT * cylinder.radius_mm:
         return False
     inside = np.isin(neighbours[cylinder.faces], cylinder.faces)
@@ -146,7 +149,7 @@ def _is_band(mesh: Mesh, neighbours: Ints, cylinder: Cylinder) -> bool:
 
 
 def _bent(mesh: Mesh, neighbours: Ints, cylinders: Sequence[Cylinder]) -> set[int]:
-    """Places of the cylinders that another one of their radius goes on from: pieces of a ring or a bent pipe."""
+    """Indices of the cylinders that continue in another one of the same radius: pieces of a ring or a bent pipe."""
     owner = np.full(len(mesh.faces), -1, np.int32)
     for place, cylinder in enumerate(cylinders):
         owner[cylinder.faces] = place
@@ -161,7 +164,7 @@ def _bent(mesh: Mesh, neighbours: Ints, cylinders: Sequence[Cylinder]) -> set[in
 
 
 def _folds(mesh: Mesh, neighbours: Ints) -> tuple[Indices, _Folds]:
-    """(m,) the strip that each face belongs to, and the edges at which a surface folds as between the strips of a cylinder."""
+    """(m,) strip of each face, and the edges at which a surface folds as between the strips of a cylinder."""
     face, corner = np.nonzero(neighbours >= 0)
     across = neighbours[face, corner]
     once = face < across
@@ -182,8 +185,9 @@ def _folds(mesh: Mesh, neighbours: Ints) -> tuple[Indices, _Folds]:
 
 
 def _widths_mm(mesh: Mesh, strips: Indices, face: Indices, along: Floats) -> Floats:
-    """(e,) how wide the strips that faces belong to are across (e, 3) directions along them; infinite where one has too many
-    faces to be a strip."""
+    """(e,) width of the strips that faces belong to, across (e, 3) directions along them; infinite for a strip with too many
+    faces.
+    """
     order, counts = np.argsort(strips, kind="stable"), np.bincount(strips, minlength=len(strips))
     starts, size = (np.cumsum(counts) - counts)[strips[face]], counts[strips[face]]
     size = np.where(size <= MOST_FACES, size, 1)
@@ -197,13 +201,13 @@ def _widths_mm(mesh: Mesh, strips: Indices, face: Indices, along: Floats) -> Flo
     return widths
 
 
-def _alike(folds: _Folds) -> tuple[Indices, Indices]:
-    """Pairs of edges that tell of one cylinder: of one strip, parallel, with the same radius."""
+def _matching_folds(folds: _Folds) -> tuple[Indices, Indices]:
+    """Pairs of edges that belong to one cylinder: of one strip, parallel, with equal radius."""
     strip, fold = folds.strips.ravel(), np.repeat(np.arange(len(folds.strips)), 2)
     order = np.argsort(strip, kind="stable")
     strip, fold = strip[order], fold[order]
     first, second = [], []
-    for apart in range(1, 4):  # of a strip that has more edges than four most are no strip's
+    for apart in range(1, 4):  # a region with more than four edges is usually no strip
         same = np.flatnonzero(strip[:-apart] == strip[apart:])
         a, b = fold[same], fold[same + apart]
         parallel = np.abs(np.einsum("ij,ij->i", folds.along[a], folds.along[b])) > PARALLEL
@@ -215,13 +219,13 @@ def _alike(folds: _Folds) -> tuple[Indices, Indices]:
 
 
 def _fit(mesh: Mesh, strips: Indices, folds: _Folds, rows: Indices) -> Cylinder | None:
-    """The cylinder through some edges; None where they lie on none."""
+    """The cylinder through some edges; None if they do not lie on one."""
     signs = np.sign(folds.along[rows] @ folds.along[rows[0]])
     axis = (folds.along[rows] * signs[:, None]).mean(axis=0)
     axis /= np.linalg.norm(axis)
     across = frame_across(axis)
     points = folds.middle[rows] @ across.T
-    # Kasa: |p|^2 = 2 c.p + (r^2 - |c|^2) is linear in the middle c
+    # Kasa: |p|^2 = 2 c.p + (r^2 - |c|^2) is linear in the centre c
     solved = np.linalg.lstsq(np.column_stack([2.0 * points, np.ones(len(points))]), (points**2).sum(axis=1), rcond=None)[0]
     centre = solved[:2]
     radius_mm = float(np.sqrt(max(solved[2] + centre @ centre, 0.0)))

@@ -1,7 +1,7 @@
-"""Facets: the table of a solid's faces, and its surface laid out for sweeping: near faces and vertices near in memory.
+"""Facets: the table of a solid's faces, and its surface arranged for sweeping, with neighbours close together in memory.
 
-What a sweep reads in a row lies in a row: a face's corner numbers, its normal and its area vector each as three long arrays, and
-around every vertex its neighbours in cyclic order.
+Data that a sweep reads in sequence is stored in sequence: the faces' corner numbers, normals and area vectors as three long
+arrays each, and the neighbours of every vertex in cyclic order.
 """
 
 from dataclasses import dataclass
@@ -14,26 +14,26 @@ from mdp.kernels.arrays import flags, ints, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints, Mesh, crosses_of
-from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
+from mdp.overhang import PLATE_TOLERANCE_MM, Mask
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
 from mdp.sweep.rays import TriangleTree, triangle_tree
 
-LEAST_ALTITUDE = 1e-8  # of a triangle, as a share of the largest coordinate: below, rounding may decide which corner is higher
+# altitude of a triangle, as a share of the largest coordinate, below which rounding may decide which corner is higher
+LEAST_ALTITUDE = 1e-8
 COSINE_MARGIN = 1e-6
-GRID_BITS = 16  # of the space-filling curve's cells along each axis
-UNKNOWN = -2  # anchor of a vertex that has not been looked up
+GRID_BITS = 16  # of the cells of the space-filling curve along each axis
+UNKNOWN = -2  # anchor of a vertex that has not been computed
 
 Indices = NDArray[np.uint32]
 
 
 class FaceTable(NamedTuple):
-    """The faces of a solid, each coordinate in a row of its own: points (3, n) of its vertices, corners (3, m), unit normals
-    (3, m).
+    """The faces of a solid, one row per coordinate: points (3, n) of its vertices, corners (3, m), unit normals (3, m).
 
-    For each face (m,): its area; sources, the face of the model that it is a piece of, below 0: a cut laid it open, it needs
-    support wherever it is risky; whether it is risky upright; counts, how many times an area counts that needs support;
-    seam_weights, how much a mm of rim counts, (0,): seams do not count; stair_weights, how much an area counts whose steps are
-    as high as a layer, (0,): stairs do not count.
+    For each face (m,): its area; sources, its source face in the model, negative if created by a cut, which needs support
+    wherever it is risky; whether it is risky upright; counts, the weight of area that needs support; seam_weights, the weight of
+    a mm of rim, (0,) if seams cost nothing; stair_weights, the weight of area whose steps are as high as a layer, (0,) if
+    stair-stepping costs nothing.
     """
 
     points: Floats
@@ -48,19 +48,20 @@ class FaceTable(NamedTuple):
 
     @property
     def counted_mm2(self) -> Floats:
-        """(m,) what each face counts where it needs support."""
+        """(m,) weighted area of each face if it needs support."""
         return self.areas_mm2 * self.counts
 
     def of_faces(self, chosen: NDArray[np.int64]) -> "FaceTable":
-        """The table of some of the faces, given by their numbers."""
+        """The table of a subset of the faces, given by number."""
         columns: list[Any] = [np.take(column, chosen, axis=-1) if column.size else column for column in self[1:]]
         return FaceTable(self.points, *columns)
 
 
-class Scars(NamedTuple):
-    """What blemishes a solid along each of (k, 3) directions: its faces, the cosine of normal and direction below which one is
-    risky, what the faces of the model need (k, n), how many times an area over air counts, by how much more a rim does on a
-    feather edge, and the faces that no cut can save (m,), (0,): not asked for."""
+class Blemishes(NamedTuple):
+    """Blemishes of a solid along each of (k, 3) directions: its faces, the cosine of normal and direction below which a face is
+    risky, the support classes of the model's faces (k, n), the weight of area over air, the extra weight of a rim on a feather
+    edge, and the faces that no cut can save (m,), (0,) if not requested.
+    """
 
     directions: Floats
     faces: FaceTable
@@ -72,28 +73,27 @@ class Scars(NamedTuple):
 
 
 @no_nrt
-def class_along(scars: Scars, row: int, f: int) -> int:
-    """What a face needs that is risky along a direction."""
-    source = scars.faces.sources[f]
-    return int(scars.classes[row, source]) if source >= 0 else NEEDS_SUPPORT
+def class_along(blemishes: Blemishes, row: int, f: int) -> int:
+    """Support class of a face that is risky along a direction."""
+    source = blemishes.faces.sources[f]
+    return int(blemishes.classes[row, source]) if source >= 0 else NEEDS_SUPPORT
 
 
 @no_nrt
-def times_along(scars: Scars, row: int, f: int) -> float:
-    """How many times the area of a face counts that is risky along a direction."""
-    needed = class_along(scars, row, f)
-    return scars.weight if needed == UNSUPPORTABLE else 1.0 if needed == NEEDS_SUPPORT else 0.0
+def times_along(blemishes: Blemishes, row: int, f: int) -> float:
+    """Weight of the area of a face that is risky along a direction."""
+    needed = class_along(blemishes, row, f)
+    return blemishes.weight if needed == UNSUPPORTABLE else 1.0 if needed == NEEDS_SUPPORT else 0.0
 
 
 class Layout(NamedTuple):
-    """A solid laid out for sweeps along any direction: its faces and boxes over them; vectors_mm2 (3, m), their normals times
+    """A solid arranged for sweeps along any direction: its faces and boxes over them; vectors_mm2 (3, m), their normals times
     areas; rising_edges (2, e), each with its lower end first, those with the lowest lower end first.
 
-    For the vertices: those next to v in cyclic order are neighbours[starts[v] : starts[v + 1]]; unit angle-weighted normals
-    (3, n), whose sign tells on which side the solid lies (Baerentzen, Aanaes); flatness (n,), see _flatness; sharp: numbers
-    3 f + k of the face corners where the normal of the vertex does not tell where the surface looks; those standing on the
-    platform; anchors (n,): the face that a ray into the solid meets, -1: none, UNKNOWN: not looked up, which the sweep does when
-    needed.
+    For the vertices: the neighbours of v in cyclic order are neighbours[starts[v] : starts[v + 1]]; unit angle-weighted normals
+    (3, n), whose sign gives the side of the solid (Baerentzen, Aanaes); flatness (n,), see _flatness; sharp: numbers 3 f + k of
+    the face corners at which the vertex normal does not represent the surface; standing: vertices on the build plate; anchors
+    (n,): the face that a ray into the solid meets, -1 if none, UNKNOWN until the sweep computes it.
     """
 
     faces: FaceTable
@@ -111,7 +111,9 @@ class Layout(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """The surface of a solid along a space-filling curve: its mesh, its faces, and (m,) their numbers in the solid's."""
+    """The surface of a solid ordered along a space-filling curve: its mesh, its face table, and (m,) the faces' numbers in the
+    solid.
+    """
 
     mesh: Mesh
     faces: FaceTable
@@ -119,7 +121,7 @@ class Facets:
 
     @classmethod
     def of(cls, mesh: Mesh, faces: FaceTable) -> "Facets":
-        """The surface of a mesh, whose faces are in its own order."""
+        """The facets of a mesh. faces: its face table in its own order."""
         low = mesh.bounds_mm[0]
         scale = (2**GRID_BITS - 1) / max(float((mesh.bounds_mm[1] - low).max()), 1e-12)
         order = np.argsort(_morton(mesh.vertices, low, scale), kind="stable")
@@ -131,7 +133,9 @@ class Facets:
         return cls(laid, faces.of_faces(turn)._replace(points=points, corners=corners), turn)
 
     def layout(self, cosine: float) -> Layout:
-        """The surface laid out; sharp: corners at vertices with a face that leans further than that from the vertex' normal."""
+        """The surface arranged for sweeping. cosine: a vertex is sharp if one of its faces deviates more than that from the
+        vertex normal.
+        """
         mesh, z = self.mesh, self.faces.points[2]
         starts, neighbours, single = _link(mesh.faces.flatten(), len(mesh.vertices))
         normals = _vertex_normals(mesh.vertices, mesh.faces, mesh.normals)
@@ -147,7 +151,7 @@ class Facets:
             vertex_normals=np.ascontiguousarray(normals.T),
             flatness=flatness,
             sharp=np.flatnonzero(flatness[mesh.faces] <= cosine).astype(np.int32),
-            standing=np.flatnonzero(z <= PLATFORM_TOLERANCE_MM).astype(np.int32),
+            standing=np.flatnonzero(z <= PLATE_TOLERANCE_MM).astype(np.int32),
             anchors=np.full(len(mesh.vertices), UNKNOWN, np.int32),
         )
 
@@ -162,7 +166,7 @@ def _rising_edges(faces: Ints, z: Floats) -> Indices:
 
 @kernel
 def _morton(points: Floats, low: Floats, scale: float) -> NDArray[np.int64]:
-    """Position along Morton's curve: near points get near numbers."""
+    """Position along Morton's curve, by which near points get near numbers."""
     codes = longs(len(points), 0)
     for v in range(len(points)):
         for axis in range(3):
@@ -174,9 +178,9 @@ def _morton(points: Floats, low: Floats, scale: float) -> NDArray[np.int64]:
 
 @kernel
 def _link(corners: Ints, size: int) -> tuple[NDArray[np.int64], Ints, Mask]:
-    """Starts and neighbours of all vertices, in cyclic order where they form a single ring, and whether they do.
+    """Starts and neighbours of all vertices, in cyclic order if they form a single ring, and whether they do.
 
-    corners: (3 m,) vertices of the faces, one face after the other.
+    corners: (3 m,) vertices of the faces, face by face.
     """
     starts, around = counting_sort(corners, size)
     first, second, single = ints(len(corners), 0), ints(len(corners), 0), flags(size)
@@ -198,10 +202,11 @@ def _link(corners: Ints, size: int) -> tuple[NDArray[np.int64], Ints, Mask]:
 
 
 def _flatness(mesh: Mesh, vertex_normals: Floats, least_mm: float) -> Floats:
-    """(n,) least cosine between a vertex' normal m and those of its faces, 0 if rounding decides; to be -1 without a single ring.
+    """(n,) least cosine between a vertex' normal m and those of its faces, 0 if rounding decides; the caller sets -1 for vertices
+    without a single ring.
 
-    A vertex with |d . m| below it is regular for the direction d: around it the surface is a graph over the plane across m
-    whose slope cannot outweigh d's part in that plane.
+    A vertex with |d . m| below it is regular for the direction d: around it the surface is a graph over the plane across m whose
+    slope cannot outweigh d's part in that plane.
     """
     corners = mesh.vertices[mesh.faces]
     longest = np.max([_squares(corners[:, k] - corners[:, k - 1]) for k in range(3)], axis=0)
@@ -221,7 +226,7 @@ def _squares(vectors: Floats) -> Floats:
 
 @kernel
 def _vertex_normals(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
-    """(n, 3) unit normals, those of the faces around each vertex weighted by their angles there."""
+    """(n, 3) unit vertex normals: the normals of the faces around each vertex, weighted by their angles there."""
     total = table(len(vertices), 3)
     for f in range(len(faces)):
         for k in range(3):

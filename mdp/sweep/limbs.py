@@ -1,5 +1,6 @@
-"""Limbs: which pieces above a plane would save something if they alone were cut off, what that would do, and which faces they
-have. The pieces themselves are followed by mdp.sweep.pieces (numba kernels)."""
+"""Limbs: the pieces above a plane that are worth cutting off alone, the effect of such a cut, and the faces of each piece.
+mdp.sweep.pieces traces the pieces (numba kernels).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from mdp.plane import Plane, normals_and_offsets
 from mdp.sweep.components import LEAST_CONTACT_AREA_MM2, before
 from mdp.sweep.crossing import find_heights
 from mdp.sweep.cylinders import Cylinder, crossed_by
-from mdp.sweep.facets import Layout, Scars
+from mdp.sweep.facets import Blemishes, Layout
 from mdp.sweep.pieces import (
     AREAS,
     MOMENT,
@@ -36,28 +37,29 @@ from mdp.sweep.pieces import (
     value,
     volume,
 )
-from mdp.sweep.sweep import Remainder, scars_of
+from mdp.sweep.sweep import Remainder, blemishes_of
 from mdp.topology.components import root
 
 MOST_JOINED = 6  # limbs that one plane cuts off together
 MOST_ROWS = 48  # candidates per direction
-SPAN = 8  # the best of this many adjacent offsets is kept per limb: at the best of all the head may collide
-TRADE_OFF = 2.0  # weight of the area left for ever against the area made safe when a limb's planes are compared
-SAME_MM2 = 1e-6  # squared distance up to which a point of a plane is a vertex
-KEPT = 8  # marked vertices of the last planes: one check of a plane asks for them several times
-# For planes: (k,) offsets, the points of their limbs (k, MOST_JOINED, 3), infinite for fewer, and how high a limb must be that
+SPAN = 8  # only the best of this many adjacent offsets is kept per limb: the head may collide at the best of all
+TRADE_OFF = 2.0  # weight of finally lost area against saved area when the planes of a limb are compared
+SAME_MM2 = 1e-6  # squared distance within which a point of a plane is a vertex
+KEPT = 8  # cached vertex masks of the last planes: one check of a plane needs its mask several times
+# For planes: (k,) offsets, the points of their limbs (k, MOST_JOINED, 3), infinite if unused, and the least height of a limb that
 # needs a contact area.
 PointedPlanes = tuple[Floats, Floats, float]
-# The best candidates of k directions: the numbers of their offsets and their keys, lower is better, infinite: not in use (k,
-# MOST_ROWS), and the highest vertex of each limb that the plane cuts off (k, MOST_ROWS, MOST_JOINED), NONE for fewer.
+# The best candidates of k directions: the numbers of their offsets and their keys, lower is better, infinite if unused (k,
+# MOST_ROWS), and the highest vertex of each limb that the plane cuts off (k, MOST_ROWS, MOST_JOINED), NONE if unused.
 LimbRows = tuple[Ints, Floats, Ints]
-CONTACT, LOWEST, EXISTS, ALONE = range(len(SUMS), len(SUMS) + 4)  # further columns beside the SUMS
+CONTACT, LOWEST, EXISTS, ALONE = range(len(SUMS), len(SUMS) + 4)  # further columns besides the SUMS
 
 
 class LimbGrid(NamedTuple):
-    """Where to look for limbs and what they must respect. directions (k, 3); step_mm of their offsets. For each direction:
-    least_height_mm (k,) least z of what is cut off; keep_mm (k, s, 2) offsets that planes must avoid. seam_mm, cut_mm2: see
-    CostTerms. least_interface_mm2: the smallest contact area of a limb that is at least `fragment` steps high."""
+    """Search grid for limbs and its constraints. directions (k, 3); step_mm of their offsets. For each direction: least_height_mm
+    (k,) least z of the limb; keep_mm (k, s, 2) offsets that planes must avoid. seam_mm, cut_mm2: see CostTerms.
+    least_interface_mm2: least contact area of a limb that is at least `fragment` steps high.
+    """
 
     directions: Floats
     step_mm: float
@@ -73,7 +75,8 @@ class LimbGrid(NamedTuple):
 
 class LimbCandidates(NamedTuple):
     """Limbs that may be worth a cut, best first: (r,) row of the direction, (r,) offset, and (r, MOST_JOINED) the highest vertex
-    of each limb that the plane cuts off, in the order of the facets, NONE for fewer."""
+    of each limb that the plane cuts off, in the order of the facets, NONE if unused.
+    """
 
     direction: Ints
     offset_mm: Floats
@@ -81,12 +84,11 @@ class LimbCandidates(NamedTuple):
 
 
 def find_limbs(remainder: Remainder, grid: LimbGrid, risky_below: float) -> LimbCandidates:
-    """The limbs that would save something if they alone were cut off. Planes with a single piece above them are whole cuts and
-    left out."""
+    """The limbs that are worth cutting off alone. Planes with a single piece above them are ordinary cuts and left out."""
     count = len(grid.directions)
     column, keys = np.zeros((count, MOST_ROWS), np.int32), np.full((count, MOST_ROWS), np.inf)
     tops = np.full((count, MOST_ROWS, MOST_JOINED), NONE, np.int32)
-    surface = scars_of(remainder, grid.directions, risky_below), remainder.layout
+    surface = blemishes_of(remainder, grid.directions, risky_below), remainder.layout
     in_threads(_find_limbs, count, surface, grid, (column, keys, tops))
     direction, place = np.nonzero(np.isfinite(keys))
     order = np.lexsort((place, direction, keys[direction, place]))
@@ -97,9 +99,9 @@ def find_limbs(remainder: Remainder, grid: LimbGrid, risky_below: float) -> Limb
 
 @dataclass(frozen=True, eq=False)
 class LimbSums:
-    """What cutting off limbs would do, (r,) each, named as in sweep.Gains and sweep.Sweep. contact_mm2: the smallest contact area
-    of a limb that is no fragment; exists: whether every limb still has something above its plane; alone: whether nothing else
-    has."""
+    """Sums for cuts of limbs, (r,) each, named as in sweep.Gains and sweep.Sweep. contact_mm2: least contact area of a limb that
+    is not a fragment; exists: whether every limb still has something above its plane; alone: whether nothing else lies above it.
+    """
 
     up_mm2: Floats
     residual_mm2: Floats
@@ -116,10 +118,11 @@ class LimbSums:
 
 
 def sum_limbs(remainder: Remainder, planes: Sequence[Plane], risky_below: float, fragment_mm: float) -> LimbSums:
-    """What cutting off the limbs of planes would do; nothing is cut. The points of the limbs must be vertices of them; limbs
-    lower than fragment_mm may have any contact area."""
+    """Sums over the limbs of planes, without cutting. The points of the limbs must be vertices of them; limbs lower than
+    fragment_mm may have any contact area.
+    """
     sums = np.zeros((len(planes), ALONE + 1))
-    surface = scars_of(remainder, normals_and_offsets(planes)[0], risky_below), remainder.layout
+    surface = blemishes_of(remainder, normals_and_offsets(planes)[0], risky_below), remainder.layout
     in_threads(_sum_limbs, len(planes), surface, _pointed(planes, fragment_mm), sums)
     crossed = [crossed_by(cylinders_cut(remainder, remainder.cylinders, plane), plane) for plane in planes]
     columns: list[Any] = [*sums.T[:EXISTS], sums[:, EXISTS] > 0.0, sums[:, ALONE] > 0.0, np.array(crossed)]
@@ -136,31 +139,33 @@ def _pointed(planes: Sequence[Plane], fragment_mm: float) -> PointedPlanes:
 
 @lru_cache(KEPT)
 def limb_vertices(remainder: Remainder, plane: Plane) -> Mask:
-    """(n,) the vertices that a plane cuts off a solid, in the order of its facets; read-only. A limb is the piece with the vertex
-    nearest to its point."""
+    """(n,) vertices that a plane cuts off a solid, in the order of its facets; read-only. A limb is the piece with the vertex
+    nearest to its point.
+    """
     if plane.limbs_mm is None:
         marked: Mask = plane.heights_mm(remainder.facets.mesh.vertices) > 0.0
     else:
-        scars = scars_of(remainder, plane.normal[None], 0.0)
-        marked = _mark_limbs(scars, remainder.layout, _pointed([plane], 0.0))
+        blemishes = blemishes_of(remainder, plane.normal[None], 0.0)
+        marked = _mark_limbs(blemishes, remainder.layout, _pointed([plane], 0.0))
     marked.setflags(write=False)
     return marked
 
 
 def limb_faces(remainder: Remainder, plane: Plane) -> Mask:
-    """(m,) the faces of a solid, in the order of its mesh, that reach into what a plane cuts off."""
+    """(m,) faces of a solid, in the order of its mesh, that extend into the part that a plane cuts off."""
     return _faces_with(remainder, limb_vertices(remainder, plane))
 
 
 def limb_mesh(remainder: Remainder, plane: Plane) -> Mesh:
-    """The faces of a solid that reach into what a plane cuts off, not cut at the plane: the mesh is open below."""
+    """The faces of a solid that extend into the part that a plane cuts off, not trimmed at the plane: the mesh is open below."""
     used, faces = np.unique(remainder.mesh.faces[limb_faces(remainder, plane)], return_inverse=True)
     return Mesh(remainder.mesh.vertices[used], faces.reshape(-1, 3).astype(np.int32))
 
 
 def limb_reach(remainder: Remainder, plane: Plane) -> Mask:
-    """(m,) the faces of a solid, in the order of its mesh, that a plane may cut when it is moved a little: those of its limbs,
-    and those below it from which the steepest way up leads into a limb. Without limbs all faces."""
+    """(m,) faces of a solid, in the order of its mesh, that a plane may cut when it is moved a little: those of its limbs, and
+    faces below it from which the steepest ascent leads into a limb; all faces for a plane without limbs.
+    """
     if plane.limbs_mm is None:
         return np.ones(len(remainder.mesh.faces), np.bool_)
     facets = remainder.facets
@@ -170,7 +175,7 @@ def limb_reach(remainder: Remainder, plane: Plane) -> Mask:
 
 
 def _faces_with(remainder: Remainder, marked: Mask) -> Mask:
-    """(m,) the faces of a solid, in the order of its mesh, with any marked vertex; marked (n,) in the order of its facets."""
+    """(m,) faces of a solid, in the order of its mesh, with any marked vertex. marked: (n,) in the order of its facets."""
     facets = remainder.facets
     faces = np.zeros(len(remainder.mesh.faces), np.bool_)
     faces[facets.order] = marked[facets.mesh.faces].any(axis=1)
@@ -179,7 +184,7 @@ def _faces_with(remainder: Remainder, marked: Mask) -> Mask:
 
 @kernel
 def _spread_down(highest_first: Indices, heights: Floats, layout: Layout, marked: Mask) -> None:
-    """Mark each vertex below the plane like the highest of its neighbours."""
+    """Give each vertex below the plane the mark of its highest neighbour."""
     for v in highest_first:
         if heights[v] <= 0.0:
             highest = v
@@ -190,7 +195,7 @@ def _spread_down(highest_first: Indices, heights: Floats, layout: Layout, marked
 
 
 def cylinders_cut(remainder: Remainder, cylinders: tuple[Cylinder, ...], plane: Plane) -> tuple[Cylinder, ...]:
-    """Those of some cylinders that have a face in what a plane cuts off."""
+    """The cylinders with a face in the part that a plane cuts off."""
     if plane.limbs_mm is None or not cylinders:
         return cylinders
     sources = np.unique(remainder.faces.sources[limb_faces(remainder, plane)])
@@ -199,7 +204,7 @@ def cylinders_cut(remainder: Remainder, cylinders: tuple[Cylinder, ...], plane: 
 
 @no_nrt
 def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
-    """What cutting off a piece would gain and lose, without the cost of a cut; seam_mm: for a RIM in steps."""
+    """Gain and loss of cutting off a piece, without the cost per cut. seam_mm: cost of a RIM in steps."""
     stairs, seam = value(pieces, piece, STAIRS), seam_mm * value(pieces, piece, RIM)
     residual = value(pieces, piece, RESIDUAL) + stairs + seam
     stairs_up = value(pieces, piece, STAIRS_UP)
@@ -208,8 +213,9 @@ def _costs(pieces: Pieces, piece: int, seam_mm: float) -> tuple[float, float]:
 
 @no_nrt
 def _keep_row(out: LimbRows, row: int, key: float, column: int, tops: Ints) -> None:
-    """Keep a candidate if it is the best of its limbs within a span of offsets; in a full table the worst one makes room. One of
-    infinite key is left out."""
+    """Keep a candidate if it is the best of its limbs within a span of offsets; in a full table it replaces the worst one. A
+    candidate with an infinite key is dropped.
+    """
     columns, keys, kept_tops = out[0][row], out[1][row], out[2][row]
     same, worst = NONE, 0
     for k in range(MOST_ROWS):
@@ -227,7 +233,7 @@ def _keep_row(out: LimbRows, row: int, key: float, column: int, tops: Ints) -> N
 
 @no_nrt
 def _is_allowed(grid: LimbGrid, row: int, offset_mm: float) -> bool:
-    """Whether a plane avoids the zones that stay whole."""
+    """Whether a plane avoids the [[keep]] zones."""
     allowed = True
     for span in range(grid.keep_mm.shape[1]):
         allowed = allowed and not (grid.keep_mm[row, span, 0] < offset_mm and offset_mm < grid.keep_mm[row, span, 1])
@@ -236,7 +242,7 @@ def _is_allowed(grid: LimbGrid, row: int, offset_mm: float) -> bool:
 
 @no_nrt
 def _may_be_cut(pieces: Pieces, piece: int, column: int, grid: LimbGrid, least_mm: float) -> bool:
-    """Whether the head clears the table under a piece, and its contact area is large enough."""
+    """Whether the head clears the table under a piece and its contact area is large enough."""
     if min(pieces.low[piece, 0], pieces.low[piece, 1]) < least_mm:
         pieces.low[piece, 0] = -np.inf  # below this column it never clears the table again
     high = pieces.heights[pieces.top[piece]] - column >= grid.fragment
@@ -246,14 +252,14 @@ def _may_be_cut(pieces: Pieces, piece: int, column: int, grid: LimbGrid, least_m
 
 @no_nrt
 def _rank(gain: float, lost: float, grid: LimbGrid) -> float:
-    """The key of a candidate, infinite where it gains too little. gain, lost: without the cost of a cut."""
+    """The key of a candidate, infinite if it gains too little. gain, lost: without the cost per cut."""
     gain, lost = gain - grid.cut_mm2, lost + grid.cut_mm2
     return TRADE_OFF * lost - gain if gain >= grid.least_gain_mm2 else np.inf
 
 
 @no_nrt
 def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: LimbGrid, tops: tuple[Ints, Ints]) -> None:
-    """Keep every piece above a column that gains enough, and all that gain together where they are several but not all.
+    """Keep every piece above a column that gains enough, and all gaining pieces together if they are several but not all.
 
     place: row and column; tops: scratch arrays for the vertices of several limbs and of one.
     """
@@ -282,10 +288,10 @@ def _offer_pieces(out: LimbRows, place: tuple[int, int], pieces: Pieces, grid: L
 
 
 @kernel
-def _find_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], grid: LimbGrid, out: LimbRows) -> None:
-    """Fill the candidates of some directions."""
-    scars, layout = surface
-    pieces, tops, step_mm = make_pieces(scars, layout), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE)), grid.step_mm
+def _find_limbs(begin_row: int, end_row: int, surface: tuple[Blemishes, Layout], grid: LimbGrid, out: LimbRows) -> None:
+    """Fill the candidates of a range of directions."""
+    blemishes, layout = surface
+    pieces, tops, step_mm = make_pieces(blemishes, layout), (ints(MOST_JOINED, NONE), ints(MOST_JOINED, NONE)), grid.step_mm
     for row in range(begin_row, end_row):
         first, n = find_heights(layout.faces.points, grid.directions[row], step_mm, pieces.heights)
         if n == 0 or not np.isfinite(grid.least_height_mm[row]):
@@ -300,8 +306,8 @@ def _find_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], gri
 
 
 @kernel
-def _sum_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], planes: PointedPlanes, out: Floats) -> None:
-    """Fill the rows of some planes with the SUMS over their limbs and what else LimbSums has."""
+def _sum_limbs(begin_row: int, end_row: int, surface: tuple[Blemishes, Layout], planes: PointedPlanes, out: Floats) -> None:
+    """Fill the rows of a range of planes with the SUMS over their limbs and the further columns of LimbSums."""
     pieces = make_pieces(surface[0], surface[1])
     for row in range(begin_row, end_row):
         chosen = _find_chosen(pieces, row, planes, SAME_MM2)
@@ -320,9 +326,9 @@ def _sum_limbs(begin_row: int, end_row: int, surface: tuple[Scars, Layout], plan
 
 
 @kernel
-def _mark_limbs(scars: Scars, layout: Layout, planes: PointedPlanes) -> Mask:
-    """(n,) the vertices of the limbs of one plane."""
-    pieces = make_pieces(scars, layout)
+def _mark_limbs(blemishes: Blemishes, layout: Layout, planes: PointedPlanes) -> Mask:
+    """(n,) vertices of the limbs of one plane."""
+    pieces = make_pieces(blemishes, layout)
     marked, chosen = flags(len(pieces.heights)), _find_chosen(pieces, 0, planes, np.inf)
     for v in range(len(marked)):
         if pieces.parent[v] >= 0:
@@ -334,9 +340,10 @@ def _mark_limbs(scars: Scars, layout: Layout, planes: PointedPlanes) -> Mask:
 
 @helper
 def _find_chosen(pieces: Pieces, row: int, planes: PointedPlanes, farthest_mm2: float) -> Ints:
-    """The pieces that the points of a plane lie on, lowered to its offset; none where any of the points lies on none within that
-    squared distance."""
-    d, points, heights = pieces.scars.directions[row], pieces.layout.faces.points, pieces.heights
+    """The pieces selected by the points of a plane, descended to its offset; empty if a point has no piece within the given
+    squared distance.
+    """
+    d, points, heights = pieces.blemishes.directions[row], pieces.layout.faces.points, pieces.heights
     offsets_mm, limb_points, _ = planes
     dot(points[0], points[1], points[2], d, heights)
     for v in range(len(heights)):
@@ -360,7 +367,7 @@ def _find_chosen(pieces: Pieces, row: int, planes: PointedPlanes, farthest_mm2: 
 
 @no_nrt
 def _nearest(point: Floats, points: Floats, parent: Ints, farthest_mm2: float) -> int:
-    """The vertex above the plane that is nearest to a point; NONE where none is within the distance."""
+    """The vertex above the plane that is nearest to a point; NONE if none is within the distance."""
     nearest, least = NONE, farthest_mm2
     for v in range(len(parent)):
         if parent[v] >= 0:

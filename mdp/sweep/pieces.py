@@ -1,9 +1,9 @@
 """Pieces: the connected pieces of a solid above a plane that moves down through it, and the sums over each (numba kernels).
 
-Vertices that come to lie above the plane join their neighbours above it (union-find). A face that comes to lie wholly above adds
-its sums to those of its piece; faces that cross the plane add the shares above it at every offset anew. The first vertex of a
-void has solid above it and joins the surface that a ray into the solid hits. The work along a direction is therefore linear in
-vertices, faces and crossings, as in the sweep.
+A vertex that has been passed joins its neighbours above the plane (union-find). A face wholly above adds its sums to those of its
+piece; faces that cross the plane add their shares above it at every offset. The first vertex of a void has solid above it and
+joins the surface that a ray into the solid meets. The work per direction is linear in vertices, faces and crossings, as in the
+sweep.
 """
 
 from typing import NamedTuple
@@ -17,27 +17,27 @@ from mdp.mesh import Floats, Indices, Ints
 from mdp.overhang import step_share
 from mdp.sweep.components import anchor_of, before
 from mdp.sweep.crossing import Ramp, chord_at, column_over, moment_above, ramp_of, share_above, weigh_chord
-from mdp.sweep.facets import Layout, Scars, times_along
+from mdp.sweep.facets import Blemishes, Layout, times_along
 from mdp.topology.components import root
 
 NONE = -1
 SUMS = UP, RESIDUAL, STAIRS_UP, STAIRS, SECTION, MOMENT, RIM = 0, 1, 2, 3, 4, 5, 6
-Sorted = tuple[Indices, Indices]  # where those of each column start, and all of them, column by column
+Sorted = tuple[Indices, Indices]  # the starts of each column, and all items, column by column
 Order = tuple[Sorted, Sorted]  # vertices and faces in the order in which the plane passes them
 AREAS = 5  # the first five sums are areas: a face that crosses the plane adds the share above it
 
 
 class Pieces(NamedTuple):
-    """The pieces of a solid above a plane, and what blemishes it. For each vertex: heights (n,) along the direction in steps;
-    cosines (n,) of its normal with the direction; parent (n,) by union-find, NONE while it lies below the plane.
+    """The pieces of a solid above a plane, and its blemishes. For each vertex: heights (n,) along the direction in steps; cosines
+    (n,) of its normal with the direction; parent (n,) by union-find, NONE while it lies below the plane.
 
-    weights (m, 7): what each face adds to the SUMS. For the vertex that stands for a piece: whole (n, 7) the SUMS of its faces
-    wholly above; crossing (n, 7) those of the shares of faces that cross the plane; top (n,) its highest vertex; low (n, 2) its
-    least z, among vertices and on the plane. live: vertices that stand for a piece, or did once; active: the faces that cross the
+    weights (m, 7): contribution of each face to the SUMS. For the representative vertex of a piece: whole (n, 7) the SUMS of its
+    faces wholly above; crossing (n, 7) the SUMS of the shares of crossing faces; top (n,) its highest vertex; low (n, 2) its
+    least z, among vertices and on the plane. live: vertices that represent a piece, or did once; active: the faces that cross the
     plane; counts (2,): of live and active.
     """
 
-    scars: Scars
+    blemishes: Blemishes
     layout: Layout
     heights: Floats
     cosines: Floats
@@ -53,19 +53,20 @@ class Pieces(NamedTuple):
 
 
 @helper
-def make_pieces(scars: Scars, layout: Layout) -> Pieces:
-    """Room for the pieces of a solid."""
+def make_pieces(blemishes: Blemishes, layout: Layout) -> Pieces:
+    """Empty arrays for the pieces of a solid."""
     size, faces = layout.faces.points.shape[1], layout.faces.corners.shape[1]
     heights, cosines, parent, top, low = floats(size, 0.0), floats(size, 0.0), ints(size, NONE), ints(size, 0), table(size, 2)
     weights, whole, crossing = table(faces, len(SUMS)), table(size, len(SUMS)), table(size, len(SUMS))
     live, active, counts = ints(size, 0), ints(faces, 0), ints(2, 0)
-    return Pieces(scars, layout, heights, cosines, parent, weights, whole, crossing, top, low, live, active, counts)
+    return Pieces(blemishes, layout, heights, cosines, parent, weights, whole, crossing, top, low, live, active, counts)
 
 
 @helper
 def begin(pieces: Pieces, row: int, columns: int) -> Order:
-    """Lay out vertices and faces along a direction of the scars, the plane above all of them. pieces.heights are set already."""
-    normals, corners, d = pieces.layout.vertex_normals, pieces.layout.faces.corners, pieces.scars.directions[row]
+    """Sort vertices and faces along a direction of the blemishes, with the plane above all of them. pieces.heights must be
+    set."""
+    normals, corners, d = pieces.layout.vertex_normals, pieces.layout.faces.corners, pieces.blemishes.directions[row]
     over, face_over = ints(len(pieces.heights), 0), ints(corners.shape[1], 0)
     for v in range(len(over)):
         over[v] = min(column_over(pieces.heights[v]), columns)
@@ -74,13 +75,13 @@ def begin(pieces: Pieces, row: int, columns: int) -> Order:
     for f in range(len(face_over)):
         face_over[f] = max(over[corners[0, f]], over[corners[1, f]], over[corners[2, f]])
     pieces.counts[0] = pieces.counts[1] = 0
-    _weigh_faces(pieces.scars, row, d, pieces.weights)
+    _weigh_faces(pieces.blemishes, row, d, pieces.weights)
     return counting_sort(over, columns + 1), counting_sort(face_over, columns + 1)
 
 
 @helper
 def descend(pieces: Pieces, column: int, order: Order) -> None:
-    """Move the plane down to a column from the one above it."""
+    """Move the plane down to the next column."""
     (starts, vertices), (face_starts, faces) = order
     _enter(pieces, vertices[starts[column + 1] : starts[column + 2]])
     for at in range(face_starts[column + 1], face_starts[column + 2]):
@@ -110,7 +111,7 @@ def _add(sums: Floats, a: int, other: Floats, b: int) -> None:
 
 @no_nrt
 def _join(pieces: Pieces, a: int, b: int) -> None:
-    """Join the pieces of two vertices; the lesser of the vertices that stand for them stands for both."""
+    """Join the pieces of two vertices; the lesser of their representatives represents both."""
     p, q = root(pieces.parent, a), root(pieces.parent, b)
     if p == q:
         return
@@ -125,7 +126,7 @@ def _join(pieces: Pieces, a: int, b: int) -> None:
 
 @helper
 def _enter(pieces: Pieces, vertices: Indices) -> None:
-    """Begin a piece at each vertex that comes to lie above the plane, and join it to its neighbours there."""
+    """Begin a piece at each vertex that the plane has passed, and join it to its neighbours above."""
     layout = pieces.layout
     starts, neighbours = layout.starts, layout.neighbours
     for v in vertices:
@@ -152,18 +153,18 @@ def _enter(pieces: Pieces, vertices: Indices) -> None:
 
 
 @helper
-def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
-    """What each face, when it lies wholly above, adds to the SUMS of its piece; MOMENT is left out, RIM is a weight."""
-    faces = scars.faces
+def _weigh_faces(blemishes: Blemishes, row: int, d: Floats, weights: Floats) -> None:
+    """Contribution of each face, when it lies wholly above, to the SUMS of its piece; without MOMENT; RIM is a weight."""
+    faces = blemishes.faces
     normals, areas = faces.normals, faces.areas_mm2
     for f in range(len(areas)):
         cosine, counted = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2], areas[f] * faces.counts[f]
         weights[f, UP] = counted if faces.risky[f] else 0.0
-        weights[f, RESIDUAL] = counted * times_along(scars, row, f) if cosine < scars.risky_below else 0.0
+        weights[f, RESIDUAL] = counted * times_along(blemishes, row, f) if cosine < blemishes.risky_below else 0.0
         weights[f, SECTION] = areas[f] * cosine
         weights[f, STAIRS_UP], weights[f, STAIRS], weights[f, RIM] = 0.0, 0.0, 0.0
         if len(faces.seam_weights) > 0:
-            weights[f, RIM] = 2.0 * areas[f] * faces.seam_weights[f] * weigh_chord(cosine, scars.feather)
+            weights[f, RIM] = 2.0 * areas[f] * faces.seam_weights[f] * weigh_chord(cosine, blemishes.feather)
         if len(faces.stair_weights) > 0:
             weights[f, STAIRS_UP] = areas[f] * faces.stair_weights[f] * step_share(normals[2, f])
             weights[f, STAIRS] = areas[f] * faces.stair_weights[f] * step_share(cosine)
@@ -171,7 +172,7 @@ def _weigh_faces(scars: Scars, row: int, d: Floats, weights: Floats) -> None:
 
 @no_nrt
 def _cross(pieces: Pieces, column: int) -> None:
-    """Add the faces that have come to lie wholly above a column to their pieces, and the shares of those that cross it."""
+    """Add the faces that now lie wholly above a column to their pieces, and the shares of those that cross it."""
     surface, heights, c = pieces.layout.triangles, pieces.heights, float(column)
     faces, points = surface.faces, surface.vertices
     _forget_crossing(pieces)
@@ -185,7 +186,7 @@ def _cross(pieces: Pieces, column: int) -> None:
         if ramp[0] > c:
             _add(pieces.whole, own, pieces.weights, f)
             pieces.whole[own, MOMENT] += pieces.weights[f, SECTION] * (p + q + r) / 3.0
-            pieces.whole[own, RIM] = 0.0  # only faces that cross have a rim
+            pieces.whole[own, RIM] = 0.0  # only crossing faces have a rim
             continue
         pieces.active[still] = f
         still += 1
@@ -200,7 +201,7 @@ def _cross(pieces: Pieces, column: int) -> None:
 
 @no_nrt
 def _forget_crossing(pieces: Pieces) -> None:
-    """Clear what the pieces have from faces that cross, and drop the vertices that stand for a piece no longer."""
+    """Clear the contributions of crossing faces, and drop vertices that no longer represent a piece."""
     still = 0
     for at in range(pieces.counts[0]):
         v = pieces.live[at]

@@ -1,4 +1,4 @@
-"""Rays: the first face that a ray meets, and how far places lie from a surface, over a tree of boxes."""
+"""Rays: the first face that a ray meets, and distances of points from a surface, by a tree of boxes."""
 
 from typing import NamedTuple
 
@@ -11,11 +11,12 @@ from mdp.mesh import Floats, Ints, Mesh
 
 LEAF_FACES = 4
 DEPTH = 64
-ANY_FACE = -2.0  # no cosine is less
+ANY_FACE = -2.0  # below any cosine
 
 
 class TriangleTree(NamedTuple):
-    """A surface's triangles in spatial order, and boxes over them: node k has the children 2k and 2k + 1, each leaf LEAF_FACES.
+    """A surface's triangles in spatial order, and boxes over them: node k has the children 2k and 2k + 1, each leaf has
+    LEAF_FACES faces.
 
     vertices (n, 3), faces (m, 3), unit normals (m, 3); least and greatest corners low and high (2 leaves, 3) of the boxes.
     """
@@ -92,10 +93,11 @@ def _distance(p: Floats, q: Floats, r: Floats, origin: Floats, ray: Floats) -> f
 
 @helper
 def first_hit(tree: TriangleTree, placed_ray: Floats, reach: float, own_vertex: int, facing: float, enough: float) -> int:
-    """The first face that a ray, its origin and unit direction (2, 3), meets within reach and whose normal has at least the
-    cosine `facing` with it; -1: none.
+    """The first face that a ray, given by origin and unit direction (2, 3), meets within reach and whose normal has at least the
+    cosine `facing` with the direction; -1 if none.
 
-    The faces around own_vertex are left out (-1: around none). A face that is nearer than `enough` will do, first or not.
+    Faces around own_vertex are ignored (-1: none). A face nearer than `enough` is returned at once, whether or not it is the
+    first.
     """
     vertices, faces, normals, origin, ray = tree.vertices, tree.faces, tree.normals, placed_ray[0], placed_ray[1]
     leaves = len(tree.low) // 2
@@ -129,8 +131,8 @@ def first_hit(tree: TriangleTree, placed_ray: Floats, reach: float, own_vertex: 
 
 
 def faces_met(tree: TriangleTree, rays: Floats, reach: float, facing: float = ANY_FACE, in_turn: bool = False) -> Ints:
-    """(n,) the first face that each ray, its origin and unit direction (n, 2, 3), meets within reach and whose normal has at
-    least the cosine `facing` with it; -1: none.
+    """(n,) first face that each ray, given by origin and unit direction (n, 2, 3), meets within reach and whose normal has at
+    least the cosine `facing` with the direction; -1 if none.
 
     in_turn: on one core, for a process that has no threads.
     """
@@ -152,8 +154,8 @@ def _find_met(begin: int, end: int, tree: TriangleTree, rays: tuple[Floats, floa
 def blocked_shares(
     tree: TriangleTree, framed_places: tuple[Floats, Floats], rays: Floats, reach_mm: float, in_turn: bool = False
 ) -> Floats:
-    """(n,) the share of rays that meet the surface within reach, given in the frame of each place: (n, 3) places and (n, 3, 3)
-    frames, whose rows are their axes.
+    """(n,) share of rays, given in each point's frame, that meet the surface within reach. framed_places: (n, 3) points and (n,
+    3, 3) frames with their axes as rows.
 
     in_turn: on one core, for a process that has no threads.
     """
@@ -166,7 +168,7 @@ def blocked_shares(
 
 
 def frames_about(normals: Floats) -> Floats:
-    """(n, 3, 3) a frame for each unit vector (n, 3), which is its third row (Duff et al. 2017)."""
+    """(n, 3, 3) a frame for each unit vector (n, 3), its third row (Duff et al. 2017)."""
     x, y, z = normals.T
     sign = np.where(z >= 0.0, 1.0, -1.0)
     a = -1.0 / (sign + z)
@@ -189,8 +191,8 @@ def _find_blocked(begin: int, end: int, tree: TriangleTree, bundles: tuple[Float
 
 
 def nearest_faces(surface: Mesh, places: Floats, reach_mm: float) -> tuple[Floats, Ints]:
-    """(n,) distances of places (n, 3) from a mesh whose faces are in spatial order, mm, and (n,) the nearest faces; reach_mm and
-    face 0 for places that lie farther."""
+    """(n,) distances of points (n, 3) from a mesh whose faces are in spatial order, mm, and (n,) the nearest faces; reach_mm and
+    face 0 for points farther away."""
     squares, nearest = np.full(len(places), reach_mm * reach_mm), np.zeros(len(places), np.int32)
     in_threads(_find_nearest, len(places), triangle_tree(surface), places, squares, nearest)
     return np.sqrt(squares), nearest
@@ -198,7 +200,7 @@ def nearest_faces(surface: Mesh, places: Floats, reach_mm: float) -> tuple[Float
 
 @kernel
 def _find_nearest(begin: int, end: int, tree: TriangleTree, places: Floats, squares: Floats, nearest: Ints) -> None:
-    """Lower the squares to those of the distances of the places from the surface, and note the nearest faces."""
+    """Reduce the squared distances of points to those from the surface, and store the nearest faces."""
     vertices, faces, leaves = tree.vertices, tree.faces, len(tree.low) // 2
     stack = ints(DEPTH, 1)
     for k in range(begin, end):
@@ -225,7 +227,7 @@ def _find_nearest(begin: int, end: int, tree: TriangleTree, places: Floats, squa
 
 @no_nrt
 def _from_box(tree: TriangleTree, node: int, place: Floats) -> float:
-    """Squared distance of a place from a node's box."""
+    """Squared distance of a point from a node's box."""
     total = 0.0
     for axis in range(3):
         off = max(0.0, tree.low[node, axis] - place[axis], place[axis] - tree.high[node, axis])
@@ -235,14 +237,14 @@ def _from_box(tree: TriangleTree, node: int, place: Floats) -> float:
 
 @no_nrt
 def _from_face(p: Floats, q: Floats, r: Floats, place: Floats) -> float:
-    """Squared distance of a place from a triangle: from its plane where the place lies over it, else from its nearest edge."""
+    """Squared distance of a point from a triangle: from its plane if the point lies over it, else from its nearest edge."""
     ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     vx, vy, vz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
     x, y, z = place[0] - p[0], place[1] - p[1], place[2] - p[2]
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     size = nx * nx + ny * ny + nz * nz
     if size > 0.0:
-        # Barycentric coordinates of the place's shadow on the plane.
+        # Barycentric coordinates of the point's projection on the plane.
         b = ((y * vz - z * vy) * nx + (z * vx - x * vz) * ny + (x * vy - y * vx) * nz) / size
         c = ((uy * z - uz * y) * nx + (uz * x - ux * z) * ny + (ux * y - uy * x) * nz) / size
         if b >= 0.0 and c >= 0.0 and b + c <= 1.0:
@@ -253,7 +255,7 @@ def _from_face(p: Floats, q: Floats, r: Floats, place: Floats) -> float:
 
 @no_nrt
 def _from_edge(p: Floats, q: Floats, place: Floats) -> float:
-    """Squared distance of a place from a line between two points."""
+    """Squared distance of a point from the segment between two points."""
     along, length = 0.0, 0.0
     for axis in range(3):
         along += (place[axis] - p[axis]) * (q[axis] - p[axis])

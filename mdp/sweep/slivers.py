@@ -1,8 +1,8 @@
-"""Slivers: how near a plane comes to what it would leave too thin to print, or to what is thin already.
+"""Slivers: distance of a plane from surfaces that it would cut too thin to print, and from thin walls.
 
 A surface nearly level with the plane and close to it becomes a sliver. A fin, a bridge or a plate is thin by itself: a plane
-through it leaves an interface no wider than it is thick. A face is thin when a ray from its middle into the solid soon meets one
-that looks the other way; near an acute edge the other face looks aside, that is no thin wall.
+through it leaves an interface no wider than its thickness. A face is thin if a ray from its centre into the solid soon meets a
+face with the opposite normal; near an acute edge the other face is not opposite, so that is not a thin wall.
 """
 
 import numpy as np
@@ -17,8 +17,8 @@ from mdp.sweep.facets import Facets, Layout
 from mdp.sweep.rays import TriangleTree, faces_met
 
 THIN_MM = 1.0  # walls and rods of two lines or less are fragile where a plane crosses them
-SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a sliver when the plane comes too near
-OPPOSITE_COSINE = 0.8  # two faces of one wall or rod look opposite ways, within 37 degrees
+SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane becomes a sliver if the plane comes too near
+OPPOSITE_COSINE = 0.8  # the two faces of a wall or rod have opposite normals, within 37 degrees
 
 
 @no_nrt
@@ -32,10 +32,10 @@ def _note(cosine: float, height: float, n: int, above: Floats, below: Floats) ->
 
 @helper
 def find_slivers(layout: Layout, grid: OffsetGrid, cosines: Floats, fragile: Floats) -> None:
-    """Distance from each offset up to the next surface looking along the direction and down to the next one looking against it.
+    """Distance from each offset up to the next surface facing along the direction, and down to the next one facing against it.
 
-    Where the surface is smooth the normal of a vertex tells where it looks, at an edge or corner those of its faces do. cosines:
-    (n,) of vertex normals and the direction.
+    Where the surface is smooth the normal of a vertex gives its orientation, at an edge or corner the normals of its faces.
+    cosines: (n,) of vertex normals and the direction.
     """
     d, heights, n, step = grid.direction, grid.heights, grid.columns, grid.step_mm
     corners, normals, flatness = layout.faces.corners, layout.faces.normals, layout.flatness
@@ -59,22 +59,23 @@ def find_slivers(layout: Layout, grid: OffsetGrid, cosines: Floats, fragile: Flo
 
 
 def thin_faces(tree: TriangleTree, thickness_mm: float) -> Mask:
-    """(m,) whether the solid is thinner than that under the middle of a face."""
+    """(m,) whether the solid under the centre of each face is thinner than thickness_mm."""
     a, b, c = (tree.vertices[tree.faces[:, k]] for k in range(3))
     return faces_met(tree, np.stack([(a + b + c) / 3.0, -tree.normals], axis=1), thickness_mm, OPPOSITE_COSINE) >= 0
 
 
 def least_distance_mm(corners: Floats, plane: Plane) -> float:
-    """Distance from a plane to the nearest of some triangles, (k, 3, 3) corners, 0 where it meets one, infinite for none."""
+    """Distance from a plane to the nearest of some triangles, (k, 3, 3) corners; 0 if it meets one, infinite for no triangles."""
     heights = corners @ plane.normal - plane.offset_mm
     low, high = heights.min(axis=1, initial=np.inf), heights.max(axis=1, initial=-np.inf)
     return float(np.maximum(np.maximum(low, -high), 0.0).min(initial=np.inf))
 
 
 def sliver_mm(facets: Facets, limb: Mask, plane: Plane, across: Floats) -> float:
-    """Distance from a plane up to the next surface of a limb that looks along its normal, and down to the next one straight
-    below it that looks against it: so thin is what the cut leaves. limb (n,): its vertices; across (2, 3): vectors across the
-    normal."""
+    """Thickness of the sliver that a cut of a limb leaves: distance from the plane up to the next surface of the limb facing
+    along its normal, or down to the next one straight below it facing against it. limb (n,): its vertices; across (2, 3): vectors
+    across the normal.
+    """
     vertices, faces = facets.mesh.vertices, facets.mesh.faces
     heights, cosines = plane.heights_mm(vertices), facets.mesh.normals @ plane.normal
     along, against = (np.zeros(len(vertices), np.bool_) for _ in range(2))

@@ -1,8 +1,8 @@
-"""Sweep: every offset of a direction evaluated in one pass over the faces, nothing is cut.
+"""Sweep: every offset of a direction evaluated in one pass over the faces, without cutting.
 
-For a unit direction d let h = vertex . d. A face adds a piecewise quadratic in the offset c to "area above c", weighted
-with 1 (risky areas) or with n . d: by the divergence theorem the n . d-weighted area above c is the cross-section at c and
-its first moment about c the volume above c.
+For a unit direction d let h = vertex . d. A face adds a piecewise quadratic in the offset c to "area above c", weighted with 1
+(risky areas) or with n . d: by the divergence theorem the n . d-weighted area above c is the cross-section at c and its first
+moment about c the volume above c.
 
     share of a face above c, whose corners lie at the heights low, mid and high:
 
@@ -19,11 +19,11 @@ its first moment about c the volume above c.
 
     area above[column] = shares[column] + wholes[column + 1] + wholes[column + 2] + ...
 
-So one way down through the columns adds up all faces: vertices + faces + crossings is what a direction costs. Heights are counted
-in steps above its first offset, which makes column c lie at the height c (sweep.crossing).
+So one pass down through the columns sums up all faces, and a direction costs vertices + faces + crossings. Heights are in steps
+above the first offset, so column c lies at height c (sweep.crossing).
 
-There are two passes: `gains` touches only the faces that are risky one way or the other and says what a cut would make safe;
-`sweep` says whether it can be made, and runs only for the directions of candidates that come up.
+There are two passes: `gains` touches only faces that are risky in either direction and computes the savings of a cut; `sweep`
+computes its feasibility, and runs only for the directions of promising candidates.
 """
 
 from dataclasses import dataclass
@@ -41,9 +41,18 @@ from mdp.plane import Plane
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import Classes
 from mdp.sweep.components import count_pieces, find_contact_areas, find_critical, plant_tree
-from mdp.sweep.crossing import RIM, STAIRS, STAIRS_UP, OffsetGrid, find_heights, find_lowest, integrate_scars, integrate_volume
+from mdp.sweep.crossing import (
+    RIM,
+    STAIRS,
+    STAIRS_UP,
+    OffsetGrid,
+    find_heights,
+    find_lowest,
+    integrate_blemishes,
+    integrate_volume,
+)
 from mdp.sweep.cylinders import Cylinder, crossings
-from mdp.sweep.facets import FaceTable, Facets, Layout, Scars
+from mdp.sweep.facets import Blemishes, FaceTable, Facets, Layout
 from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
 
 
@@ -51,10 +60,10 @@ class Gains(NamedTuple):
     """Values for each of k directions (rows) and its offsets c = (first + column) * step; those beyond `columns` are unused.
 
     up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
-    direction, weighted by what support each face needs; rim_mm: weighted length of the rim that a cut leaves, 0 where the
-    remainder counts no seams; unavoidable_mm2: risky area above it that no cut can save, 0 where that was not asked for;
-    stairs_up_mm2, stairs_mm2: what the stairs above it count printed straight up and along the direction, crossed: how many
-    cylinders it cuts askew; 0 where the remainder counts none.
+    direction, weighted by what support each face needs; rim_mm: weighted length of the rim that a cut leaves, 0 if seams cost
+    nothing; unavoidable_mm2: risky area above it that no cut can save, 0 if not requested; stairs_up_mm2, stairs_mm2: cost of the
+    stair-stepping above it when printed straight up and along the direction; crossed: weighted number of cylinders that it cuts
+    askew; these are 0 if they cost nothing.
     """
 
     first: Ints
@@ -69,21 +78,21 @@ class Gains(NamedTuple):
 
     @property
     def used(self) -> Mask:
-        """(k, n) which values are of offsets."""
+        """(k, n) whether each value belongs to an offset."""
         return np.arange(self.up_mm2.shape[1]) < self.columns[:, None]
 
     def offsets_mm(self, step_mm: float) -> Floats:
-        """(k, n) the offsets."""
+        """(k, n) offsets, mm."""
         return (self.first[:, None] + np.arange(self.up_mm2.shape[1])) * np.float64(step_mm)
 
 
 class Sweep(NamedTuple):
-    """Rows and columns as in Gains.
+    """Feasibility values; rows and columns as in Gains.
 
-    section_mm2: cross-section; volume_mm3: volume above; lowest_mm: least z of what lies above, exact where it is below the
-    direction's watched height, some greater number elsewhere; fragile_mm: distance to the nearest surface that the plane
-    would cut into a sliver; pieces: components of the solid below that do not reach the platform; contact_area_mm2: least
-    cross-section of a component of the solid above, fragments left out, where there are no such pieces and what lies above is
+    section_mm2: cross-section; volume_mm3: volume above; lowest_mm: minimum z of the part above the plane, exact if below the
+    direction's watched height, otherwise some greater number; fragile_mm: distance to the nearest surface that the plane would
+    cut into a sliver; pieces: components of the solid below that do not reach the build plate; contact_area_mm2: least
+    cross-section of a component of the solid above, without fragments; valid if there are no such pieces and the part above is
     nowhere below the watched height.
     """
 
@@ -99,11 +108,11 @@ class Sweep(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """What the sweep needs to know of a solid, made once for all directions: its mesh, which faces are risky upright, and how
-    much a mm of a seam's rim counts on each face (m,), feather edges more; None: seams do not count. pieces: of which faces of
-    the model its own are pieces; None: every risky face needs support. stair_weights: (m,) how much an area on each face counts
-    whose steps are as high as a layer; None: stairs do not count, nor do they where seams do not. cylinders: bores that
-    are not to be cut askew."""
+    """The solid in the form that the sweep takes, made once for all directions: its mesh, the faces that are risky upright, and
+    the weight of a mm of rim on each face (m,), None if seams cost nothing; feather: extra weight of feather edges. pieces:
+    source faces in the model; None if every risky face needs support. stair_weights: (m,) weight of area on each face whose steps
+    are as high as a layer; None if stair-stepping or seams cost nothing. cylinders: bores that should not be cut askew.
+    """
 
     mesh: Mesh
     risky: Mask
@@ -115,16 +124,16 @@ class Remainder:
 
     @property
     def weight(self) -> float:
-        """How many times an area counts that is over air."""
+        """Weight of area over air."""
         return 1.0 if self.pieces is None else self.pieces.need.weight
 
     def classes(self, directions: Floats) -> Classes:
-        """(k, n) what the faces of the model need along (k, 3) directions."""
+        """(k, n) support class of the model's faces along (k, 3) directions."""
         return np.zeros((len(directions), 0), np.uint8) if self.pieces is None else self.pieces.need.along(directions)
 
     @cached_property
     def faces(self) -> FaceTable:
-        """The faces, in the order of the mesh."""
+        """The face table, in the order of the mesh."""
         pieces, count = self.pieces, len(self.risky)
         return FaceTable(
             points=np.ascontiguousarray(self.mesh.vertices.T),
@@ -145,39 +154,41 @@ class Remainder:
 
     @cached_property
     def risky_mm2(self) -> float:
-        """What is risky upright, as it counts."""
+        """Weighted area that is risky upright, mm2."""
         return float(self.faces.counted_mm2[self.risky].sum())
 
     @cached_property
     def stairs_mm2(self) -> float:
-        """What its stairs count printed straight up."""
+        """Cost of the stair-stepping when printed straight up, mm2."""
         if self.stair_weights is None:
             return 0.0
         return float((self.mesh.areas_mm2 * self.stair_weights) @ step_shares(self.mesh.normals[:, 2]))
 
     @cached_property
     def layout(self) -> Layout:
-        """The surface laid out for sweeping."""
+        """The surface arranged for sweeping."""
         return self.facets.layout(SLIVER_COSINE)
 
     @cached_property
     def thin(self) -> Floats:
-        """(k, 3, 3) corners of the faces under whose middle the solid is a thin wall or rod: a ray for every face."""
+        """(k, 3, 3) corners of the faces under whose centre the solid is a thin wall or rod, by a ray for every face."""
         mesh = self.facets.mesh
         return mesh.vertices[mesh.faces[thin_faces(self.layout.triangles, THIN_MM)]]
 
     def thin_mm(self, plane: Plane) -> float:
-        """Distance of a plane to the nearest thin wall or rod on either side, 0 where it goes through one; infinite: no such."""
+        """Distance of a plane to the nearest thin wall or rod on either side, mm; 0 if it crosses one, infinite if there are
+        none.
+        """
         return least_distance_mm(self.thin, plane)
 
     def most_columns(self, step_mm: float) -> int:
-        """No direction has more offsets."""
+        """Upper bound of the number of offsets of any direction."""
         return int(float(np.linalg.norm(self.mesh.bounds_mm[1] - self.mesh.bounds_mm[0])) / step_mm) + 3
 
 
 def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float, unavoidable: Mask | None = None) -> Gains:
-    """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle; unavoidable:
-    (m,) the faces, as remainder.facets orders them, that no cut can save.
+    """Savings of all offsets of (k, 3) unit directions. risky_below: overhang.threshold of the angle; unavoidable: (m,) faces
+    that no cut can save, in the order of remainder.facets.
 
     >>> from mdp.cut import convex_hull
     >>> from mdp.overhang import risky_upright, threshold
@@ -189,18 +200,18 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     shape = (len(directions), remainder.most_columns(step_mm))
     columns = np.zeros((2, shape[0]), np.int32)
     swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(7)))
-    scars = scars_of(remainder, directions, risky_below, unavoidable)
-    in_threads(_gains, shape[0], scars, step_mm, swept)
+    blemishes = blemishes_of(remainder, directions, risky_below, unavoidable)
+    in_threads(_gains, shape[0], blemishes, step_mm, swept)
     if remainder.cylinders:
         swept.crossed[:] = crossings(remainder.cylinders, directions, swept.offsets_mm(step_mm))
     return swept
 
 
-def scars_of(remainder: Remainder, directions: Floats, risky_below: float, unavoidable: Mask | None = None) -> Scars:
-    """What blemishes a solid's surface along each of some directions; risky_below, unavoidable: see gains."""
+def blemishes_of(remainder: Remainder, directions: Floats, risky_below: float, unavoidable: Mask | None = None) -> Blemishes:
+    """The blemishes of a solid along some directions. risky_below, unavoidable: see gains."""
     lost, faces = np.zeros(0, np.bool_) if unavoidable is None else unavoidable, remainder.facets.faces
     directions, classes = np.ascontiguousarray(directions), remainder.classes(directions)
-    return Scars(directions, faces, risky_below, classes, remainder.weight, remainder.feather, lost)
+    return Blemishes(directions, faces, risky_below, classes, remainder.weight, remainder.feather, lost)
 
 
 def sweep(
@@ -210,10 +221,10 @@ def sweep(
     watched_mm: Floats | None = None,
     fragment_mm: float = 2.0,
 ) -> Sweep:
-    """Whether a cut can be made at all offsets of (k, 3) unit directions.
+    """Feasibility of cuts at all offsets of (k, 3) unit directions.
 
-    watched_mm (k,): the height below which the least z of a part matters, and that it must reach for the contact area to be of
-    use; absent: all heights matter. fragment_mm: a piece above the plane that is lower than this may stand on any area.
+    watched_mm (k,): height below which the least z of a part matters, and which it must reach for the contact area to be valid;
+    None: all heights matter. fragment_mm: a lower piece above the plane may stand on any area.
     """
     watched = np.full(len(directions), np.inf) if watched_mm is None else np.ascontiguousarray(watched_mm)
     needed = np.full(len(directions), -np.inf) if watched_mm is None else watched
@@ -227,19 +238,19 @@ def sweep(
 
 
 @kernel
-def _gains(begin_row: int, end_row: int, scars: Scars, step_mm: float, out: Gains) -> None:
-    heights = floats(scars.faces.points.shape[1], 0.0)
+def _gains(begin_row: int, end_row: int, blemishes: Blemishes, step_mm: float, out: Gains) -> None:
+    heights = floats(blemishes.faces.points.shape[1], 0.0)
     for row in range(begin_row, end_row):
-        first, n = find_heights(scars.faces.points, scars.directions[row], step_mm, heights)
+        first, n = find_heights(blemishes.faces.points, blemishes.directions[row], step_mm, heights)
         out.first[row], out.columns[row] = first, n
         if n > 0:
-            above = integrate_scars(scars, row, OffsetGrid(scars.directions[row], heights, n, step_mm))
+            above = integrate_blemishes(blemishes, row, OffsetGrid(blemishes.directions[row], heights, n, step_mm))
             for k in range(n):
-                sums = above[k]  # by the kinds of faces, see crossing
+                sums = above[k]  # by kind of face, see crossing
                 airy_both = sums[5] + sums[7]
                 both = sums[3] + sums[6]
                 out.up_mm2[row, k] = sums[1] + both + airy_both
-                out.residual_mm2[row, k] = sums[2] + both + scars.weight * (sums[4] + airy_both)
+                out.residual_mm2[row, k] = sums[2] + both + blemishes.weight * (sums[4] + airy_both)
                 out.unavoidable_mm2[row, k] = sums[6] + sums[7]
                 out.stairs_up_mm2[row, k], out.stairs_mm2[row, k] = sums[STAIRS_UP], sums[STAIRS]
                 out.rim_mm[row, k] = sums[RIM] / step_mm
@@ -249,8 +260,10 @@ def _gains(begin_row: int, end_row: int, scars: Scars, step_mm: float, out: Gain
 def _sweep(
     begin_row: int, end_row: int, layout: Layout, sampling: tuple[Floats, float, Floats, Floats, float], out: Sweep
 ) -> None:
-    """sampling: directions (k, 3), the step of their offsets, for each (k,) the height below which the least z of a part matters
-    and the one that it must reach for the contact area to be of use, and how many steps a piece must be high to need one."""
+    """Kernel of sweep. sampling: directions (k, 3), the step of their offsets, for each (k,) the height below which the least z
+    of a part matters and the height that it must reach for the contact area to be valid, and the least height of a piece with a
+    contact area, in steps.
+    """
     points, normals, (directions, step_mm, watched_mm, needed_mm, fragment) = layout.faces.points, layout.vertex_normals, sampling
     section, contact_area, lowest, pieces = out.section_mm2, out.contact_area_mm2, out.lowest_mm, out.pieces
     size = points.shape[1]
@@ -265,7 +278,7 @@ def _sweep(
             dot(normals[0], normals[1], normals[2], directions[row], cosines)
             find_slivers(layout, grid, cosines, out.fragile_mm[row])
             critical = scratch[: find_critical(layout, heights, cosines, scratch)]
-            # Whether a tree grows from above is no constant: these functions would be compiled once for every value of it.
+            # The direction of growth is not a literal, otherwise these functions would be compiled once for each value.
             count_pieces(plant_tree(layout, grid, cosines, critical, n < 0), pieces[row])
             wanted = ints(n, 0)
             for column in range(n):
@@ -275,11 +288,12 @@ def _sweep(
 
 
 def unavoidable_faces(remainder: Remainder, directions: Floats, least_offset_mm: Floats, risky_below: float) -> Mask:
-    """(m,) the risky faces, as remainder.facets orders them, that no cut can save: every one of (k, 3) directions along which
-    they would carry themselves needs a plane that lies too low, by (k,) least offsets, infinite: the direction is out of reach.
+    """(m,) unavoidable overhangs: risky faces, in the order of remainder.facets, that no cut can save, because each of (k, 3)
+    directions along which they would support themselves needs a plane that lies too low, by (k,) least offsets, infinite if the
+    direction is out of reach.
 
-    A face is saved by a direction along which it does not overhang, where a plane across it may lie below the face's middle. What
-    a search has lost for ever is at least their area: a lower bound that it knows before it cuts anything.
+    A direction saves a face if the face does not overhang along it and a plane across it may lie below the face's centre. The
+    final loss of a search is at least the area of these faces: a lower bound that is known before any cut.
     """
     faces, bounds = remainder.facets.faces, (np.ascontiguousarray(directions), least_offset_mm, risky_below)
     lost: Mask = faces.risky.copy()

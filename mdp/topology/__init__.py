@@ -1,5 +1,5 @@
-"""Topology: edges of a surface, the faces across them, and what hangs together.
+"""Topology: edges of a surface, adjacent faces, and connected components.
 
 `edges.edges_of` for arrays of any faces, `edges.opposites` and `edges.link` for oriented ones, `components` for arrays and inside
-kernels, `cross_section` for the outlines of a surface at heights.
+kernels, `cross_section` for the outlines of a surface at given heights.
 """

@@ -1,6 +1,6 @@
-"""Components: what hangs together, of nodes and edges between them, and of a surface over its vertices.
+"""Connected components of graphs, and of a surface over its vertices.
 
-Kernels find them by union-find: sets that grow together, each known by one of its members (paths halved).
+Kernels find them by union-find: growing sets, each represented by one of its members (path halving).
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from mdp.mesh import Indices, Ints
 def connected_components(count: int, a: Ints | Indices, b: Ints | Indices) -> Indices:
     """(count,) the least member of the connected component of every node, for edges from a to b.
 
-    Labels hook onto the least label next to them and jump to its root until nothing changes: a few vectorised rounds.
+    Labels hook onto the least neighbouring label and jump to its root until nothing changes, in a few vectorised rounds.
 
     >>> connected_components(5, np.array([0, 3]), np.array([2, 4]))
     array([0, 1, 0, 3, 3])
@@ -33,13 +33,13 @@ def connected_components(count: int, a: Ints | Indices, b: Ints | Indices) -> In
 
 
 def vertex_components(count: int, faces: Ints | Indices) -> Indices:
-    """(count,) the least vertex that hangs together with each over (m, 3) faces."""
+    """(count,) the least vertex of each vertex's connected component over (m, 3) faces."""
     return connected_components(count, faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())
 
 
 @helper
 def singletons(size: int) -> Ints:
-    """The parents of `count` members, none of which have been joined."""
+    """The parents of `size` separate sets with one member each."""
     parent = ints(size, 0)
     for member in range(size):
         parent[member] = member
@@ -48,7 +48,7 @@ def singletons(size: int) -> Ints:
 
 @no_nrt
 def root(parent: Ints, member: int) -> int:
-    """The member that stands for all that one has been joined with."""
+    """The representative of a member's set."""
     while parent[member] != member:
         parent[member] = parent[parent[member]]
         member = parent[member]
@@ -57,6 +57,6 @@ def root(parent: Ints, member: int) -> int:
 
 @helper
 def join(parent: Ints, a: int, b: int) -> None:
-    """Join two sets; the lesser of the members that stand for them stands for both."""
+    """Join two sets; the lesser of their representatives represents both."""
     p, q = root(parent, a), root(parent, b)
     parent[max(p, q)] = min(p, q)

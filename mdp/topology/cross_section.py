@@ -1,8 +1,8 @@
 """Cross sections: the exact outlines of a closed mesh at many heights at once.
 
-Each face that a plane crosses gives one segment, from the edge on which the face's boundary goes down through the plane
-to the edge on which it goes up; the neighbour over the upward edge gives the next segment, so chains close by topology alone.
-A vertex exactly in a plane counts as above it: the section of a flat top is taken from the solid below.
+Each face that a plane crosses gives one segment, from the edge on which the face's boundary goes down through the plane to the
+edge on which it goes up; the neighbour over the upward edge gives the next segment, so loops close by topology alone. A vertex
+exactly in a plane counts as above it: the section of a flat top is taken from the solid below.
 """
 
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ from profiles.errors import SliceError
 
 
 def cross_sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
-    """For each cutting height (rising, mm) the loops of the section, (n, 2) mm, solid on the left of every loop.
+    """The loops of the section at each cutting height (ascending, mm), (n, 2) mm, with the solid on the left of every loop.
 
-    Raises SliceError when the mesh is not closed.
+    Raises SliceError if the mesh is not closed.
 
     >>> corners = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]])
     >>> tetrahedron = Mesh(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
@@ -37,7 +37,7 @@ def cross_sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
 
 
 def loops_at(vertices: Floats, faces: Ints, across: Ints, cuts_mm: Floats) -> list[list[Floats]]:
-    """The loops as cross_sections gives them, of a closed mesh of which (3 m,) the half-edge across each half-edge is known."""
+    """Loops as in cross_sections, for a closed mesh with a known opposite half-edge of each half-edge (3 m,)."""
     points, ends, counts = _walk(vertices, faces, across, cuts_mm)
     ends = ends[: counts.sum()]
     loops = np.split(points, ends[:-1]) if len(ends) else []
@@ -47,7 +47,7 @@ def loops_at(vertices: Floats, faces: Ints, across: Ints, cuts_mm: Floats) -> li
 
 @helper
 def _spans(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Ints, Ints]:
-    """Per face the first and the last layer it crosses; the last is less than the first where it crosses none."""
+    """First and last layer that each face crosses; the last is less than the first if it crosses none."""
     first, last = ints(len(faces), 0), ints(len(faces), 0)
     for f in range(len(faces)):
         a, b, c = vertices[faces[f, 0], 2], vertices[faces[f, 1], 2], vertices[faces[f, 2], 2]
@@ -58,7 +58,7 @@ def _spans(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Ints, Ints]:
 
 @kernel
 def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-    """Points of all loops, the end of each loop in them (with room for more), the number of loops of each layer."""
+    """Points of all loops, the end of each loop in them (with unused space behind), and the number of loops in each layer."""
     first, last = _spans(vertices, faces, cuts)
     offsets, listed = sort_into_bins(first, last, len(cuts))
     points, ends = table(len(listed), 2), longs(len(listed), 0)
@@ -93,7 +93,7 @@ def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Fl
 
 
 def loop_edges(loops: Sequence[Floats]) -> Floats:
-    """(n, 4) edges x0, y0, x1, y1 of closed loops (k, 2), loop after loop."""
+    """(n, 4) edges x0, y0, x1, y1 of closed loops (k, 2), loop by loop."""
     if not loops:
         return np.zeros((0, 4))
     out = np.empty((sum(map(len, loops)), 4))

@@ -1,4 +1,4 @@
-"""Edges of a surface: half-edges, what they share, and a surface with the face on the other side of every edge, for kernels.
+"""Edges of a surface: half-edges and their undirected edges, and a surface with the adjacent face over every edge, for kernels.
 
 Half-edge 3 f + k runs from corner k of face f to the next corner.
 """
@@ -16,7 +16,7 @@ from mdp.mesh import Floats, Indices, Ints, Mesh
 from mdp.topology.components import connected_components
 
 Flags = NDArray[np.bool_]
-FLAT_COSINE = 1.0 - 1e-9  # of the normals of neighbours in one flat place: some 0.003 degrees
+FLAT_COSINE = 1.0 - 1e-9  # of the normals of neighbours in one flat region: some 0.003 degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Edges:
 
     @cached_property
     def counts(self) -> Indices:
-        """(edges,) faces at each edge."""
+        """(edges,) number of faces at each edge."""
         return np.bincount(self.edge)
 
     @cached_property
@@ -39,13 +39,13 @@ class Edges:
 
     @cached_property
     def unbalanced(self) -> Indices:
-        """Numbers of the edges that are not run through equally often either way."""
+        """Numbers of the edges that are not traversed equally often in both directions."""
         net = np.bincount(self.edge, np.where(self.forward, 1, -1))
         return np.flatnonzero(net)
 
     @cached_property
     def by_edge(self) -> tuple[Indices, Indices]:
-        """Half-edges sorted by edge, and where the run of each edge starts (edges + 1 places)."""
+        """Half-edges sorted by edge, and the start of each edge's run (edges + 1 positions)."""
         return np.argsort(self.edge, kind="stable"), np.concatenate([[0], np.cumsum(self.counts)])
 
     @cached_property
@@ -65,7 +65,7 @@ def edges_of(faces: Indices) -> Edges:
 
 
 def opposites(faces: Ints | Indices) -> Ints:
-    """(3 m,) for every half-edge of (m, 3) faces the one that runs the other way on the face across; -1 on a border.
+    """(3 m,) the opposite half-edge, on the adjacent face, of every half-edge of (m, 3) faces; -1 on a border.
 
     The half-edges of an edge with more than two faces are paired in the order of their faces.
 
@@ -79,7 +79,7 @@ def opposites(faces: Ints | Indices) -> Ints:
 
 @kernel
 def _paired(order: Indices, keys: Indices, forward: NDArray[np.bool_]) -> Ints:
-    """Pair the half-edges of every key; order: by their keys."""
+    """Pair the half-edges of every key. order: half-edges sorted by key."""
     paired: Ints = ints(len(keys), -1)
     start = 0
     while start < len(order):
@@ -97,8 +97,9 @@ def _paired(order: Indices, keys: Indices, forward: NDArray[np.bool_]) -> Ints:
 
 class LinkedFaces(NamedTuple):
     """A surface of m faces and n vertices: vertices (3, n), faces (m, 3), unit normals (3, m), areas (m,), neighbours (m, 3): the
-    face across the edge from corner k to the next one, below 0 where there is none; the vertices next to v are
-    around[starts[v] : starts[v + 1]]."""
+    adjacent face over the edge from corner k to the next one, negative if there is none; the neighbours of vertex v are
+    around[starts[v] : starts[v + 1]].
+    """
 
     vertices: Floats
     faces: Ints
@@ -110,7 +111,7 @@ class LinkedFaces(NamedTuple):
 
 
 def link(mesh: Mesh) -> LinkedFaces:
-    """A mesh with its neighbours."""
+    """A mesh with the neighbours of its faces and vertices."""
     begins, ends = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     order = np.lexsort((ends, begins))
     return LinkedFaces(
@@ -125,7 +126,7 @@ def link(mesh: Mesh) -> LinkedFaces:
 
 
 def flat_places(surface: LinkedFaces) -> Ints:
-    """(m,) the least face of the flat place that each face belongs to with its neighbours."""
+    """(m,) the least face of each face's flat region."""
     face, corner = np.nonzero(surface.neighbours >= 0)
     across, (x, y, z) = surface.neighbours[face, corner], surface.normals
     flat = x[face] * x[across] + y[face] * y[across] + z[face] * z[across] > FLAT_COSINE

@@ -1,1 +1,1 @@
-"""Configurations of other slicers as material and process profiles: PrusaSlicer, SuperSlicer, OrcaSlicer, Bambu Studio, Cura."""
+"""Foreign: settings of PrusaSlicer, SuperSlicer, OrcaSlicer, Bambu Studio and Cura converted to profiles."""

@@ -1,6 +1,6 @@
-"""Config: the settings of another slicer, each under the key that PrusaSlicer has for it, with the name and text of its own file.
+"""Config: the settings of another slicer by PrusaSlicer's keys, each with its name and text in the file.
 
-The other programs name the same things otherwise, which a table tells, so the rules of conversion are written once.
+The other programs use other names, which a table maps to PrusaSlicer's, so that one set of conversion rules serves all.
 """
 
 import re
@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from math import isfinite
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-OF_NOZZLE = "% of the nozzle"  # ends a width that is in percent of a nozzle that the file does not tell
+OF_NOZZLE = "% of the nozzle"  # ends a width in percent of a nozzle whose diameter the file does not give
 NOTHING = ("", "nil")  # PrusaSlicer's filament overrides are nil where the printer's value holds
-NAMES = (  # of PrusaSlicer, OrcaSlicer and Cura; empty: as PrusaSlicer has it, or nothing
+NAMES = (  # in PrusaSlicer, OrcaSlicer and Cura; empty: PrusaSlicer's name, or none
     ("extrusion_width", "line_width", "line_width"),
     ("perimeter_extrusion_width", "inner_wall_line_width", "wall_line_width_x"),
     ("external_perimeter_extrusion_width", "outer_wall_line_width", "wall_line_width_0"),
@@ -113,15 +113,16 @@ NAMES = (  # of PrusaSlicer, OrcaSlicer and Cura; empty: as PrusaSlicer has it, 
 ORCASLICERS = {orcaslicers: key for key, orcaslicers, _ in NAMES if orcaslicers}
 CURAS = {curas: key for key, _, curas in NAMES if curas}
 
-Entry = tuple[str, str]  # name of a setting as its file has it, and its text as PrusaSlicer would have it
+Entry = tuple[str, str]  # name of a setting in its file, and its text as PrusaSlicer would write it
 
 
 @dataclass(frozen=True)
 class Config:
-    """What a file says. entries: by PrusaSlicer's key; unknown: names in the file that no key stands for; process, material: what
-    the presets are called, empty where the file does not tell. own: of entries whose text is not the file's, the file's own text,
-    or the worked-out one where the file has none, and how it was worked out, "" where the two mean the same; read: names in the
-    file that other entries follow from."""
+    """The content of a configuration file. entries: by PrusaSlicer's key; unknown: names in the file without a key; process,
+    material: names of the presets, empty if the file has none. own: for entries whose text is not the file's, the text in the
+    file, or the computed one where the file has none, and how it was computed, "" where the two are equivalent; read: names in
+    the file that other entries are computed from.
+    """
 
     program: str
     entries: Mapping[str, Entry]
@@ -132,7 +133,7 @@ class Config:
     read: frozenset[str] = frozenset()
 
     def text(self, key: str) -> str | None:
-        """The text of a key, of the first extruder where there are several; None where nothing is said."""
+        """The text of a key, for the first extruder of several; None if it is not set."""
         entry = self.entries.get(key)
         if entry is None:
             return None
@@ -140,11 +141,11 @@ class Config:
         return None if text in NOTHING else text
 
     def number(self, key: str) -> float | None:
-        """The number of a key; None where nothing is said, or a share, or no number."""
+        """The number of a key; None if it is not set, a percentage, or not a number."""
         return finite(self.text(key) or "")
 
     def share(self, key: str) -> float | None:
-        """The percentage of a key as a share; None where it is none."""
+        """The percentage of a key as a share; None if it is not a percentage."""
         text = self.text(key)
         percent = finite(text[:-1]) if text is not None and text.endswith("%") else None
         return None if percent is None else percent / 100.0
@@ -156,7 +157,7 @@ class Config:
 
 
 def without_still_fan(entries: dict[str, Entry]) -> dict[str, Entry]:
-    """The settings of a program whose fan never stands still above the first layers."""
+    """The settings of a program whose fan never stops above the first layers."""
     return entries | ({"fan_always_on": (entries["min_fan_speed"][0], "1")} if "min_fan_speed" in entries else {})
 
 
@@ -166,15 +167,16 @@ def first_filament(settings: Mapping[str, str]) -> str:
 
 
 def finite(text: str) -> float | None:
-    """The number that a text is; None where it is none, or too large for one."""
+    """The number in a text; None if it is not a number, or not finite."""
     stripped = text.strip()
     number = float(stripped) if NUMBER.fullmatch(stripped) else None
     return number if number is not None and isfinite(number) else None
 
 
 def width_of_nozzle(text: str, nozzle: str) -> tuple[str, str]:
-    """A line's width that is in percent of the nozzle, in mm, and how it was worked out; ending in OF_NOZZLE where the nozzle is
-    not told; any other as it is."""
+    """A line width given in percent of the nozzle, in mm, and how it was computed; ending in OF_NOZZLE if the nozzle is unknown;
+    any other width unchanged.
+    """
     first = first_of(text)
     percent = finite(first[:-1]) if first.endswith("%") else None
     if percent is None:
@@ -186,7 +188,7 @@ def width_of_nozzle(text: str, nozzle: str) -> tuple[str, str]:
 
 
 def first_of(text: str) -> str:
-    """The first extruder's value of a list; quoted texts stay whole."""
+    """The first extruder's value of a list; quoted texts are not split."""
     stripped = text.strip()
     if stripped.startswith('"'):
         return stripped

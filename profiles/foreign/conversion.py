@@ -1,7 +1,7 @@
-"""Conversion: a setting of another slicer as a value of ours, or the reason why it is left.
+"""Conversion: a setting of another slicer as a value of a tiltprint profile, or the reason why it is not imported.
 
-Where PrusaSlicer's zero means "worked out", as for widths, its own rule is used (src/libslic3r/Flow.cpp,
-auto_extrusion_width); where it means "the firmware's", nothing is taken.
+Where PrusaSlicer's zero means "computed", as for widths, its own rule is used (src/libslic3r/Flow.cpp, auto_extrusion_width);
+where it means "the firmware's value", nothing is imported.
 """
 
 from collections.abc import Callable
@@ -9,23 +9,23 @@ from math import pi
 
 from profiles.foreign.config import OF_NOZZLE, Config
 
-AUTO_WIDTH, AUTO_NARROW = 1.125, 1.0  # of the nozzle: walls and infill, uppermost skins and support
-ROUND_ENDS = 1.0 - pi / 4.0  # of a bead's height: by how much beads side by side overlap
+AUTO_WIDTH, AUTO_NARROW = 1.125, 1.0  # of the nozzle: walls and infill; top skins and support
+ROUND_ENDS = 1.0 - pi / 4.0  # of a bead's height: overlap of adjacent beads
 
-# A value of ours and what was worked out, "" where it is taken as it is; or None and the reason why nothing is taken.
+# A value of ours and how it was computed, "" if unchanged; or None and the reason why nothing is imported.
 Converted = tuple[float | bool | str | None, str]
 Convert = Callable[[Config, str], Converted]
-NO_NUMBER: Converted = (None, "is no number")
+NO_NUMBER: Converted = (None, "is not a number")
 
 
 def no_number(config: Config, key: str) -> Converted:
-    """Why a setting gives no number."""
+    """The reason why a setting gives no number."""
     is_of_nozzle = (config.text(key) or "").endswith(OF_NOZZLE)
     return (None, "a percentage of the nozzle, which the file does not tell") if is_of_nozzle else NO_NUMBER
 
 
 def number(config: Config, key: str) -> Converted:
-    """A number as it is."""
+    """A number, unchanged."""
     value = config.number(key)
     return NO_NUMBER if value is None else (value, "")
 
@@ -37,12 +37,12 @@ def whole(config: Config, key: str) -> Converted:
 
 
 def always(value: float | bool | str | None, how: str = "") -> Convert:
-    """The same whatever the setting says; None: it is known and not taken."""
+    """One value for any setting; None: the setting is known but not imported."""
     return lambda config, key: (value, how)
 
 
 def by_flag(on: Converted, off: Converted) -> Convert:
-    """What on and off mean."""
+    """Values for on and off."""
     return lambda config, key: on if config.flag(key) else off
 
 
@@ -50,12 +50,12 @@ flag = by_flag((True, ""), (False, ""))
 
 
 def unless_off(switch: str, off: Converted, convert: Convert) -> Convert:
-    """A conversion that holds only where another setting is not off."""
+    """A conversion that applies only where another setting is not off."""
     return lambda config, key: off if config.flag(switch) is False else convert(config, key)
 
 
 def above_zero(zero: str) -> Convert:
-    """A number where 0 means something else."""
+    """A number whose 0 has another meaning."""
 
     def convert(config: Config, key: str) -> Converted:
         value = config.number(key)
@@ -67,15 +67,15 @@ def above_zero(zero: str) -> Convert:
 
 
 def share(config: Config, key: str) -> Converted:
-    """A percentage, with its sign or without, as a share."""
+    """A percentage, with or without its sign, as a share."""
     value, plain = config.share(key), config.number(key)
     if plain is not None:
         return round(plain / 100.0 if value is None else value, 6), "percent as a share"
-    return (None, "is no percentage") if value is None else (value, "")
+    return (None, "is not a percentage") if value is None else (value, "")
 
 
 def part_of(base: str, zero: str = "") -> Convert:
-    """A number, or a percentage of another setting; zero: what 0 means where it is no value."""
+    """A number, or a percentage of another setting. zero: the meaning of 0 where it is not a value."""
 
     def convert(config: Config, key: str) -> Converted:
         part, value, whole_value = config.share(key), config.number(key), _size(config, base)
@@ -98,7 +98,7 @@ PARTS = {
 
 
 def _size(config: Config, key: str) -> float | None:
-    """The number of a setting, percentages of others and widths worked out."""
+    """The number of a setting, with percentages and automatic widths computed."""
     if key.endswith("_extrusion_width"):
         value, _ = width()(config, key)
     elif key in PARTS and config.text(key) is not None:
@@ -109,7 +109,9 @@ def _size(config: Config, key: str) -> float | None:
 
 
 def width(height: str = "layer_height", auto: float = AUTO_WIDTH) -> Convert:
-    """A line's width: in mm, or in percent of the layer's height; 0: as all lines, and where that is 0, by the nozzle."""
+    """A line width in mm, or in percent of the layer height; 0: the default line width, and if that is 0, computed from the
+    nozzle.
+    """
 
     def convert(config: Config, key: str) -> Converted:
         for name in dict.fromkeys((key, "extrusion_width")):
@@ -129,7 +131,7 @@ def width(height: str = "layer_height", auto: float = AUTO_WIDTH) -> Convert:
 
 
 def density(line: str) -> Convert:
-    """The share that lines of that width fill which stand as far apart as the setting says."""
+    """The density of lines of a width at the distance that the setting gives."""
 
     def convert(config: Config, key: str) -> Converted:
         gap, (wide, _) = config.number(key), width(auto=AUTO_NARROW)(config, line)
@@ -142,8 +144,8 @@ def density(line: str) -> Convert:
     return convert
 
 
-def one_of(words: dict[str, str], unknown: str = "there is no such one here") -> Convert:
-    """A word for a word."""
+def one_of(words: dict[str, str], unknown: str = "has no equivalent here") -> Convert:
+    """A choice mapped to a choice."""
 
     def convert(config: Config, key: str) -> Converted:
         text = config.text(key) or ""

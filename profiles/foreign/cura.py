@@ -1,7 +1,8 @@
-"""Cura's .curaprofile: a zip of ini files, one of the print and one an extruder, with what differs from a printer's definition.
+"""Cura's .curaprofile: a zip of ini files, one for the print and one per extruder, with the differences from the definition of a
+printer.
 
-What the user has not changed stands in Cura's own definitions, not in the file (Cura, plugins/CuraProfileReader). A project
-(.3mf) keeps stacks of such files, one of the print and one for each extruder, the person's own on top (Cura,
+Values that the user has not changed are in Cura's own definitions, not in the file (Cura, plugins/CuraProfileReader). A project
+(.3mf) contains stacks of such files, one for the print and one for each extruder, the user's own on top (Cura,
 cura/Settings/CuraContainerStack.py). Names: Cura, resources/definitions/fdmprinter.def.json.
 """
 
@@ -16,13 +17,13 @@ from zipfile import ZipFile
 from profiles.errors import ProfileError, first_line, reason
 from profiles.files import DAMAGED_ZIP
 from profiles.foreign.config import CURAS, Config, Entry, finite, without_still_fan
-from profiles.foreign.cura_formulas import USUAL, inputs, worked_out
+from profiles.foreign.cura_formulas import USUAL, evaluated, inputs
 
 PROGRAM = "Cura"
 SLICER_FILE = re.compile(r"Cura/(.*)\.inst\.cfg$")  # members of a slicer file that have settings
 STACK = re.compile(r"Cura/.*\.(global|extruder)\.cfg$")
 MATERIAL = re.compile(r"Cura/(.*)\.xml\.fdm_material$")
-PROPERTIES = {  # of a material's file
+PROPERTIES = {  # in a file of a material
     "material_type": "{*}metadata/{*}name/{*}material",
     "material_diameter": "{*}properties/{*}diameter",
     "material_density": "{*}properties/{*}density",
@@ -34,7 +35,7 @@ OF_MATERIAL = {
     "retraction amount": "retraction_amount",
     "retraction speed": "retraction_speed",
 }
-HOLDS = {  # settings that hold only where another has a word, and what they are where it has not; None: nothing is said
+HOLDS = {  # settings that hold only if another has a value, and their value otherwise; None: not set
     "retraction_hop": ("retraction_hop_enabled", "true", "0"),
     "retraction_amount": ("retraction_enable", "true", "0"),
     "cool_fan_speed_max": ("cool_fan_enabled", "true", "0"),
@@ -49,9 +50,9 @@ HOLDS = {  # settings that hold only where another has a word, and what they are
     "acceleration_layer_0": ("acceleration_enabled", "true", None),
 }
 DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, configparser.Error, ElementTree.ParseError)
-MOST_BYTES = 4 << 20  # of a member: a profile has a few kB
+MOST_BYTES = 4 << 20  # for a member: a profile has a few kB
 PERCENT = frozenset({"fill_density", "ironing_flowrate"})  # without the sign in Cura
-RAFT_LAYERS = {"raft_base_layers": 1, "raft_interface_layers": 1, "raft_surface_layers": 2}  # with Cura's own numbers
+RAFT_LAYERS = {"raft_base_layers": 1, "raft_interface_layers": 1, "raft_surface_layers": 2}  # with Cura's default numbers
 BESIDE_OTHERS = frozenset({*RAFT_LAYERS, "layer_0_z_overlap"})  # read by _raft
 WORDS = {
     "fill_pattern": {
@@ -69,13 +70,13 @@ WORDS = {
 
 
 def read_profile(file: Path) -> Config:
-    """What a .curaprofile says. Raises ProfileError."""
+    """The settings of a .curaprofile. Raises ProfileError."""
     return of_values(*read_values(file))
 
 
 def of_values(values: Mapping[str, str], name: str = "") -> Config:
-    """Settings under Cura's names, formulas worked out where that can be."""
-    entries, hows, known = dict[str, Entry](), dict[str, str](), worked_out(values)
+    """Settings given by Cura's names, with formulas computed where possible."""
+    entries, hows, known = dict[str, Entry](), dict[str, str](), evaluated(values)
     unknown, read = list[str](), set[str]()
     for theirs, text in known.items():
         switch, word, off = HOLDS.get(theirs, ("", "", None))
@@ -91,7 +92,7 @@ def of_values(values: Mapping[str, str], name: str = "") -> Config:
                 continue
             entries[key] = theirs, off
         elif (theirs in values or theirs in CURAS) and theirs not in BESIDE_OTHERS:
-            entries[key] = theirs, _said(key, text)
+            entries[key] = theirs, _to_prusaslicer(key, text)
             if theirs not in values:
                 how = f"Cura's own formula: {USUAL[theirs]}"
             elif values[theirs] != text:
@@ -112,10 +113,10 @@ def of_values(values: Mapping[str, str], name: str = "") -> Config:
 
 
 def _raft(values: Mapping[str, str]) -> Iterator[tuple[str, str, str, str]]:
-    """The number of raft layers and the gap above the raft, less what the first layer sinks into it. Of each the key, the name in
-    the file, the text, and how it was worked out.
+    """The number of raft layers and the gap above the raft, reduced by how far the first layer sinks into it. Each with its key,
+    name in the file, text, and how it was computed.
 
-    A value that the file does not give as a number is Cura's default: the sinking is half of the gap.
+    A value that the file does not give as a number is Cura's default: the first layer sinks by half of the gap.
     """
     if (kind := values.get("adhesion_type", "")) and not kind.startswith("="):
         counts = [_number(values.get(key, ""), usual) for key, usual in RAFT_LAYERS.items()] if kind == "raft" else []
@@ -133,7 +134,9 @@ def _number(text: str, usual: float) -> float:
 
 
 def read_values(file: Path) -> tuple[Mapping[str, str], str]:
-    """The settings of a profile or of a slicer file, the first extruder's over the print's, and its name. Raises ProfileError."""
+    """The settings of a profile or a slicer file, where the first extruder's override the print's, and its name. Raises
+    ProfileError.
+    """
     try:
         with ZipFile(file) as archive:
             if file.suffix.lower() == ".3mf":
@@ -147,11 +150,11 @@ def read_values(file: Path) -> tuple[Mapping[str, str], str]:
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
     except DAMAGED as error:
-        raise ProfileError(f"profile {file}: is no profile of Cura ({first_line(error)})") from None
+        raise ProfileError(f"profile {file}: is not a Cura profile ({first_line(error)})") from None
 
 
 def _of_slicer_file(archive: ZipFile) -> dict[str, str]:
-    """The settings of the stacks of the print and of its first extruder that is switched on, level by level."""
+    """The settings of the stacks of the print and of its first enabled extruder, level by level."""
     layers = {match[1]: member for member in archive.namelist() if (match := SLICER_FILE.match(member) or MATERIAL.match(member))}
     stacks = [_ini(archive, member) for member in archive.namelist() if STACK.match(member)]
     prints = [stack for stack in stacks if not _position(stack)]
@@ -170,12 +173,12 @@ def _of_slicer_file(archive: ZipFile) -> dict[str, str]:
 
 
 def _material_of(container: str, layers: Collection[str]) -> str:
-    """The file of a material, which a container's name begins with before those of the printer and its nozzle."""
+    """The file of a material, whose name a container's name begins with, before the names of printer and nozzle."""
     return max((name for name in layers if container.startswith(f"{name}_")), key=len, default="")
 
 
 def _of_material(material: ElementTree.Element) -> dict[str, str]:
-    """What a material's file says for all printers."""
+    """The settings of a material's file that hold for all printers."""
     texts = {key: material.findtext(path, "") for key, path in PROPERTIES.items()}
     for setting in material.findall("{*}settings/{*}setting"):
         texts[OF_MATERIAL.get(setting.get("key", ""), "")] = setting.text or ""
@@ -183,7 +186,7 @@ def _of_material(material: ElementTree.Element) -> dict[str, str]:
 
 
 def _content(archive: ZipFile, member: str) -> str:
-    """The text of a member. Raises ProfileError for one that is too large."""
+    """The text of a member. Raises ProfileError if it is too large."""
     size = archive.getinfo(member).file_size
     if size > MOST_BYTES:
         raise ProfileError(f"profile {archive.filename}: {member} has {size} bytes, {MOST_BYTES} are allowed")
@@ -205,8 +208,8 @@ def _position(ini: configparser.ConfigParser) -> str:
     return ini.get("metadata", "position", fallback="")
 
 
-def _said(key: str, text: str) -> str:
-    """A value as PrusaSlicer would say it."""
+def _to_prusaslicer(key: str, text: str) -> str:
+    """A value as PrusaSlicer would write it."""
     if key in PERCENT and not text.endswith("%"):
         return f"{text}%"
     if key == "extrusion_multiplier" and (percent := finite(text)) is not None:

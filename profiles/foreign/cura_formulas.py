@@ -1,7 +1,7 @@
-"""Cura's formulas: values of settings that follow from others (`=line_width * 2`), in a file and in Cura's own definitions.
+"""Cura's formulas: values of settings that depend on others (`=line_width * 2`), in a file and in Cura's own definitions.
 
-Formulas are expressions of Python (Cura, UM/Settings/SettingFunction.py); those of its definitions are in
-resources/definitions/fdmprinter.def.json. Only arithmetic on settings that a file has a value for is worked out.
+Formulas are Python expressions (Cura, UM/Settings/SettingFunction.py); those of the definitions are in
+resources/definitions/fdmprinter.def.json. Only arithmetic on settings with a value in the file is computed.
 """
 
 import ast
@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-USUAL = {  # formulas of its definitions for what people set by another setting
+USUAL = {  # formulas in Cura's definitions for values usually set by another setting
     "magic_spiralize": "False",
     "line_width": "machine_nozzle_size",
     "wall_line_width": "line_width",
@@ -60,11 +60,11 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "math.ceil": math.ceil,
     "math.floor": math.floor,
 }
-DEEPEST = 12  # formulas within formulas; a ring of them would never end
+DEEPEST = 12  # nested formulas; a cycle would never end
 
 
-def worked_out(values: Mapping[str, str]) -> dict[str, str]:
-    """The values with formulas worked out where all that they name is known; those that are not stay as they are."""
+def evaluated(values: Mapping[str, str]) -> dict[str, str]:
+    """The values with formulas computed where all their names are known; other values are unchanged."""
     worked = dict(values)
     for key in (*values, *USUAL):
         if values.get(key, "=").startswith("="):
@@ -76,7 +76,7 @@ def worked_out(values: Mapping[str, str]) -> dict[str, str]:
 
 
 def inputs(key: str, values: Mapping[str, str]) -> set[str]:
-    """The settings of a file that the value of one follows from by formulas, itself aside."""
+    """The settings of a file that a value depends on by formulas, without itself."""
     found, waiting = set[str](), [key]
     while waiting:
         name = waiting.pop()
@@ -88,37 +88,37 @@ def inputs(key: str, values: Mapping[str, str]) -> set[str]:
 
 
 def _value(key: str, values: Mapping[str, str], deep: int) -> Any:
-    """The value of a setting. Raises LookupError where a setting has none, or for a word that is no arithmetic."""
+    """The value of a setting. Raises LookupError if a setting has no value, or for an unsupported expression."""
     text = values.get(key, "=" + USUAL.get(key, ""))
     if text == "=" or deep > DEEPEST:
         raise LookupError(key)
     if text.startswith("="):
-        return _worked(ast.parse(text[1:].strip(), mode="eval").body, values, deep + 1)
+        return _evaluate(ast.parse(text[1:].strip(), mode="eval").body, values, deep + 1)
     try:
         return ast.literal_eval(text)
     except (ValueError, SyntaxError):
         return text
 
 
-def _worked(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
-    """The value of an expression. Raises LookupError where a setting has none, or for a word that is no arithmetic."""
+def _evaluate(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
+    """The value of an expression. Raises LookupError if a setting has no value, or for an unsupported expression."""
     match node:
         case ast.Constant(value=value):
             return value
         case ast.Name(id=name):
             return _value(name, values, deep)
         case ast.IfExp(test=test, body=body, orelse=other):
-            return _worked(body if _worked(test, values, deep) else other, values, deep)
+            return _evaluate(body if _evaluate(test, values, deep) else other, values, deep)
         case ast.UnaryOp(op=operation, operand=operand) if type(operation) in OPERATORS:
-            return OPERATORS[type(operation)](_worked(operand, values, deep))
+            return OPERATORS[type(operation)](_evaluate(operand, values, deep))
         case ast.BinOp(left=left, op=operation, right=right) if type(operation) in OPERATORS:
             return OPERATORS[type(operation)](_number(left, values, deep), _number(right, values, deep))
         case ast.Compare(left=left, ops=[operation], comparators=[right]) if type(operation) in OPERATORS:
-            return OPERATORS[type(operation)](_worked(left, values, deep), _worked(right, values, deep))
+            return OPERATORS[type(operation)](_evaluate(left, values, deep), _evaluate(right, values, deep))
         case ast.BoolOp(op=ast.And(), values=terms):
-            return all(_worked(term, values, deep) for term in terms)
+            return all(_evaluate(term, values, deep) for term in terms)
         case ast.BoolOp(op=ast.Or(), values=terms):
-            return any(_worked(term, values, deep) for term in terms)
+            return any(_evaluate(term, values, deep) for term in terms)
         case ast.Call(func=called, args=[ast.Constant(value=str(name))]) if ast.unparse(called) == "resolveOrValue":
             return _value(name, values, deep)
         case ast.Call(func=called, args=terms, keywords=[]) if (function := FUNCTIONS.get(ast.unparse(called))) is not None:
@@ -127,12 +127,12 @@ def _worked(node: ast.AST, values: Mapping[str, str], deep: int) -> Any:
 
 
 def _number(node: ast.AST, values: Mapping[str, str], deep: int) -> float:
-    value = _worked(node, values, deep)
+    value = _evaluate(node, values, deep)
     if not isinstance(value, int | float):
         raise LookupError(ast.unparse(node))
     return value
 
 
 def _text(value: Any) -> str:
-    """A value as Cura's files have it."""
+    """A value as Cura's files write it."""
     return f"{value:.9g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

@@ -1,4 +1,6 @@
-"""Imported: a configuration of another slicer as settings of our material and process, row by row, with what was left and why."""
+"""Imported: a configuration of another slicer as settings of a material and a process, row by row, with what was not imported and
+why.
+"""
 
 from collections.abc import Collection, Iterator
 from typing import Any, NamedTuple
@@ -12,7 +14,7 @@ from profiles.profile import load_one
 from profiles.toml_text import read_value, value_text
 
 PROCESS_BASE = "standard"
-NOZZLE_MM = 0.4  # of the shipped machines, whose profile decides in the end
+NOZZLE_MM = 0.4  # of the shipped machines; the machine profile decides in the end
 KINDS = ("process", "material")
 RULES = {"process": PROCESS_RULES, "material": MATERIAL_RULES}
 CONDITIONS = {  # read together with other settings, and reported with them
@@ -20,12 +22,13 @@ CONDITIONS = {  # read together with other settings, and reported with them
     *("wipe_distance", "enable_pressure_advance", "enable_dynamic_overhang_speeds", "enable_overhang_speed"),
     *("curr_bed_type", "adhesion_type"),
 }
-SPARE = frozenset(f"process.{key}" for key in WIDTHS) - {"process.line_width_mm"}  # widths that may be those of all lines
+SPARE = frozenset(f"process.{key}" for key in WIDTHS) - {"process.line_width_mm"}  # widths that may equal the default line width
 
 
 class Row(NamedTuple):
-    """A setting of theirs and what it became. key: ours; value: ours, as TOML has it, empty where it is left; how: what was
-    worked out, or why it is left."""
+    """A setting of another slicer and what it became. key: ours; value: ours in TOML, empty if not imported; how: how it was
+    computed, or why it was not imported.
+    """
 
     name: str
     text: str
@@ -35,12 +38,12 @@ class Row(NamedTuple):
 
     @property
     def taken(self) -> bool:
-        """Whether it is in the profile."""
+        """Whether the setting is in the profile."""
         return bool(self.value)
 
 
 class Imported(NamedTuple):
-    """A profile to be: kind, name, the shipped one it inherits from, and the rows of its settings."""
+    """A profile to be written: kind, name, the shipped profile it inherits, and the rows of its settings."""
 
     kind: str
     name: str
@@ -49,19 +52,21 @@ class Imported(NamedTuple):
 
     @property
     def settings(self) -> list[str]:
-        """What differs, as --set takes it."""
+        """The differences from the shipped profile, as for --set."""
         return [f'{self.kind}.name="{_quoted(self.name)}"', *(f"{row.key}={row.value}" for row in self.rows if row.taken)]
 
 
 def imported(config: Config, kind: str, name: str = "", nameless: str = "imported") -> Imported:
-    """The material or the process of a configuration. name: what to call it; else as there; nameless: where it has no name."""
+    """The material or the process of a configuration. name: of the profile; else its name in the file; nameless: used if it has
+    none.
+    """
     base = PROCESS_BASE if kind == "process" else base_of(config)[0]
     own_name = name or (config.process if kind == "process" else config.material) or nameless
-    return _sound(Imported(kind, own_name, base, tuple(_rows(config, kind, base))))
+    return _without_conflicts(Imported(kind, own_name, base, tuple(_rows(config, kind, base))))
 
 
-def _sound(profile: Imported) -> Imported:
-    """The profile without widths that do not go with its layers; ProfileError where it cannot be one even so."""
+def _without_conflicts(profile: Imported) -> Imported:
+    """The profile without widths that conflict with its layers. Raises ProfileError if it is invalid even then."""
     try:
         load_one(profile.base, profile.settings, profile.kind)
     except ProfileError as error:
@@ -69,25 +74,25 @@ def _sound(profile: Imported) -> Imported:
         wide = [row for row in profile.rows if row.taken and row.key in SPARE and row.key.split(".")[1] in said]
         if not wide:
             raise ProfileError(f"{profile.kind} {profile.name!r}: {said}") from None
-        rows = (row._replace(value="", how=_about(row, said)) if row in wide else row for row in profile.rows)
-        return _sound(profile._replace(rows=tuple(rows)))
+        rows = (row._replace(value="", how=_sentence_on(row, said)) if row in wide else row for row in profile.rows)
+        return _without_conflicts(profile._replace(rows=tuple(rows)))
     return profile
 
 
-def _about(row: Row, said: str) -> str:
-    """The sentence that names a row's key."""
+def _sentence_on(row: Row, said: str) -> str:
+    """The sentence of an error message that names a row's key."""
     return next(line for line in said.replace("; ", "\n").splitlines() if row.key.split(".")[1] in line)
 
 
 def unused(config: Config) -> list[str]:
-    """Names of theirs that no rule reads: what there is nothing like here, and what belongs to the machine."""
+    """Names in the file that no rule reads: settings without an equivalent, and settings of the machine."""
     keys = {source for kind in KINDS for _, source, _ in RULES[kind]} | CONDITIONS
     read = config.read | {name for key, (name, _) in config.entries.items() if key in keys}
     return sorted({name for name, _ in config.entries.values()} - read | set(config.unknown))
 
 
-def stay(profile: Imported) -> list[str]:
-    """Our keys that nothing of theirs has touched."""
+def unchanged_keys(profile: Imported) -> list[str]:
+    """Our keys that the import leaves unchanged."""
     from profiles.wording import keys
 
     taken = {row.key for row in profile.rows if row.taken}
@@ -96,8 +101,9 @@ def stay(profile: Imported) -> list[str]:
 
 
 def _rows(config: Config, kind: str, base: str, sources: Collection[str] | None = None) -> Iterator[Row]:
-    """One row a rule whose setting the file has; of several for one key the first that gives a value is taken. sources: the
-    settings to look at; None: all."""
+    """One row per rule whose setting the file has; if several give one key, the first value is used. sources: the settings to
+    read; None: all.
+    """
     done: set[str] = set()
     for key, source, convert in RULES[kind]:
         if config.text(source) is None or (sources is not None and source not in sources):
@@ -117,8 +123,9 @@ def _rows(config: Config, kind: str, base: str, sources: Collection[str] | None 
 
 
 def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str, Any], list[str]]:
-    """What some settings of a configuration, by their names there, become where they hold in a volume of a print: values by keys
-    of a process, and the names of those that are left."""
+    """Some settings of a configuration, by their names in the file, converted for a volume of a print: values by keys of a
+    process, and the names that were not imported.
+    """
     process = load_one(PROCESS_BASE, kind="process")["process"]
     assert isinstance(process, Process)
     sources = {key for key, (name, _) in config.entries.items() if name in names}
@@ -132,7 +139,7 @@ def settings_of_place(config: Config, names: Collection[str]) -> tuple[dict[str,
 
 
 def _text(value: float | bool | str, base: str, kind: str, key: str) -> str:
-    """A value as TOML has it; whole numbers where the key takes whole ones."""
+    """A value as TOML; whole numbers where the key takes whole ones."""
     is_whole = isinstance(value, float) and value.is_integer() and not isinstance(value, bool)
     if is_whole and isinstance(_default(base, kind, key), int):
         return value_text(int(value))
@@ -145,7 +152,7 @@ def _default(base: str, kind: str, key: str) -> object:
 
 
 def _refusal(base: str, kind: str, key: str, text: str) -> str:
-    """What a profile says against a value; empty where it takes it."""
+    """The problem of a value in a profile; empty if it is allowed."""
     try:
         load_one(base, [f"{key}={text}"], kind)
     except ProfileError as error:

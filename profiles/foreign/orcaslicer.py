@@ -1,7 +1,7 @@
-"""OrcaSlicer's and Bambu Studio's files: JSON presets that inherit from files beside them, and the settings in a G-code file.
+"""OrcaSlicer's and Bambu Studio's files: JSON presets that inherit from neighbouring files, and the settings in a G-code file.
 
-Keys and what percentages are of: OrcaSlicer, src/libslic3r/PrintConfig.cpp. Line widths in percent are of the nozzle, where
-PrusaSlicer's are of the layer's height.
+Keys and the base of percentages: OrcaSlicer, src/libslic3r/PrintConfig.cpp. Line widths in percent refer to the nozzle,
+PrusaSlicer's to the layer height.
 """
 
 import json
@@ -19,7 +19,7 @@ ABOUT = (
     *("type", "name", "from", "inherits", "instantiation", "setting_id", "filament_id", "version", "is_custom_defined"),
     *("compatible_printers", "compatible_prints", "compatible_printers_condition", "compatible_prints_condition"),
 )
-WORDS = {  # values that are called otherwise
+WORDS = {  # values with other names
     "fill_pattern": {"zig-zag": "rectilinear", "tri-hexagon": "stars"},
     "top_fill_pattern": {"zig-zag": "rectilinear"},
     "bottom_fill_pattern": {"zig-zag": "rectilinear"},
@@ -27,7 +27,7 @@ WORDS = {  # values that are called otherwise
     "seam_position": {"back": "rear", "aligned_back": "rear"},
     "support_material_pattern": {"default": "rectilinear"},
 }
-PLATES = {  # the bed that Bambu Studio and OrcaSlicer heat is that of the plate that lies on it
+PLATES = {  # the heated bed's temperature depends on the plate on it
     "Cool Plate": "cool_plate_temp",
     "Engineering Plate": "eng_plate_temp",
     "High Temp Plate": "hot_plate_temp",
@@ -36,7 +36,7 @@ PLATES = {  # the bed that Bambu Studio and OrcaSlicer heat is that of the plate
 
 
 def read_preset(file: Path, document: Mapping[str, Any]) -> Config:
-    """A JSON preset with what it inherits from files beside it. Raises ProfileError."""
+    """A JSON preset with all it inherits from neighbouring files. Raises ProfileError."""
     values, missing = _inherited(file, document, ())
     values.setdefault("nozzle_diameter", _nozzle(file, document))
     name, kind = str(document.get("name", file.stem)), TYPES.get(str(document.get("type", "")), "")
@@ -45,7 +45,7 @@ def read_preset(file: Path, document: Mapping[str, Any]) -> Config:
 
 
 def of_values(values: Mapping[str, str], process: str = "", material: str = "") -> Config:
-    """Settings under OrcaSlicer's names."""
+    """Settings given by OrcaSlicer's names."""
     entries, own = dict[str, Entry](), dict[str, tuple[str, str]]()
     for name, text in values.items():
         key = ORCASLICERS.get(name, name)
@@ -68,7 +68,7 @@ def values_of(document: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _inherited(file: Path, document: Mapping[str, Any], below: tuple[Path, ...]) -> tuple[dict[str, str], str]:
-    """All settings of a preset, and the name of a parent that no file beside it has (its settings are then unknown)."""
+    """All settings of a preset, and the name of a parent without a neighbouring file (whose settings are unknown)."""
     own = values_of(document)
     parent = str(document.get("inherits", "") or "")
     if not parent:
@@ -83,7 +83,7 @@ def _inherited(file: Path, document: Mapping[str, Any], below: tuple[Path, ...])
 
 
 def _nozzle(file: Path, document: Mapping[str, Any]) -> str:
-    """The nozzle of the printers that a preset is for, by their files beside it; "" where there are none, or they differ."""
+    """The nozzle of the printers of a preset, according to their neighbouring files; "" if there are none or they differ."""
     printers, beside = document.get("compatible_printers"), {path.stem: path for path in reversed(_beside(file))}
     found = [beside[name] for name in printers if name in beside] if isinstance(printers, list) else []
     nozzles = {_inherited(printer, read_json(printer), ())[0].get("nozzle_diameter", "") for printer in found}
@@ -91,8 +91,9 @@ def _nozzle(file: Path, document: Mapping[str, Any]) -> str:
 
 
 def _beside(file: Path) -> list[Path]:
-    """The files that a parent or a printer may be in: of the same folder, of those beside and above it that hold profiles, and of
-    a person's own preset in user/NAME/process those of the vendors in system/NAME/process."""
+    """The files that may hold a parent or a printer: in the preset's folder, in folders beside and above it that hold profiles,
+    and for a user's preset in user/NAME/process the vendors' in system/NAME/process.
+    """
     above = file.parent.parent
     return [
         *sorted(file.parent.glob("*.json")),
@@ -103,20 +104,20 @@ def _beside(file: Path) -> list[Path]:
 
 
 def read_json(file: Path) -> Mapping[str, Any]:
-    """The table of a JSON file. Raises ProfileError."""
+    """The table in a JSON file. Raises ProfileError."""
     try:
         document = json.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
     except (ValueError, RecursionError) as error:
-        raise ProfileError(f"profile {file}: is no JSON ({error})") from None
+        raise ProfileError(f"profile {file}: is not JSON ({error})") from None
     if not isinstance(document, dict):
-        raise ProfileError(f"profile {file}: is no table of settings")
+        raise ProfileError(f"profile {file}: is not a table of settings")
     return document
 
 
 def _text(value: object) -> str:
-    """A value of a preset: texts, or lists of one text an extruder."""
+    """A value of a preset: a text, or a list with one text per extruder."""
     if isinstance(value, list):
         return ",".join(str(item) for item in value)
     return str(value)

@@ -1,9 +1,9 @@
-"""PrusaSlicer's and SuperSlicer's files: config.ini, bundles of presets that inherit, and what stands at the end of G-code.
+"""PrusaSlicer's and SuperSlicer's files: config.ini, bundles of presets with inheritance, and the settings at the end of G-code.
 
-A bundle's sections are [print:NAME], [filament:NAME], [printer:NAME]; `inherits = A; B` takes A, then B over it, and names in
-asterisks are parts that no one chooses (PrusaSlicer, src/libslic3r/PresetBundle.cpp). PrusaSlicer 3 writes its settings into
-G-code twice: as JSON, and as older versions read them. The latter have the default of each setting that has moved from the
-printer to the print, such as retraction, so the JSON counts.
+The sections of a bundle are [print:NAME], [filament:NAME], [printer:NAME]; with `inherits = A; B`, B overrides A, and names in
+asterisks are building blocks that users do not select (PrusaSlicer, src/libslic3r/PresetBundle.cpp). PrusaSlicer 3 writes its
+settings into G-code twice: as JSON, and in the older format. The latter contains the default of each setting that has moved from
+the printer to the print, such as retraction, so the JSON is used.
 """
 
 import json
@@ -14,23 +14,23 @@ from typing import Any
 from profiles.errors import ProfileError
 from profiles.foreign.config import Config, finite, first_filament, width_of_nozzle
 
-KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # of a bundle's sections, and the options' names
+KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # of the sections of a bundle, and the options' names
 SECTION = re.compile(r"\[(.+)\]")
-# SuperSlicer has the widths of lines by their distance, too; its percentages of widths and of layers are of the nozzle, and
-# flows are percentages (supermerill/SuperSlicer, src/libslic3r/PrintConfig.cpp, ratio_over).
+# SuperSlicer also gives line widths by their distance; its percentages of widths and layers refer to the nozzle, and flows are
+# percentages (supermerill/SuperSlicer, src/libslic3r/PrintConfig.cpp, ratio_over).
 OF_SUPERSLICER = frozenset({"extrusion_spacing", "perimeter_extrusion_spacing", "external_perimeter_extrusion_spacing"})
 WIDTHS = ("extrusion_width", "min_layer_height", "max_layer_height")
 FLOWS = ("bridge_flow_ratio", "over_bridge_flow_ratio")
-SHOWN = 8  # presets that a sentence names
+SHOWN = 8  # presets that a message names
 JSON_BLOCK = re.compile(r"^; prusaslicer_json_config = begin\r?\n(.*?)^; prusaslicer_json_config = ", re.MULTILINE | re.DOTALL)
-BLOCKS = frozenset({"prusaslicer_config", "prusaslicer_json_config"})  # that begin and end like settings
+BLOCKS = frozenset({"prusaslicer_config", "prusaslicer_json_config"})  # which begin and end like settings
 JSON_GROUPS = ("printer_settings", "print_settings", "toolprint_settings", "filament_settings")  # the last has a key's value
 
 Presets = dict[str, dict[str, dict[str, str]]]  # kind, name, key
 
 
 def read_settings(lines: list[str], chosen: Mapping[str, str]) -> Config:
-    """A config.ini, or the one preset of each kind that is chosen of a bundle. Raises ProfileError."""
+    """The settings of a config.ini, or of the selected preset of each kind in a bundle. Raises ProfileError."""
     presets = _sections(lines)
     if not any(presets[kind] for kind in KINDS):
         return of_gcode(presets[""].get("", {}))
@@ -42,7 +42,7 @@ def read_settings(lines: list[str], chosen: Mapping[str, str]) -> Config:
 
 
 def gcode_settings(text: str) -> dict[str, str]:
-    """The settings at the end of a G-code file: `; key = value`, and those of its JSON; empty where it has none.
+    """The settings at the end of a G-code file: `; key = value`, and those of its JSON; empty if it has none.
 
     Raises ProfileError for text that is not JSON.
     """
@@ -68,12 +68,12 @@ def _json_settings(block: str) -> dict[str, str]:
     settings: dict[str, str] = {}
     for group in of_print:
         settings |= group
-    # A filament has a key of the print only where it overrides it, which older versions call filament_KEY.
+    # A filament has a key of the print only to override it; older versions call that key filament_KEY.
     return settings | {f"filament_{key}" if key in settings else key: text for key, text in of_filament.items()}
 
 
 def _json_text(value: Any) -> str:
-    """A value of PrusaSlicer 3's JSON as its config.ini has it; of a list the first."""
+    """A value of PrusaSlicer 3's JSON as in config.ini; of a list, the first."""
     if isinstance(value, list):
         return _json_text(value[0]) if value else ""
     if isinstance(value, dict):
@@ -84,7 +84,7 @@ def _json_text(value: Any) -> str:
 
 
 def of_gcode(settings: Mapping[str, str]) -> Config:
-    """The settings of a G-code file that PrusaSlicer or SuperSlicer wrote."""
+    """The settings of a G-code file written by PrusaSlicer or SuperSlicer."""
     return _config(settings, settings.get("print_settings_id", ""), first_filament(settings))
 
 
@@ -101,30 +101,30 @@ def _sections(lines: list[str]) -> Presets:
     return presets
 
 
-def _chosen(presets: Presets, kind: str, asked: str) -> str:
-    """The preset of a kind that is asked for, that the bundle calls active, or that is its only one."""
+def _chosen(presets: Presets, kind: str, wanted: str) -> str:
+    """The preset of a kind that was requested, that is active in the bundle, or that is its only one."""
     names = [name for name in presets[kind] if not name.startswith("*")]
-    if asked:
-        if asked not in presets[kind]:
-            raise ProfileError(f"{KINDS[kind]} preset {asked!r}: the file has no such one; {_told(names, asked)}")
-        return asked
+    if wanted:
+        if wanted not in presets[kind]:
+            raise ProfileError(f"{KINDS[kind]} preset {wanted!r}: the file has no such one; {_preset_names(names, wanted)}")
+        return wanted
     active = presets["presets"].get("", {}).get(kind, "").split(";")[0].strip()
     if active in presets[kind]:
         return active
     if len(names) > 1 and kind != "printer":
-        raise ProfileError(f"--{KINDS[kind]}-preset is missing: the file has {len(names)}; {_told(names, '')}")
+        raise ProfileError(f"--{KINDS[kind]}-preset is missing: the file has {len(names)}; {_preset_names(names, '')}")
     return names[0] if len(names) == 1 else ""
 
 
-def _told(names: list[str], asked: str) -> str:
-    """A few of the names, those that share a word with what was asked for first."""
-    words = [word for word in re.split(r"\W+", asked.lower()) if word]
+def _preset_names(names: list[str], wanted: str) -> str:
+    """A few of the names, those that share a word with the requested one first."""
+    words = [word for word in re.split(r"\W+", wanted.lower()) if word]
     near = sorted(names, key=lambda name: -sum(word in name.lower() for word in words))
     return f"among them {', '.join(repr(name) for name in near[:SHOWN])}" if names else "it has none of this kind"
 
 
 def _inherited(presets: Mapping[str, Mapping[str, str]], name: str, below: tuple[str, ...]) -> dict[str, str]:
-    """A preset's settings with those that it inherits."""
+    """The settings of a preset, with inherited ones."""
     if name in below:
         raise ProfileError(f"preset {name!r} inherits itself")
     if name not in presets:
@@ -142,13 +142,13 @@ def _parents(text: str) -> Iterator[str]:
 def _config(values: Mapping[str, str], process: str, material: str) -> Config:
     if not OF_SUPERSLICER & values.keys():
         return Config("PrusaSlicer", {key: (key, value) for key, value in values.items()}, (), process, material)
-    said = {key: _said(key, value, values.get("nozzle_diameter", "")) for key, value in values.items()}
+    said = {key: _to_prusaslicer(key, value, values.get("nozzle_diameter", "")) for key, value in values.items()}
     own = {key: (values[key], how) for key, (text, how) in said.items() if text != values[key]}
     return Config("SuperSlicer", {key: (key, text) for key, (text, _) in said.items()}, (), process, material, own)
 
 
-def _said(key: str, text: str, nozzle: str) -> tuple[str, str]:
-    """A value of SuperSlicer as PrusaSlicer would say it, and how it was worked out."""
+def _to_prusaslicer(key: str, text: str, nozzle: str) -> tuple[str, str]:
+    """A value of SuperSlicer as PrusaSlicer would write it, and how it was computed."""
     if key.endswith(WIDTHS):
         return width_of_nozzle(text, nozzle)
     percent = finite(text[:-1]) if key in FLOWS and text.endswith("%") else None

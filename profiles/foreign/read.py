@@ -1,4 +1,4 @@
-"""Read: the settings in a file of another slicer, whose kind its content shows, or in a .3mf that it has saved."""
+"""Read: the settings in a file of another slicer, recognised by its content, or in a .3mf that the slicer has saved."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
 from profiles.foreign.imported import settings_of_place
 
-MOST_BYTES = 256 << 20  # of a G-code file; settings stand in its last MiB, OrcaSlicer's in its first as well
+MOST_BYTES = 256 << 20  # of a G-code file; settings are in its last MiB, OrcaSlicer's also in its first
 END_BYTES = 1 << 20
 ORCA_KEYS = frozenset({"sparse_infill_density", "wall_loops", "nozzle_temperature"})
 PRUSA_KEYS = frozenset({"fill_density", "perimeters", "temperature", "layer_height", "filament_diameter", "nozzle_diameter"})
@@ -20,20 +20,20 @@ DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, ProfileError)
 MOST_SETTINGS_BYTES = 16 << 20  # of a slicer file, whose settings have some 100 kB
 OF_PRUSASLICER = ("metadata/slic3r_pe.config", "metadata/slic3r.config", "metadata/superslicer.config")
 OF_ORCASLICER = "metadata/project_settings.config"
-OBJECTS_OF_ORCASLICER = "metadata/model_settings.config"  # there without the other where a file holds models alone
+OBJECTS_OF_ORCASLICER = "metadata/model_settings.config"  # present without the other if a file holds only models
 OF_CURA = "cura/"
 
-# The settings of a slicer file under its program's names, and what makes a configuration of such.
+# The settings of a slicer file by its program's names, and the function that converts them to a configuration.
 SlicerSettings = tuple[Mapping[str, str], Callable[[Mapping[str, str]], Config]]
 
 
 def is_slicer_file(file: Path) -> bool:
-    """Whether a file may be one, by its name and kind."""
+    """Whether a file may hold settings of a slicer, by its name and content."""
     return file.suffix.lower() == ".3mf" and is_zip(file)
 
 
 def read_slicer_settings(file: Path) -> SlicerSettings:
-    """The settings of a slicer file, none where it keeps none. Raises ProfileError for such that are damaged."""
+    """The settings of a slicer file; empty if it has none. Raises ProfileError for damaged ones."""
     try:
         with ZipFile(file) as archive:
             entries = {name.lower(): name for name in archive.namelist()}
@@ -58,13 +58,13 @@ def read_slicer_settings(file: Path) -> SlicerSettings:
 
 
 def settings_of_volume(settings: SlicerSettings, of_volume: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
-    """What settings of a volume or an object become: values by keys of a process, and the names of those that are left."""
+    """The settings of a volume or an object converted: values by keys of a process, and the names that were not imported."""
     values, of_values = settings
     return settings_of_place(of_values({**values, **of_volume}), of_volume.keys()) if of_volume else ({}, [])
 
 
 def _text(archive: ZipFile, name: str) -> str:
-    """The text of a member. Raises ValueError for one that is too large."""
+    """The text of a member. Raises ValueError if it is too large."""
     size = archive.getinfo(name).file_size
     if size > MOST_SETTINGS_BYTES:
         raise ValueError(f"{name} has {size} bytes, {MOST_SETTINGS_BYTES} are allowed")
@@ -72,10 +72,10 @@ def _text(archive: ZipFile, name: str) -> str:
 
 
 def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
-    """The configuration in a file.
+    """The configuration in a file of another slicer.
 
-    presets: of a bundle, by "process", "material" and "printer". Raises ProfileError for a file that cannot be read, that is of
-    no slicer known here, or whose presets are not named.
+    presets: in a bundle, by "process", "material" and "printer". Raises ProfileError for a file that cannot be read, an unknown
+    slicer, or presets that are not named.
     """
     try:
         if is_slicer_file(file):
@@ -106,15 +106,15 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
 
 
 def _of_slicer_file(file: Path) -> Config:
-    """The settings inside a slicer file. Raises ProfileError where it keeps none."""
+    """The settings inside a slicer file. Raises ProfileError if it has none."""
     values, of_values = read_slicer_settings(file)
     if not values:
-        raise ProfileError(f"{file}: keeps no print settings; a .3mf that a slicer has saved with them is expected")
+        raise ProfileError(f"{file}: holds no print settings; a .3mf that a slicer has saved with them is expected")
     return of_values(values)
 
 
 def _ends(file: Path) -> bytes:
-    """A file's first and last bytes, all of a small one: presets are small, G-code is not."""
+    """The first and last bytes of a file, all of a small one: presets are small, G-code is not."""
     with file.open("rb") as stream:
         length = stream.seek(0, 2)
         stream.seek(0)

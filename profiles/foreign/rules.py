@@ -1,4 +1,4 @@
-"""Rules: which of another slicer's print and filament settings become which keys of a process and of a material."""
+"""Rules: the conversion of another slicer's print and filament settings to keys of a process and a material."""
 
 import re
 from math import pi
@@ -23,7 +23,7 @@ from profiles.foreign.conversion import (
     width,
 )
 
-Rule = tuple[str, str, Convert]  # our key, "" where there is none; PrusaSlicer's; how the one becomes the other
+Rule = tuple[str, str, Convert]  # our key, "" if there is none; PrusaSlicer's; the conversion
 FIRMWARE = "the firmware's own"
 AUTO = "as fast as the plastic melts; ours stays"
 SMALL_WALL = always(round(2.0 * pi * 6.5, 2), "a radius of 6.5 mm")  # of the walls that PrusaSlicer calls small
@@ -59,25 +59,25 @@ GCODE = "G-code blocks belong to the machine"
 
 
 def base_of(config: Config) -> tuple[str, str]:
-    """The shipped material that one inherits from, and what the file says that it is."""
+    """The shipped material to inherit, and the type of material in the file."""
     kind = (config.text("filament_type") or "").strip('"').upper()
     return next((BASES[word] for word in re.split(r"[^A-Z]+", kind) if word in BASES), USUAL_BASE), kind
 
 
 def _first_layer_infill_speed(config: Config, key: str) -> Converted:
-    """Only where the first layer's speed is a percentage do its skins have one of their own."""
+    """The speed of skins in the first layer; only if it is a percentage does it differ from other lines."""
     if config.share(key) is None:
         return None, "one speed for all lines"
     return part_of("solid_infill_speed")(config, key)
 
 
 def _first_layer_width(config: Config, key: str) -> Converted:
-    """0 is as elsewhere, by kind of line."""
+    """The first layer's line width; 0 uses the widths of the other layers."""
     return (None, "0: as elsewhere") if config.number(key) == 0.0 else part_of("first_layer_height")(config, key)
 
 
 def _steepest(config: Config, key: str) -> Converted:
-    """From the printing direction, where the others count from the horizontal."""
+    """The steepest overhang from the printing direction; other slicers count from the horizontal."""
     threshold = config.number(key)
     if threshold is None:
         return NO_NUMBER
@@ -85,13 +85,13 @@ def _steepest(config: Config, key: str) -> Converted:
 
 
 def _found_by_the_slicer(config: Config, key: str) -> Converted:
-    """A number, below 0 where the slicer works it out."""
+    """A number; if negative, the slicer computes it."""
     below = (config.number(key) or 0.0) < 0.0
     return (None, "below 0: worked out by the slicer; ours stays") if below else number(config, key)
 
 
 def _same_as_top(key_above: str, same: float, convert: Convert) -> Convert:
-    """A number where one value of it means: as above."""
+    """A number; one value of it means the value of another key."""
 
     def converted(config: Config, key: str) -> Converted:
         value = config.number(key)
@@ -122,7 +122,7 @@ def _holes_of_all(config: Config, key: str) -> Converted:
 
 
 def _overhang(percent_on_plastic: str) -> Convert:
-    """PrusaSlicer's speeds by what is on plastic hold at one share, ours from there to the next; 0 is off."""
+    """Speed at an overhang: PrusaSlicer's values hold at one share of the line on plastic, ours up to the next; 0 is off."""
 
     def convert(config: Config, key: str) -> Converted:
         value, how = part_of("external_perimeter_speed", "not slowed down there; ours stays")(config, key)
@@ -133,7 +133,7 @@ def _overhang(percent_on_plastic: str) -> Convert:
 
 
 def _fan_most(config: Config, key: str) -> Converted:
-    """The fan's most: where nothing is cooled by layer time, the least that is always there."""
+    """Greatest fan speed: if nothing is cooled by layer time, the least one."""
     if config.flag("cooling") is False and config.text("fan_always_on") is not None:
         least, how = FAN_LEAST(config, "min_fan_speed")
         return least, how if least is None else "cooling is off: the fan stays at its least"
@@ -141,12 +141,12 @@ def _fan_most(config: Config, key: str) -> Converted:
 
 
 def _bridge_fan(config: Config, key: str) -> Converted:
-    """The fan over bridges; below 0 SuperSlicer has it as elsewhere."""
+    """Fan speed over bridges; in SuperSlicer a negative value means the usual one."""
     return (None, "below 0: as elsewhere") if (config.number(key) or 0.0) < 0.0 else share(config, key)
 
 
 def _override(own: str, convert: Convert = number) -> Convert:
-    """The filament's own value where it has one, else the printer's."""
+    """The filament's own value if it has one, else the printer's."""
 
     def converted(config: Config, key: str) -> Converted:
         if config.text(own) is None:
@@ -158,7 +158,7 @@ def _override(own: str, convert: Convert = number) -> Convert:
 
 
 def _advance(config: Config, key: str) -> Converted:
-    """Pressure advance out of a filament's G-code, where a line says nothing else."""
+    """Pressure advance from a filament's G-code, if no line contradicts it."""
     blocks = (config.text(key) or "").strip('"').replace("\\n", "\n").split("\n")
     found = [match[1] for line in blocks if (match := ADVANCE.match(line.split(";")[0].strip()))]
     if found:
@@ -302,8 +302,8 @@ PROCESS_RULES: tuple[Rule, ...] = (
 )
 MATERIAL_RULES: tuple[Rule, ...] = (
     ("material.diameter_mm", "filament_diameter", number),
-    ("material.density_g_cm3", "filament_density", above_zero("not told")),
-    ("material.price_per_kg", "filament_cost", above_zero("not told")),
+    ("material.density_g_cm3", "filament_density", above_zero("not given")),
+    ("material.price_per_kg", "filament_cost", above_zero("not given")),
     ("material.nozzle_c", "temperature", number),
     ("material.first_layer_nozzle_c", "first_layer_temperature", number),
     ("material.bed_c", "bed_temperature", number),

@@ -1,5 +1,5 @@
-"""Settings of a process: a file for each matter, all of them the fields of one Process.
+"""Settings of a process: a file for each subject, all of them fields of Process.
 
-A key is declared by `simple`, `advanced` or `rare` of profiles.frozen: first what people read and what is allowed, then its
-default and meaning.
+A key is declared by `simple`, `advanced` or `rare` of profiles.frozen: first its title and allowed values, then its default and
+meaning.
 """

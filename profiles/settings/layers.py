@@ -1,4 +1,4 @@
-"""Layers: how a part itself is printed, from the heights of its layers over its walls and skins to what fills it."""
+"""Layers: how a part itself is printed: the heights of its layers, walls, skins and infill."""
 
 from typing import Literal
 
@@ -8,7 +8,7 @@ SkinPattern = Literal["monotonic", "rectilinear", "concentric"]
 
 
 class Layers(Frozen):
-    """Size and turn of the model, heights of layers, widths of lines."""
+    """Size and orientation of the model, layer heights, line widths."""
 
     name: str = rare("Name of the process", effect=Effect.NONE)(..., "what people call it")
     scale: float = advanced("Scale of the model", "size factor shrink enlarge", gt=0, le=100000, effect=Effect.FRONT)(
@@ -174,7 +174,7 @@ class Finish(Frozen):
 
 
 class Infill(Frozen):
-    """What fills the inside."""
+    """Pattern and density of the infill."""
 
     infill_density: float = simple("Infill density", "fill density sparse percent", ge=0, le=1)(
         0.2, "share of the inside that is filled"

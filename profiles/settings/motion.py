@@ -1,4 +1,4 @@
-"""Motion: how fast the head moves along paths and between them."""
+"""Motion: speeds along paths and between them."""
 
 from profiles.frozen import Frozen, advanced, simple
 

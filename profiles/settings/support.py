@@ -1,4 +1,4 @@
-"""Support: what a part stands on, be it support, the plate, or the parts before it."""
+"""Support: what a part rests on: support, the build plate, or earlier parts."""
 
 from typing import Any, Literal
 
@@ -6,8 +6,8 @@ from pydantic import model_validator
 
 from profiles.frozen import Effect, Frozen, advanced, rare, simple
 
-ANY_MATERIAL_MM = 5.0  # what bridges in whatever is printed
-FARTHEST_MM = 1000.0  # no plate reaches so far from its turn axis
+ANY_MATERIAL_MM = 5.0  # a length that any material can bridge
+FARTHEST_MM = 1000.0  # larger than the distance of any plate from its turn axis
 MIDDLE = (0.0, 0.0)
 
 
@@ -52,7 +52,7 @@ class Support(Frozen):
         "ground, sturdier under heavy flat places",
     )
     support_on_part: bool = simple("Support may stand on the part", "supports on build plate only everywhere")(
-        True, "false: support stands on the platform or on the part's base only, so that it scars no surface"
+        True, "false: support stands on the build plate or on the part's base only, so that it leaves no marks"
     )
     support_branch_angle_deg: float = advanced("Support lean at most", "tree support branch angle supports", ge=0, le=60)(
         40.0,
@@ -101,13 +101,13 @@ class Support(Frozen):
     )
     support_foot_mm: float = rare("Wider foot on the plate", "supports first layer expansion", ge=0, le=20)(
         2.0,
-        "support is wider by up to this in its first layer on the platform, to stick better; no wider than twice its own height, "
-        "mm",
+        "support is wider by up to this in its first layer on the build plate, to stick better; no wider than twice its own "
+        "height, mm",
     )
     support_foot_density: float = rare("Density of the foot", "supports first layer density", gt=0, le=1)(
         0.85,
-        "share of the support's first layer on the platform that is filled; from 0.85 on its lines lie so near each other that "
-        "whatever stands on it has plastic under it",
+        "share of the support's first layer on the build plate that is filled; at 0.85 or more its lines are so close together "
+        "that everything on it has plastic beneath",
     )
     support_least_mm2: float = advanced(
         "Smallest place that is supported", "supports minimum area remove small overhangs", ge=0, le=1000, effect=Effect.FRONT
@@ -115,7 +115,7 @@ class Support(Frozen):
 
     @property
     def bridge_mm(self) -> float:
-        """The longest bridge without support; a profile that was loaded has put the material's where nothing was asked for."""
+        """The longest bridge without support; a loaded profile has the material's value if the process sets none."""
         return ANY_MATERIAL_MM if self.bridge_longest_mm is None else self.bridge_longest_mm
 
 
@@ -260,7 +260,7 @@ class Interface(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _as_in_earlier_versions(cls, values: Any) -> Any:
-        """What interlock_mm alone has meant before there was interlock."""
+        """Read interlock_mm alone, as in versions before interlock existed."""
         if isinstance(values, dict) and isinstance(values.get("interlock_mm"), int | float) and "interlock" not in values:
             return values | {"interlock": "grooves" if values["interlock_mm"] > 0 else "none"}
         return values

@@ -1,1 +1,1 @@
-"""Estimate: what parts cost in time and filament, known from some of their layers, and how long moves take."""
+"""Estimate: time and filament of parts from a sample of their layers, and duration of moves."""

@@ -1,13 +1,13 @@
 """Estimate: print time and filament of parts from a few of their layers, sliced as for a print.
 
-Sections and overhangs are those of the print. Support grows in thick layers by the rules of the real ones: what hangs in any of
-the layers that a thick one stands for hangs in it, so small places that hang are not lost between two sections, and what carries
-itself is known from the real layers. Each layer has a rough length of lines, from sums over the mesh and areas of support.
+Sections and overhangs are those of the print. Support is grown in thick layers by the ordinary rules: a thick layer has the
+overhangs of all the layers that it represents, so small overhangs are not lost between two sections, and self-supporting areas
+are known from the real layers. Each layer has a rough length of lines, from sums over the mesh and areas of support.
 
 The layers are divided into runs of about equal rough time. Two neighbouring layers of each run are sliced by the slicer's own
-code and timed with the machine's acceleration; the whole run differs from its rough figures by the same factor. Seams lie where
-the layer alone would have them, and a spiral vase counts as ordinary walls. The estimate is for choosing between decompositions;
-the dry run has the exact figures.
+code and timed with the machine's acceleration; the whole run is scaled from its rough figures by the same factor. Seams are
+placed as if each layer were alone, and a spiral vase counts as ordinary walls. The estimate is for choosing between
+decompositions; the dry run has the exact figures.
 """
 
 from collections.abc import Sequence
@@ -38,24 +38,24 @@ from slicer.strokes.order import SUPPORTS
 from slicer.strokes.seam import NO_SEAMS, Surroundings, place_seams
 from slicer.strokes.seam_plan import NO_LIMITS, rear_of
 from slicer.strokes.speed import SPEED_KEYS
-from slicer.support.handed_down import plan_supports, up_to
+from slicer.support.from_earlier_part import plan_supports, up_to
 from slicer.support.support import Supports, own_supports, wanted_places
 
-SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced: estimates of 44 prints are then off by 2 % (rms)
-FEWEST = 12  # pairs of a part
-RUN = 8  # layers a pair stands for, at least: with more of them a small print would take as long as slicing all of it
-STEP = 2  # layers that a thick one stands for, at least: growing support from half of the layers takes half the time
-MOST_THICK = 200  # thick layers of a part: a higher part has thicker ones
-FEW = 40  # layers up to the highest place that hangs whose support is grown as it is
-WAY_S = 0.3  # to a layer and to each of its outlines
-SLOWER = 1.4  # strokes with their accelerations and travels than their lengths at their speeds
+SAMPLES = 24  # pairs of neighbouring layers of a print that are sliced; the error for 44 prints is then 2 % (rms)
+FEWEST = 12  # least number of pairs for a part
+RUN = 8  # least number of layers represented by a pair; fewer would make the estimate of a small print as slow as slicing it
+STEP = 2  # least number of layers in a thick layer: growing support in half of the layers takes half the time
+MOST_THICK = 200  # greatest number of thick layers of a part; a higher part has thicker ones
+FEW = 40  # number of layers up to the highest overhang below which support is grown in real layers
+WAY_S = 0.3  # for reaching a layer and each of its outlines
+SLOWER = 1.4  # factor for accelerations and travels on the time of strokes at their nominal speeds
 TINY_MM2, TINY_MM3 = 1e-9, 1e-6
-TURN_S = 2.0  # of the table before a part
+TURN_S = 2.0  # turn of the table before a part
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Seconds of printing, mm of filament, and mm3 of it that is support."""
+    """Printing time, s, filament, mm, and volume of support, mm3."""
 
     time_s: float
     filament_mm: float
@@ -63,9 +63,9 @@ class Estimate:
 
 
 def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
-    """What printing one part, or several one after the other, takes.
+    """Time and filament of one part, or of several printed one after the other.
 
-    The same on every machine. Raises SliceError where a part's mesh is not closed or it is too high to be meant.
+    The result does not depend on the computer. Raises SliceError if a part's mesh is not closed or it is implausibly high.
     """
     several = (parts,) if isinstance(parts, Part) else tuple(parts)
     total, sections = np.zeros(3), section_parts(several, profile)
@@ -77,7 +77,7 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
 
 
 def _of_part(supports: Supports, overhangs: Sequence[Overhang], samples: int) -> Floats:
-    """(3,) seconds, mm of filament and mm3 of support of a part, and of the turn of the table and the wait for heat before it."""
+    """(3,) seconds, mm of filament and mm3 of support of a part, including the turn of the table and the heating before it."""
     sections, profile = supports.sections, supports.sections.profile
     process, filament_mm2 = profile.process, 0.25 * pi * profile.material.diameter_mm**2
     drawn_mm, held_mm = rough_lengths_mm(sections), support_lengths_mm(supports)
@@ -89,13 +89,13 @@ def _of_part(supports: Supports, overhangs: Sequence[Overhang], samples: int) ->
     own_mm3, support_mm3 = drawn_mm.sum(axis=1) * bead_mm2 + TINY_MM3, held_mm.sum(axis=1) * bead_mm2
     time_s = float(_weights(rough_s, layers, begins) @ real[:, 0])
     own = float(_weights(own_mm3, layers, begins) @ (real[:, 1] - real[:, 2]))
-    # Single layers may have no support, so the factor between rough and real figures is one for all layers over the first.
+    # Single layers may have no support, so one factor between rough and real figures serves all layers above the first.
     counts = _weights(np.ones(len(rough_s)), layers, begins)[1:]
     known = float(counts @ support_mm3[layers[1:]])
     factor = float(counts @ real[1:, 2]) / known if known > 0.0 else 1.0
     support = float(real[0, 2] + factor * support_mm3[1:].sum())
     total: Floats = np.array([time_s, (own + support) / filament_mm2, support])
-    if sections.on_platform:
+    if sections.on_plate:
         total = total + _line_before(profile, filament_mm2) + _raft(supports, filament_mm2)
     else:
         heating_s = profile.machine.heating_s(process.interface_temperature_add_c, TURN_S)
@@ -104,7 +104,7 @@ def _of_part(supports: Supports, overhangs: Sequence[Overhang], samples: int) ->
 
 
 def _rough_s(drawn_mm: Floats, outlines: Indices, process: Process) -> Floats:
-    """(n,) seconds of layers with (n, 5) mm of walls, skin, infill, support and dense support, and with (n,) outlines."""
+    """(n,) rough seconds of layers with (n, 5) mm of walls, skin, infill, support and dense support, and (n,) outlines."""
     kinds = (Kind.INNER_WALL, Kind.SKIN, Kind.INFILL, *SUPPORTS)
     speeds = np.array([getattr(process, SPEED_KEYS[kind]) for kind in kinds])
     least_s = np.minimum(process.least_layer_time_s, drawn_mm.sum(axis=1) / process.least_speed_mm_s)
@@ -113,10 +113,10 @@ def _rough_s(drawn_mm: Floats, outlines: Indices, process: Process) -> Floats:
 
 
 def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
-    """Layers that stand for runs of layers, and where each run begins: the first layer for itself, then runs of equal weight.
+    """Sample layers that represent runs of layers, and the start of each run: the first layer alone, then runs of equal weight.
 
-    The difference of a layer's weight from that of the next one counts, too, so that runs are short where weights vary and begin
-    at large jumps. A run's samples are the two neighbours in its middle, whose lines have turned directions.
+    The difference between the weights of successive layers counts as well, so runs are short where weights vary, and begin at
+    large jumps. A run's samples are the two neighbours in its middle, whose line directions differ.
     """
     count = len(weight)
     done = np.cumsum(weight[1:] + np.abs(np.diff(weight[1:], append=weight[-1:])))
@@ -130,7 +130,7 @@ def choose_layers(weight: Floats, samples: int) -> tuple[Indices, Indices]:
 
 
 def _sliced_layers(shells: Shells, layers: Indices) -> Floats:
-    """(n, 3) seconds, mm3 and mm3 of support of each of some layers."""
+    """(n, 3) seconds, mm3 and mm3 of support of some layers, sliced."""
     sections, figures = shells.sections, np.zeros((len(layers), 3))
     rear = tip = rear_of(sections.mesh.bounds_mm)
     for row, layer in zip(figures, layers.tolist(), strict=True):
@@ -139,7 +139,7 @@ def _sliced_layers(shells: Shells, layers: Indices) -> Floats:
         beads, _ = place_seams([*own, *auxiliary], sections.process, around)
         strokes, speeds, flow = order_layer([*beads, *shells.layers[layer].ending], shells, layer, tip, Polygons())
         if len(strokes):
-            height_mm, first = float(sections.heights.height_mm[layer]), layer == 0 and sections.on_platform
+            height_mm, first = float(sections.heights.height_mm[layer]), layer == 0 and sections.on_plate
             mm3 = strokes.lengths_mm * bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
             time_s = strokes_s(strokes, speeds, tip, sections.profile, first)
             row[:] = time_s, mm3.sum(), mm3[strokes.is_of(*SUPPORTS)].sum()
@@ -148,14 +148,14 @@ def _sliced_layers(shells: Shells, layers: Indices) -> Floats:
 
 
 def _weights(rough: Floats, layers: Indices, begins: Indices) -> Floats:
-    """How many times each sampled layer counts: a run takes as much more than its rough figures as its samples do."""
+    """(n,) weight of each sampled layer: a run is scaled from its rough figures like its samples."""
     run = np.searchsorted(begins, layers, side="right") - 1
     weights: Floats = (np.add.reduceat(rough, begins) / np.bincount(run, rough[layers]))[run]
     return weights
 
 
 def _line_before(profile: Profile, filament_mm2: float) -> Floats:
-    """(3,) figures of the line before a print."""
+    """(3,) figures of the purge line before a print."""
     process, length_mm = profile.process, profile.machine.purge_mm
     bead_mm2 = bead_area_mm2(INTERFACE_WIDTH * process.line_width_mm, process.first_layer_height_mm)
     return np.array(
@@ -164,7 +164,7 @@ def _line_before(profile: Profile, filament_mm2: float) -> Floats:
 
 
 def _raft(supports: Supports, filament_mm2: float) -> Floats:
-    """(3,) figures of the raft under a part, if it has one; all of it counts as support."""
+    """(3,) figures of the raft under a part, zero without one; all of it counts as support."""
     layers, profile = raft_layers(supports), supports.sections.profile
     time_s, tip = 0.0, rear_of(supports.sections.mesh.bounds_mm)
     for k, layer in enumerate(layers):
@@ -176,7 +176,7 @@ def _raft(supports: Supports, filament_mm2: float) -> Floats:
 
 
 def _rough_supports(sections: Sequence[Sections], overhangs: Sequence[Sequence[Overhang]]) -> list[Supports]:
-    """The support of all parts of a print, in print order: of every layer that of the thick one it belongs to."""
+    """The supports of all parts of a print, in print order, with real layers filled from thick ones."""
     wanted = [wanted_places(*pair) for pair in zip(sections, overhangs, strict=True)]
     tops = [max((k + 1 for k, area in enumerate(places) if not area.is_empty()), default=0) for places in wanted]
     thick = []
@@ -187,15 +187,15 @@ def _rough_supports(sections: Sequence[Sections], overhangs: Sequence[Sequence[O
 
 
 def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
-    """The support that a part has of its own, in thick layers; the first layer stands for itself."""
+    """The part's own support in thick layers; the first layer stays separate."""
     process, heights = sections.process, sections.heights
     step = max(STEP, ceil(len(heights.tip_mm) / MOST_THICK))
     begins = np.array([0, *range(1, len(heights.tip_mm), step)])
     ends = np.append(begins[1:], len(heights.tip_mm))
     middles = (begins + ends - 1) // 2
-    # Hanging places lie anywhere in a thick layer, and support ends below it: the gaps are lost in that.
+    # Overhangs lie anywhere in a thick layer, and support ends below it, so gaps do not matter.
     coarse = {
-        "support": "auto",  # the wanted places are chosen already
+        "support": "auto",  # the supported areas are already chosen
         "support_interface_layers": -(-process.support_interface_layers // step),
         "support_bottom_interface_layers": -(-process.support_bottom_interface_layers // step),
         "support_gap_mm": 0.0,
@@ -224,7 +224,7 @@ def _grown(sections: Sections, wanted: Sequence[Polygons]) -> Supports:
 
 
 def _of_layers(sections: Sections, thick: Supports) -> Supports:
-    """The support of real layers from that of thick ones."""
+    """The support of real layers from that of thick layers."""
     tips_mm = thick.sections.heights.tip_mm
     standing = [float(tips_mm[k]) for k, area in enumerate(thick.areas) if not area.is_empty()]
     sections = up_to(sections, max(standing, default=0.0))
@@ -235,30 +235,30 @@ def _of_layers(sections: Sections, thick: Supports) -> Supports:
 
 
 def support_lengths_mm(supports: Supports) -> Floats:
-    """(n, 2) sparse and dense lines of the support of every layer of a part."""
+    """(n, 2) lengths of sparse and dense lines of support in every layer of a part, mm."""
     sections, process = supports.sections, supports.sections.support_process
     several = zip(supports.areas, supports.dense, supports.hollow, strict=True)
     extents = [(whole.area(), perimeter_mm(whole), dense.area(), (whole - hollow).area()) for whole, dense, hollow in several]
     area, around, close, filled = np.array(extents).T
     spacing = spacing_mm(process.line_width_mm, process.layer_height_mm)
     walls_mm, density = process.support_walls * around, np.full(len(area), process.support_density)
-    if sections.on_platform:
+    if sections.on_plate:
         density[0] = process.support_foot_density
     inside = np.maximum(area - walls_mm * spacing, 0.0)
     dense = np.minimum(close, inside)
     sparse = (inside - dense) * filled / np.maximum(area, LEAST_MM2)
     lengths_mm = np.column_stack([walls_mm + sparse * density / spacing, dense * process.support_interface_density / spacing])
     if sections.on_raft:
-        lengths_mm[0] = 0.0  # what lies beside the first layer there is the raft's
+        lengths_mm[0] = 0.0  # beside the first layer lies the raft
     return lengths_mm
 
 
 def rough_lengths_mm(sections: Sections) -> Floats:
-    """(n, 3) walls, skin and sparse infill of every layer of a part."""
+    """(n, 3) rough lengths of walls, skin and sparse infill in every layer of a part, mm."""
     mesh, process = sections.mesh, sections.process
     (top, bottom), width = shell_layers(process), process.line_width_mm
     area, around, over, under = _measure(mesh.vertices, mesh.faces, sections.heights.cut_mm)
-    if not sections.on_platform:
+    if not sections.on_plate:
         under[0] = 0.0
     seen, hung, at = np.append(0.0, np.cumsum(over)), np.append(0.0, np.cumsum(under)), np.arange(len(area))
     bare = seen[np.minimum(at + top, len(at))] - seen[at] + hung[at + 1] - hung[np.maximum(at + 1 - bottom, 0)]
@@ -270,7 +270,7 @@ def rough_lengths_mm(sections: Sections) -> Floats:
 
 
 def _by_places(sections: Sections, key: str, usual: float) -> Floats:
-    """(n,) the mean over every layer of a value of the process that some places may have otherwise."""
+    """(n,) mean of a process value over every layer, where modifiers may override it."""
     values = np.full(len(sections.own), usual)
     for place in combined(sections.places, [key]):
         for layer, (area, section) in enumerate(zip(place.areas, sections.own, strict=True)):
@@ -281,7 +281,9 @@ def _by_places(sections: Sections, key: str, usual: float) -> Floats:
 
 @kernel
 def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """(n,) area and outline of the sections, and the surface seen from above and from below that belongs to each layer."""
+    """(n,) area and perimeter of the sections, and the upward- and downward-facing surface that belongs to each layer,
+    projected.
+    """
     n = len(cuts)
     area, around, over, under = floats(n, 0.0), floats(n, 0.0), floats(n, 0.0), floats(n, 0.0)
     ends = floats(4, 0.0)
@@ -304,7 +306,8 @@ def _measure(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Floats, Float
                 tz, hz = vertices[tail, 2], vertices[head, 2]
                 if (tz < z) != (hz < z):
                     share = (z - hz) / (tz - hz)
-                    at = 0 if hz < z else 2  # the outline comes over the edge that goes down and leaves over the one that goes up
+                    # the outline enters over the edge that goes down and leaves over the one that goes up
+                    at = 0 if hz < z else 2
                     ends[at] = vertices[head, 0] + share * (vertices[tail, 0] - vertices[head, 0])
                     ends[at + 1] = vertices[head, 1] + share * (vertices[tail, 1] - vertices[head, 1])
             area[layer] += 0.5 * (ends[0] * ends[3] - ends[1] * ends[2])

@@ -1,7 +1,7 @@
-"""Timing: how long every straight move takes, with acceleration and look-ahead at the corners, and the strokes of a layer.
+"""Timing: duration of straight moves with acceleration and look-ahead at corners, and of a layer's strokes.
 
-The model of classic Marlin: constant acceleration along the move, at a corner every axis may change its speed at once by at
-most the junction speed, and the speeds at the corners are the greatest from which the machine can still stop.
+The model is that of classic Marlin: constant acceleration along the move; at a corner every axis may change its speed instantly
+by at most the junction speed; and corner speeds are the greatest from which the machine can still stop.
 """
 
 from math import sqrt
@@ -23,13 +23,14 @@ from slicer.strokes.travels import STANDING_MM
 
 TINY = 1e-9
 SPEED, MOST_MM_S2, STANDS = 6, 7, 8  # columns of a table of moves, after the steps of six axes
-# A wipe turns in its middle by 45 deg, as over the small rings after which most are: mm along each axis for a mm of all of it.
+# A wipe turns by 45 deg in its middle, as over the small rings that most wipes follow: mm along each axis per mm of its length.
 TURNED = 0.5 / sqrt(2.0)
 
 
 class Speeds(NamedTuple):
-    """Upper limits for moves that do not extrude: mm/s straight up and down, across, and of the filament alone; mm/s2, inf
-    where the axes decide; (3,) mm/s of X, Y and Z."""
+    """Upper limits for moves that do not extrude: vertical, horizontal and of the filament alone, mm/s; acceleration, mm/s2, inf
+    if the axes decide; (3,) speeds of X, Y and Z, mm/s.
+    """
 
     lift_mm_s: float
     travel_mm_s: float
@@ -39,8 +40,8 @@ class Speeds(NamedTuple):
 
 
 class Blocks(NamedTuple):
-    """Moves as a planner takes them, (m,) each: direction (m, 6) of X Y Z tilt turn E, length, cruise speed, acceleration, by
-    what F measures it, and whether all before it must be over.
+    """Moves in the form that a planner takes, (m,) each: direction (m, 6) of X Y Z tilt turn E, length, cruise speed,
+    acceleration, the measure used by F, and whether the machine stops before the move.
     """
 
     direction: Floats
@@ -52,7 +53,7 @@ class Blocks(NamedTuple):
 
 
 def speeds_of(profile: Profile) -> Speeds:
-    """What the process asks for, as far as the axes and the extruder allow it."""
+    """The process's speeds, limited by the axes and the extruder."""
     process, machine, material = profile.process, profile.machine, profile.material
     return Speeds(
         lift_mm_s=min(process.lift_speed_mm_s, machine.z.speed_mm_s),
@@ -65,7 +66,7 @@ def speeds_of(profile: Profile) -> Speeds:
 
 @no_nrt
 def trapezoid_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, v0: float, v1: float) -> float:
-    """Seconds of a straight move from one speed to another: a trapezoid of speeds, or a triangle where it gets no faster."""
+    """Duration of a straight move between two speeds, s: a speed trapezoid, or a triangle if cruise speed is not reached."""
     peak = min(speed_mm_s, sqrt(0.5 * (v0 * v0 + v1 * v1) + acceleration_mm_s2 * length_mm))
     ramps_mm = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * acceleration_mm_s2)
     return float((2.0 * peak - v0 - v1) / acceleration_mm_s2 + max(0.0, length_mm - ramps_mm) / max(peak, TINY))
@@ -73,7 +74,7 @@ def trapezoid_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, 
 
 @kernel
 def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> float:
-    """Seconds of a straight line from a stand to a stand."""
+    """Duration of a straight move from rest to rest, s."""
     return trapezoid_s(length_mm, speed_mm_s, acceleration_mm_s2, 0.0, 0.0)
 
 
@@ -91,9 +92,9 @@ def axis_accelerations(machine: Machine) -> Floats:
 
 
 def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
-    """What F measures for (n, 6) deltas of X Y Z tilt turn E, and by which measure (0 X Y Z, 1 rotary, 2 filament, 3 none).
+    """Length measured by F for (n, 6) deltas of X Y Z tilt turn E, and its measure (0 X Y Z, 1 rotary, 2 filament, 3 none).
 
-    The rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament.
+    The rule of NIST's RS274: the path of X Y Z; if they do not move, the rotary axes; if these do not move either, the filament.
     """
     x, y, z, tilt, turn, filament = deltas.T
     ways: list[Floats] = [np.sqrt(x**2 + y**2 + z**2), np.hypot(tilt, turn), np.abs(filament)]
@@ -106,8 +107,8 @@ def move_times(
 ) -> Floats:
     """(n,) seconds for (n, 6) deltas of X Y Z tilt turn E at (n,) speeds (mm/s or deg/s along what F measures).
 
-    stop: (n,) True where the machine stands still before the move. most_mm_s2: (n,) acceleration limit of X Y Z. Axes that
-    would be too fast slow the move down.
+    stop: (n,) whether the machine stops before the move. most_mm_s2: (n,) acceleration limit of X Y Z. A move is slowed down if
+    an axis would exceed its speed.
     """
     blocks, moving = blocks_of(deltas, speed, stop, machine, most_mm_s2)
     times = np.zeros(len(deltas))
@@ -119,14 +120,14 @@ def move_times(
 def blocks_of(
     deltas: Floats, speed: Floats, stop: NDArray[np.bool_], machine: Machine, most_mm_s2: Floats | None = None
 ) -> tuple[Blocks, NDArray[np.bool_]]:
-    """The blocks of the moves that move anything, and (n,) which they are."""
+    """The blocks of all moves with a length, and (n,) a mask of these moves."""
     length, measure = lengths(deltas)
     limits = axis_speeds(machine), axis_accelerations(machine)
     cruise, acceleration = _allowed(np.ascontiguousarray(deltas), length, speed, *limits)
     if most_mm_s2 is not None:
         acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
     moving = measure < 3
-    which = slice(None) if moving.all() else moving  # mostly all of them, which need not be copied
+    which = slice(None) if moving.all() else moving  # usually all of them, which need not be copied
     halts = np.diff(np.cumsum(stop)[which], prepend=0) > 0
     direction = deltas[which] / length[which, None]
     return Blocks(direction, length[which], cruise[which], acceleration[which], measure[which], halts), moving
@@ -136,7 +137,7 @@ def blocks_of(
 def _allowed(
     deltas: Floats, length: Floats, speed: Floats, most_speed: Floats, most_acceleration: Floats
 ) -> tuple[Floats, Floats]:
-    """(n,) speed and acceleration along each move at which no axis has more than its most."""
+    """(n,) speed and acceleration along each move at which no axis exceeds its limits."""
     cruise, acceleration = floats(len(deltas), 0.0), floats(len(deltas), np.inf)
     for k in range(len(deltas)):
         cruise[k] = speed[k]
@@ -148,14 +149,14 @@ def _allowed(
 
 @no_nrt
 def along(most: float, step: float, length: float) -> float:
-    """What a move of some length may have when one axis, which makes a step of it, may have at most so much."""
+    """Limit along a move of some length from the limit of one axis, whose part of the move is `step`."""
     share = abs(step) / max(length, TINY)
     return most / share if share > 0.0 else np.inf
 
 
 @no_nrt
 def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float) -> float:
-    """The greatest speed at a corner: no axis changes its speed by more than the junction speed; 0 where the measure changes."""
+    """Greatest speed at a corner: no axis changes its speed by more than the junction speed; 0 if the measure changes."""
     if blocks.measure[before] != blocks.measure[after]:
         return 0.0
     v = min(blocks.cruise[before], blocks.cruise[after])
@@ -168,13 +169,13 @@ def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float)
 
 @no_nrt
 def block_time(blocks: Blocks, i: int, v0: float, v1: float) -> float:
-    """Seconds of a block from one speed to another."""
+    """Duration of a block between two speeds, s."""
     return trapezoid_s(blocks.length[i], blocks.cruise[i], blocks.acceleration[i], v0, v1)
 
 
 @kernel
 def _block_times(blocks: Blocks, junction_speed: float) -> Floats:
-    """Seconds of each block: corner speeds, backward and forward pass, trapezoids."""
+    """(m,) duration of each block, s: corner speeds, backward and forward pass, trapezoids."""
     n = len(blocks.length)
     corner, times = floats(n + 1, 0.0), floats(n, 0.0)
     for i in range(1, n):
@@ -189,9 +190,9 @@ def _block_times(blocks: Blocks, junction_speed: float) -> Floats:
 
 
 def strokes_s(strokes: Strokes | Layer, speeds_mm_s: Floats, tip: Floats, profile: Profile, first_layer: bool) -> float:
-    """Seconds of a layer's strokes at their (k,) speeds, with the rise to it, the travels to them and their retractions.
+    """Duration of a layer's strokes at their (k,) speeds, s, including the rise to the layer, travels and retractions.
 
-    tip: (2,) where the layer below ends.
+    tip: (2,) end of the layer below, mm.
     """
     machine, process, material, speeds = profile.machine, profile.process, profile.material, speeds_of(profile)
     places = strokes.points, strokes.starts, strokes.width_mm, strokes.approach, strokes.approach_starts
@@ -202,7 +203,7 @@ def strokes_s(strokes: Strokes | Layer, speeds_mm_s: Floats, tip: Floats, profil
     speed_mm_s, most_mm_s2, stands = np.ascontiguousarray(moves[:, SPEED:].T)
     moving_s = move_times(moves[:, :6], speed_mm_s, stands > 0.0, machine, most_mm_s2).sum()
     rise_s = line_s(process.layer_height_mm, speeds.lift_mm_s, machine.z.acceleration_mm_s2)
-    # The filament moves alone where a retraction ends, and where it begins without a wipe.
+    # The filament moves alone at the end of a retraction, and at its beginning if there is no wipe.
     alone_mm = [material.retract_mm + material.retract_prime_extra_mm, *([] if wipe_mm > 0.0 else [material.retract_mm])]
     ramp = machine.extruder_acceleration_mm_s2
     standing_s = sum(line_s(length_mm, speeds.filament_mm_s, ramp) for length_mm in alone_mm) if pulls else 0.0
@@ -218,9 +219,10 @@ def _moves(
     paces: Speeds,
     far_mm: tuple[float, float, float],
 ) -> Floats:
-    """(n, 9) straight moves of strokes one after the other with the travels to them: steps of X Y Z tilt turn E, speed, greatest
-    acceleration, and 1 where the machine stands still before. A travel that retracts wipes and lifts, and ends at a stand, where
-    the filament is primed. far_mm: of a lift, a wipe and the filament pulled back meanwhile."""
+    """(n, 9) straight moves of consecutive strokes with their travels: steps of X Y Z tilt turn E, speed, greatest acceleration,
+    and 1 if the machine stops before. A travel with retraction wipes and lifts, and ends at rest, where the filament is primed.
+    far_mm: lengths of lift, wipe and filament pulled back during the wipe.
+    """
     points, starts, width_mm, approach, approach_starts = places
     speeds, most = bounds
     lift_mm, wipe_mm, pulled_mm = far_mm
@@ -233,7 +235,7 @@ def _moves(
             if n > 0:
                 begun = starts[k - 1]
                 apart = sqrt((x - points[begun, 0]) ** 2 + (y - points[begun, 1]) ** 2)
-                wipe = wipe_mm if apart <= width_mm[k - 1] else -wipe_mm  # on along a ring, back along a line
+                wipe = wipe_mm if apart <= width_mm[k - 1] else -wipe_mm  # forward along a ring, back along a line
                 ux, uy, uz = moves[n - 1, 0], moves[n - 1, 1], moves[n - 1, 2]
                 length = sqrt(ux**2 + uy**2 + uz**2)
                 ux, uy, aside = ux / length, uy / length, TURNED * wipe
@@ -259,7 +261,7 @@ def _moves(
 
 @no_nrt
 def _add(moves: Floats, n: int, step: tuple[float, float, float], speed: float, most_mm_s2: float, stands: bool) -> int:
-    """Appends a move as row n; returns the new n."""
+    """Append a move as row n; returns the new n."""
     if sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2) <= STANDING_MM:
         return n
     moves[n, 0], moves[n, 1], moves[n, 2] = step

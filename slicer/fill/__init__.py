@@ -1,1 +1,1 @@
-"""Fill: which places are skin and which sparse, and the beads of skins and sparse infill."""
+"""Fill: division of a layer into skin and sparse areas, and the beads of skins and sparse infill."""

@@ -1,13 +1,13 @@
-"""Ends: skins over sparse infill grow until their lines end on what holds them, and strokes of skin and infill end on plastic.
+"""Ends of lines: skins over sparse infill grow until their lines end on an anchor, and strokes of skin and infill end on plastic.
 
-The lines of a layer are taken as rows. Where a row of skin ends over a void of the layer below, farther than HOLDS from what
-holds it, it goes on to the next line of infill or to the end of the void.
+The lines of a layer are treated as rows. Where a row of skin ends over a void of the layer below, farther than HOLDS from its
+last anchor, it continues to the next line of infill or to the end of the void.
 
-Even then lines lie beside the rows by which a skin grew, turns leave wedges along its border, and lines of infill end before it.
-A stroke whose last line width lies on nothing is extended to plastic nearby if that keeps it inside the outline of its own layer.
-Otherwise, where the model continues below, it is cut back to the last place that has plastic below, and left out if there is
-none; a bridge over open air stays. The runs along walls that anchor lines of infill begin where no infill lies as soon as the
-lines move or part. They are cut back, too, and grow from layer to layer as far as each carries the next.
+Even then, lines may lie beside the rows by which a skin grew, turns leave wedges along its border, and lines of infill end before
+it. A stroke whose last line width lies on nothing is extended to nearby plastic if that stays inside the outline of its own
+layer. Otherwise, where the model continues below, it is cut back to the last point with plastic below, and dropped if there is
+none; a bridge over open air stays. The runs along walls that anchor lines of infill begin over a void as soon as the lines shift
+or separate. They are cut back as well, and grow from layer to layer as far as each supports the next.
 """
 
 from collections.abc import Sequence
@@ -30,24 +30,24 @@ from slicer.geometry.polyline import length_mm
 from slicer.heights import Heights
 from slicer.paths import SKINS
 
-NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are no bridges
-ANCHORED = 2.0  # line widths that the lines of a bridge reach over its anchors
-HIDDEN = 0.6  # line widths that they keep from a top, so that gaps between the ends of the lines lie under the walls around it
-HOLDS = 0.75  # line widths that a row may reach beyond what holds it
+NARROW = 2.0  # line widths: narrower strips of skin over sparse infill are not bridges
+ANCHORED = 2.0  # line widths by which the lines of a bridge overlap its anchors
+HIDDEN = 0.6  # line widths between bridge lines and a top, so that gaps between line ends lie under the walls around it
+HOLDS = 0.75  # line widths that a row may extend beyond its anchor
 ROWS = 0.5  # line widths between rows
-RIM = 0.1  # line widths by which neighbouring rows overlap, and below which what they add is rounding
-KEPT = 1.0  # squares of an infill cell: smaller places that skins leave of the sparse infill become solid
-MOST_ROUNDS = 2  # newly solid places may themselves end over a void; what ends there still is held by hold_ends
-STEP = 0.125  # line widths between the places of a stroke under which plastic is looked for
-CARRIES = 0.35  # line widths from the middle of a line that it carries the middle of what lies on it
-ONWARD = 1.0  # line widths that a stroke may go on to plastic
-LAP = 0.5  # line widths that a stroke which ends on plastic laps over it or beyond it
-LAPS = (LAP, 0.25, 0.0)  # that are tried where plastic is nearby: a single wall leaves no room for more inside the outline
-CARRYING = 3  # layers below that carry infill: the lines of a pattern lie in the same place in every third layer at least
-SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, of the sparse infill below, and a line of it
-HELD, EXTEND, CUT = range(3)  # an end on plastic, one that may be extended to it, and one that may also be cut back
+RIM = 0.1  # line widths by which neighbouring rows overlap; smaller additions are rounding
+KEPT = 1.0  # squares of an infill cell: smaller sparse areas left between skins become solid
+MOST_ROUNDS = 2  # newly solid areas may themselves end over a void; remaining ends are handled by hold_ends
+STEP = 0.125  # line widths between the points of a stroke tested for plastic below
+CARRIES = 0.35  # line widths from the centre of a line within which it supports the centre of a line above
+ONWARD = 1.0  # line widths by which a stroke may be extended to plastic
+LAP = 0.5  # line widths by which an extended stroke overlaps plastic
+LAPS = (LAP, 0.25, 0.0)  # overlaps that are tried: a single wall leaves no room for more inside the outline
+CARRYING = 3  # layers below that support infill: a pattern's lines repeat at least every third layer
+SKIN, VOID, LINE = 0, 1, 2  # what a row crosses: the border of a skin, the border of the sparse infill below, or an infill line
+HELD, EXTEND, CUT = range(3)  # an end on plastic, an end that may be extended, and an end that may also be cut back
 
-Plastic = tuple[EdgeIndex, Floats]  # the middle lines of beads, and for each segment how far from it a bead carries, mm
+Plastic = tuple[EdgeIndex, Floats]  # centrelines of beads, and for each segment the distance within which a bead supports, mm
 
 
 def anchor_skins(
@@ -57,7 +57,9 @@ def anchor_skins(
     fillings: Sequence[Filling],
     heights: Heights,
 ) -> tuple[list[Region], dict[int, list[Bead]]]:
-    """The regions of all layers with skins that end on infill or on what is solid, and the infill of those below such skins."""
+    """The regions of all layers, with skins grown to end on infill or on solid areas, and the infill of the layers below such
+    skins.
+    """
     done, drawn = list(filled), dict[int, list[Bead]]()
     for k, process in enumerate(processes[:-1]):  # the layer below and its settings
         layer, region, width = k + 1, filled[k + 1], processes[k + 1].line_width_mm
@@ -73,9 +75,9 @@ def anchor_skins(
 def anchored(
     region: Region, sparse_below: Polygons, infill_below: Sequence[Floats], angle_deg: float, width_mm: float, cell_mm: float
 ) -> Region:
-    """The region with its skins grown along lines at an angle, so that all of these end on something.
+    """The region with its skins grown along lines at an angle, so that every line ends on an anchor.
 
-    sparse_below: what is sparse of the layer below; infill_below: the lines (n, 2) in it, about cell_mm apart.
+    sparse_below: sparse area of the layer below; infill_below: its lines (n, 2), about cell_mm apart.
     """
     skin, sparse = region.solid + region.top, region.sparse
     for _ in range(MOST_ROUNDS):
@@ -89,14 +91,14 @@ def anchored(
         skin, sparse = skin + (sparse - left), left
     if sparse is region.sparse:
         return region
-    grown = region.sparse - sparse  # a model in one piece would have it, too
+    grown = region.sparse - sparse  # the uncut model would have this skin, too
     return replace(region, solid=region.solid + grown, sparse=sparse, uncut=region.uncut - grown)
 
 
 def infill_bridges(region: Region, sparse_below: Polygons, width_mm: float) -> Polygons:
-    """Where solid lines span the sparse infill of the layer below, and as far beyond as they hold on to what is solid there.
+    """Area in which solid lines bridge the sparse infill of the layer below, including their overlap with its solid areas.
 
-    Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
+    Strips narrower than NARROW lines are left out: the skin beside them supports their lines.
     """
     solid = region.solid + (region.top - offset(region.bare, HIDDEN * width_mm))
     if solid.is_empty() or sparse_below.is_empty():
@@ -131,7 +133,7 @@ def _extension(
 
 
 def _row_crossings(segments: Floats, kind: int, apart_mm: float) -> tuple[Indices, Floats, Indices]:
-    """The rows, level lines at heights (k + 0.5) apart_mm, that segments (n, 4) cross, and x there."""
+    """The rows, horizontal lines at heights (k + 0.5) apart_mm, that segments (n, 4) cross, and the x of each crossing."""
     low, high = np.sort(segments[:, 1::2] / apart_mm - 0.5, axis=1).T
     first = np.ceil(low).astype(np.int64)
     many = np.maximum(np.ceil(high).astype(np.int64) - first, 0)
@@ -143,7 +145,7 @@ def _row_crossings(segments: Floats, kind: int, apart_mm: float) -> tuple[Indice
 
 @kernel
 def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
-    """(n, 3) row, from and to, of skins that end over a void on either side, grown to what holds them there.
+    """(n, 3) row, start and end of extensions, for skins that end over a void on either side.
 
     rows, x and kinds: of the crossings of each row, from left to right.
     """
@@ -155,7 +157,7 @@ def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
             end += 1
         for side in range(2):
             in_skin, in_void = False, False
-            held, begun, ended = -1e300, 0.0, 0.0  # the last place that holds a line, and the ends of the last skin
+            held, begun, ended = -1e300, 0.0, 0.0  # the last anchor, and the ends of the last skin
             lacking = False
             for k in range(begin, end):
                 at = k if side == 0 else begin + end - 1 - k
@@ -181,7 +183,7 @@ def _missing(rows: Indices, x: Floats, kinds: Indices, holds: float) -> Floats:
 
 
 def plastic_of(beads: Sequence[Bead]) -> Plastic | None:
-    """What the beads of a layer carry; None where there are none."""
+    """The centrelines of a layer's beads with their reach of support; None if there are no beads."""
     lying = [bead for bead in beads if len(bead.points) > 1]
     if not lying:
         return None
@@ -192,9 +194,9 @@ def plastic_of(beads: Sequence[Bead]) -> Plastic | None:
 def hold_ends(
     beads: Sequence[Bead], below: Plastic | None, section: Polygons, section_below: Polygons, width_mm: float
 ) -> list[Bead]:
-    """The beads of a layer, whose skin strokes end on the plastic of the layer below where the model is there or near.
+    """The beads of a layer with skin strokes that end on the plastic of the layer below, wherever the model is there or near.
 
-    section, section_below: the model's sections in this layer and in the one below.
+    section, section_below: the model's sections in this layer and the layer below.
     """
     skins = [k for k, bead in enumerate(beads) if bead.kind in SKINS and not bead.closed]
     if not skins or below is None:
@@ -206,7 +208,7 @@ def hold_ends(
     inside_mm = depths(np.concatenate([beads[k].points[[0, -1]] for k in skins]), index_edges(section_below)).reshape(-1, 2)
     loose = np.where(ends & (inside_mm > 0.0), CUT, np.where(ends & (inside_mm > -width_mm), EXTEND, HELD))
     needs, outline = dict(zip(skins, loose.tolist(), strict=True)), index_edges(section)
-    out, cut = list[Bead](), False  # cut: the bead that the next one would follow is left out
+    out, cut = list[Bead](), False  # cut: whether the bead before, which the next one would follow, was dropped
     for k, bead in enumerate(beads):
         points, (first, last) = bead.points, needs.get(k, (HELD, HELD))
         if first:
@@ -224,9 +226,9 @@ def hold_ends(
 
 
 def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[Bead]:
-    """The beads of a layer, whose lines of infill run along walls only as far as any of the layers below carries them.
+    """The beads of a layer with the infill lines' runs along walls limited to what the layers below support.
 
-    An end that lies on nothing for longer than an anchor is part of the pattern, and stays.
+    An end that is unsupported for longer than an anchor is part of the pattern, and stays.
     """
     layers, out = [plastic for plastic in below if plastic is not None], list(beads)
     for k, bead in enumerate(beads):
@@ -243,7 +245,7 @@ def cut_anchors(beads: Sequence[Bead], below: Sequence[Plastic | None]) -> list[
 
 @kernel
 def _first_held(points: Floats, plastic: Plastic, width_mm: float, most_mm: float) -> float:
-    """The way along a stroke to the first place that has plastic under it; -1.0 where most_mm bring none."""
+    """Distance along a stroke to the first point with plastic below, mm; -1.0 if there is none within most_mm."""
     lines, carries_mm = plastic
     farthest_mm = carries_mm.max()
     since = way = 0.0
@@ -265,7 +267,9 @@ def _first_held(points: Floats, plastic: Plastic, width_mm: float, most_mm: floa
 
 
 def _held(points: Floats, plastic: Plastic, outline: EdgeIndex, width_mm: float, need: int) -> Floats:
-    """A stroke (n, 2) that begins on plastic; no points where it may be cut and has no plastic below. need: EXTEND or CUT."""
+    """A stroke (n, 2) extended or cut back to begin on plastic; empty if it may be cut and has no plastic below. need: EXTEND or
+    CUT.
+    """
     along = points[0] - points[1]
     onward = along * (ONWARD * width_mm / max(float(np.hypot(*along)), 1e-9))
     way = _first_held(np.stack([points[0], points[0] + onward]), plastic, width_mm, ONWARD * width_mm)
@@ -281,7 +285,7 @@ def _held(points: Floats, plastic: Plastic, outline: EdgeIndex, width_mm: float,
 
 
 def _from(points: Floats, way: float) -> Floats:
-    """A stroke from a place on the way along it."""
+    """The rest of a stroke from a distance along it."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
     begins = np.cumsum(lengths) - lengths
     k = int(np.searchsorted(begins, way, side="right")) - 1

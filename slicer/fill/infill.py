@@ -1,4 +1,4 @@
-"""Infill: sparse patterns; a pattern gives the families of lines that one layer takes.
+"""Infill: sparse patterns; a pattern returns the families of lines for one layer.
 
 Gyroid: the level layers of Schoen's minimal surface sin x cos y + sin y cos z + sin z cos x = 0 as wavy lines. At height z the
 equation has the form A sin(u + phase) = B in one of x and y: in y when |cos z| > |sin z|, else in x; so every line is the graph
@@ -29,46 +29,49 @@ from slicer.heights import Heights
 from slicer.modifiers import SLIT_MM, Place, combined
 from slicer.paths import Kind
 
-DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
-MIDDLE = 0.4  # line widths: a wall that lies so far beside the one below has its middle at the edge of that, or over the infill
-BEYOND = 0.5  # line widths that a line under walls goes on beyond where they lean out
-SHORTEST = 2.0  # line widths: a wall spans less without a line under it
-RANK = 3  # behind skins (slicer.fill.skin)
-TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}  # of straight families
-SAMPLES = 6  # layers from which the plastic of anchors is judged
-MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border
-# Length of the lines in a square period, in periods, averaged over all heights, chords in place of arcs; integrated numerically.
+DENSE = 0.5  # infill with gaps below a line width supports skin without bridges
+MIDDLE = 0.4  # line widths: offset of a wall from the one below at which its centre lies at the edge of that wall, or over infill
+BEYOND = 0.5  # line widths by which a line under leaning walls extends beyond them
+SHORTEST = 2.0  # line widths: a wall bridges shorter spans without a line under it
+RANK = 3  # after skins (slicer.fill.skin)
+# of the families of straight lines
+TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}
+SAMPLES = 6  # layers from which the plastic in anchors is measured
+MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas consist mostly of border
+# Length of the lines in a square period, in periods, averaged over all heights, with chords instead of arcs; integrated
+# numerically.
 GYROID_LENGTH = 2.454
-GYROID_STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
-TURN_DEG = 60.0  # a third of the half turn after which lines are themselves again
+GYROID_STEPS = 20  # per period: chords deviate by up to 0.01 mm at a period of 5 mm
+TURN_DEG = 60.0  # a third of the half turn after which lines repeat
 
 
 @dataclass(frozen=True, eq=False)
 class Filling:
-    """A sparse infill: the place that has it, None: all that no later one takes; density: that its pattern is drawn with;
-    lightning: its lines (n, 2) in every layer, where that is the pattern."""
+    """A sparse infill. place: the modified area that has it, None for all the rest; density: density with which its pattern is
+    drawn; lightning: its lines (n, 2) in every layer, for that pattern.
+    """
 
     place: Place | None
     density: float
     lightning: Sequence[Sequence[Floats]] = ()
 
     def process(self, process: Process) -> Process:
-        """The settings of a layer for this infill, with the width of its lines."""
+        """The settings of a layer for this infill, with its line width."""
         own = process if self.place is None else self.place.over(process)
         return with_line_width(own, own.infill_line_width_mm)
 
 
 def has_lightning(process: Process, places: Sequence[Place]) -> bool:
-    """Whether any infill of a part has the lightning pattern, which is planned for all layers together."""
+    """Whether any infill of a part has the lightning pattern, which is planned for all layers at once."""
     return any(own.infill_pattern == "lightning" for own in (process, *(place.over(process) for place in places)))
 
 
 def plan_fillings(
     sparse: Sequence[Polygons], sections: Sequence[Polygons], process: Process, places: Sequence[Place], heights_mm: Floats
 ) -> list[Filling]:
-    """The infills of a part, each with the density of its pattern.
+    """The infills of a part, each with its pattern density.
 
-    sparse: the area of each layer that takes infill; sections: the part's own.
+    sparse: sparse area of each layer; sections: sections of the part itself.
     """
     fillings = [Filling(place, 0.0) for place in (None, *combined(places, Infill.model_fields))]
     areas: list[list[Polygons]] = [[] for _ in fillings]
@@ -89,8 +92,9 @@ def plan_fillings(
 
 
 def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: Process, *, apart: bool) -> list[Polygons]:
-    """A layer's sparse area divided among the infills: a later one takes its place first, with the strips beside it that are too
-    narrow for lines of an earlier one. apart: as far as both reach over their borders, as into a wall."""
+    """A layer's sparse area divided among the infills: later ones first, each with adjacent strips that are too narrow for lines
+    of an earlier one. apart: keep the distance by which both overlap their borders, as into a wall.
+    """
     left, parts, width_mm = sparse, list[Polygons](), process.line_width_mm
     apart_mm = 2.0 * process.infill_overlap * width_mm if apart and process.walls else 0.0
     for filling in reversed(fillings):
@@ -107,17 +111,17 @@ def divided(sparse: Polygons, fillings: Sequence[Filling], layer: int, process: 
 
 
 def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: float) -> float:
-    """The density to draw the pattern with so that it meets the process's density together with its anchors.
+    """The density for drawing the pattern such that pattern and anchors together meet the process's density.
 
-    areas: the sparse areas of all layers of a part. One figure for all of them, or lines would not stand on each other.
+    areas: the sparse areas of all layers of a part. One figure for all layers, otherwise lines would not stack.
     """
-    asked = process.infill_density
+    wanted = process.infill_density
     filled = [i for i, area in enumerate(areas) if not area.is_empty()]
-    if not filled or asked <= 0:
-        return asked
+    if not filled or wanted <= 0:
+        return wanted
     chosen = sorted({filled[(2 * k + 1) * len(filled) // (2 * SAMPLES)] for k in range(SAMPLES)})
     spacing = spacing_mm(process.line_width_mm, height_mm)
-    drawn = asked
+    drawn = wanted
     for _ in range(2):
         step = 0.25 * GYROID_LENGTH * spacing / drawn / len(chosen)  # a gyroid's layers differ over a quarter of its period
         samples = [
@@ -127,17 +131,17 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
         drawn_mm = sum(bead.length_mm for beads in samples for bead in beads)
         got = drawn_mm * spacing / sum(areas[i].area() for i in chosen)
         if got <= 0.0:
-            return asked
-        drawn = min(max(drawn * asked / got, asked * (1.0 - MOST_SHIFT)), asked * (1.0 + MOST_SHIFT))
+            return wanted
+        drawn = min(max(drawn * wanted / got, wanted * (1.0 - MOST_SHIFT)), wanted * (1.0 + MOST_SHIFT))
     return drawn
 
 
 def filling_beads(
     sparse: Polygons, leaning: Polygons, fillings: Sequence[Filling], process: Process, heights: Heights, layer: int
 ) -> list[Bead]:
-    """Beads of all infills in the sparse area of a layer, whose settings those of the process are.
+    """Beads of all infills in the sparse area of a layer. process: the layer's settings.
 
-    leaning: where walls of the next layer begin to leave those of this one; a line beside these carries them.
+    leaning: area where walls of the next layer leave those of this one; a line along it supports them.
     """
     width, z_mm, height_mm = process.line_width_mm, float(heights.tip_mm[layer]), float(heights.height_mm[layer])
     lines, sparse = _lines_under_walls(sparse, leaning, width, spacing_mm(width, height_mm))
@@ -152,8 +156,9 @@ def filling_beads(
 def leaning_walls(
     sparse: Sequence[Polygons], sections: Sequence[Polygons], insides: Sequence[Polygons], runs: Sequence[range], width_mm: float
 ) -> list[Polygons]:
-    """Where over the sparse places of each layer a wall of the next one has its middle beside the wall below, as where a shape
-    shrinks; runs: of layers whose walls are known."""
+    """Area over the sparse area of each layer in which a wall of the next layer has its centre beside the wall below, as where a
+    shape shrinks. runs: ranges of layers with known walls.
+    """
     leaning = [Polygons()] * len(sparse)
     for layer in (layer for run in runs for layer in run[:-1]):
         over = sparse[layer] - insides[layer + 1]
@@ -163,7 +168,7 @@ def leaning_walls(
 
 
 def _lines_under_walls(sparse: Polygons, leaning: Polygons, width_mm: float, spacing_mm: float) -> tuple[list[Floats], Polygons]:
-    """The lines along the border of a sparse area where walls lean over it, and what they leave of the area."""
+    """Lines along the border of a sparse area under leaning walls, and the remaining area."""
     middle = leaning if leaning.is_empty() else offset(sparse, -0.5 * spacing_mm)
     if middle.is_empty():
         return [], sparse
@@ -175,8 +180,9 @@ def _lines_under_walls(sparse: Polygons, leaning: Polygons, width_mm: float, spa
 
 
 def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, layer: int, lightning: bool = True) -> Polygons:
-    """The part of a layer's sparse area whose lines are too far apart to carry skin without bridges; lightning: also where
-    this is the pattern, whose branches come to the ends of skins."""
+    """The part of a layer's sparse area whose lines are too far apart to support skin without bridges. lightning: include that
+    pattern, whose branches reach the ends of skins.
+    """
     areas = zip(fillings, divided(sparse, fillings, layer, process, apart=False), strict=True)
     able = [(filling, area) for filling, area in areas if lightning or not filling.lightning]
     wide = [area for filling, area in able if filling.process(process).infill_density < DENSE]
@@ -184,7 +190,7 @@ def open_area(sparse: Polygons, fillings: Sequence[Filling], process: Process, l
 
 
 def widest_cell_mm(fillings: Sequence[Filling], process: Process, layer: int) -> float:
-    """About how far apart the lines of any infill of a layer lie."""
+    """Approximate distance of lines of the coarsest infill in a layer, mm."""
     there = [filling for filling in fillings if filling.place is None or not filling.place.areas[layer].is_empty()]
     return max(infill_cell_mm(filling.process(process)) for filling in there)
 
@@ -199,9 +205,10 @@ def infill_beads(
     height_mm: float,
     lightning: Sequence[Floats] = (),
 ) -> list[Bead]:
-    """Beads of the process's pattern in an area of a layer; density (0..1) of the pattern as pattern_density() gives it.
+    """Beads of the process's pattern in an area of a layer. density (0..1): density for drawing the pattern, from
+    pattern_density().
 
-    lightning: the layer's lines of that pattern, which are planned for all layers together.
+    lightning: the layer's lines of that pattern, which is planned for all layers at once.
     """
     width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
     inner, anchor_mm = _inner(area, process, spacing), 0.0
@@ -222,15 +229,15 @@ def infill_beads(
 
 
 def _inner(area: Polygons, process: Process, spacing_mm: float) -> Polygons:
-    """Where the middles of infill lines may be: as near to the walls as lines are apart, and by infill_overlap nearer."""
+    """The area for centrelines of infill: half a line spacing from the walls, or less by infill_overlap."""
     overlap = process.infill_overlap if process.walls else 0.0
     return area if area.is_empty() else offset(area, -(0.5 * spacing_mm - overlap * process.line_width_mm))
 
 
 def pattern_lines(process: Process, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
-    """The families of lines that the process's pattern has in a layer, which share the density.
+    """The families of lines of the process's pattern in a layer, which share the density.
 
-    z_mm: height of the layer; spacing_mm: of lines that fill an area completely.
+    z_mm: height of the layer; spacing_mm: line spacing of a solid fill.
     """
     pattern, angle_deg = process.infill_pattern, process.infill_angle_deg
     if pattern == "gyroid":
@@ -238,21 +245,21 @@ def pattern_lines(process: Process, layer: int, z_mm: float, spacing_mm: float, 
     if pattern == "honeycomb":
         return [honeycomb(layer, angle_deg, spacing_mm, density)]
     turns_deg = [90.0 * (layer % 2)] if pattern == "rectilinear" else TURNS_DEG[pattern]
-    # cubes that stand on a corner: their faces, three families of planes, move sideways by z / sqrt(2)
+    # cubes that stand on a corner: their faces, three families of planes, shift by z / sqrt(2)
     shift_mm = z_mm / sqrt(2.0) if pattern == "cubic" else 0.0
     return [parallel_lines(angle_deg + turn, len(turns_deg) * spacing_mm / density, shift_mm) for turn in turns_deg]
 
 
 def honeycomb(number: int, angle_deg: float, spacing_mm: float, density: float) -> LinePattern:
-    """Zigzags of the density."""
+    """Honeycomb zigzags of a density."""
     side = side_mm(spacing_mm, min(density, 1.0))
     return angle_deg + TURN_DEG * (number % 3), lambda box: _rows(box, side, spacing_mm)
 
 
 def side_mm(spacing_mm: float, density: float) -> float:
-    """Side a of the hexagons: a strip of sqrt(3)/2 a holds one line of length 3 a + 2 d / sqrt(3) in every 3 a.
+    """Side a of the hexagons, mm: a strip of width sqrt(3)/2 a holds one line of length 3 a + 2 d / sqrt(3) per 3 a.
 
-    d = sqrt(3)/2 a - spacing is how far the slanted sides reach from one flat side to the next.
+    d = sqrt(3)/2 a - spacing is the extent of the slanted sides between two flat ones.
     """
     per_side, fixed = 3.0 + 1.0, 2.0 / sqrt(3.0) * spacing_mm
     strip = 1.5 * sqrt(3.0) * density / spacing_mm
@@ -275,7 +282,7 @@ def _rows(box: Box, side: float, spacing_mm: float) -> Lines:
 
 
 def gyroid(z_mm: float, angle_deg: float, spacing_mm: float, density: float) -> LinePattern:
-    """Waves whose plastic is the density on average over the layers."""
+    """Gyroid waves whose mean density over the layers is the given one."""
     period = GYROID_LENGTH * spacing_mm / density
     height = 2.0 * pi * z_mm / period
     along_x = abs(cos(height)) > abs(sin(height))
@@ -283,7 +290,7 @@ def gyroid(z_mm: float, angle_deg: float, spacing_mm: float, density: float) -> 
 
 
 def _waves(box: Box, period: float, height: float, along_x: bool) -> Lines:
-    """Two waves a period; in the frame turned by 90 degrees x is the gyroid's y and y its -x."""
+    """Two waves per period; in the frame turned by 90 degrees x is the gyroid's y and y its -x."""
     unit = period / (2.0 * pi)
     low, high = np.floor(box[0] / period * GYROID_STEPS) - 1, np.ceil(box[2] / period * GYROID_STEPS) + 1
     run = np.arange(low, high + 1) * (2.0 * pi / GYROID_STEPS)

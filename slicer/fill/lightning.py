@@ -1,8 +1,8 @@
-"""Lightning: infill that is there only to hold what is solid above it.
+"""Lightning: infill that only supports the solid areas above it.
 
-Trees grow out of the walls: every place of the sparse infill under something solid lies near a branch. Planned from the top
-down, a branch gets shorter at its tip and straighter in every layer, by no more than what overhangs may, until nothing of it is
-left; so each layer prints over the one below (Tricard et al., "Ribbed Support Vaults for 3D Printing of Hollowed Objects", 2019).
+Trees grow out of the walls so that every point of the sparse infill under a solid area lies near a branch. Planned from the top
+down, a branch becomes shorter at its tip and straighter in every layer, by no more than the overhang limit, until it is gone; so
+each layer prints over the one below (Tricard et al., "Ribbed Support Vaults for 3D Printing of Hollowed Objects", 2019).
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,13 @@ from slicer.geometry.edge_index import EdgeIndex, Grid, crossings, depths, index
 from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.polyline import Segment
 
-LEAN_DEG = 40.0  # from the vertical, by which a tip may go beyond the layer below
-STEP = 0.5  # cells between the nodes of a branch, and between the places that want one
-NEAR = 0.5  # cells within which a branch or a wall holds a place
-ON_WALL_MM = 1e-3  # a node so near to the wall stands on it
+LEAN_DEG = 40.0  # from the vertical, by which a tip may extend beyond the layer below
+STEP = 0.5  # cells between the nodes of a branch, and between target points
+NEAR = 0.5  # cells within which a branch or a wall supports a point
+ON_WALL_MM = 1e-3  # a node this close to the wall stands on it
 
 
-# The trees of a layer: nodes (n, 2), and the number of each node's parent, which comes before it; -1: it is a root.
+# The trees of a layer: nodes (n, 2), and the number of each node's parent, which comes before it; -1 for a root.
 Trees = tuple[Floats, Indices]
 NO_TREES = np.zeros((0, 2)), np.zeros(0, np.int64)
 
@@ -31,10 +31,10 @@ NO_TREES = np.zeros((0, 2)), np.zeros(0, np.int64)
 def lightning_lines(
     insides: Sequence[Polygons], solid: Sequence[Polygons], cell_mm: float, heights_mm: Floats
 ) -> list[list[Floats]]:
-    """The lines (n, 2), from root to tip, of every layer of a part, the lowest first.
+    """The lines (n, 2), from root to tip, of every layer of a part, lowest layer first.
 
-    insides: where a layer's infill may be; solid: the area of a layer that is not sparse, so that the layer below must hold it;
-    cell_mm: distance between branches under it; heights_mm: (n,) of the layers.
+    insides: area for infill in each layer; solid: solid area of each layer, which the layer below must support; cell_mm: distance
+    between branches below it; heights_mm: (n,) layer heights.
     """
     trees, lines = NO_TREES, []
     for layer in range(len(insides) - 1, -1, -1):
@@ -46,7 +46,7 @@ def lightning_lines(
 
 
 def _wanting(over: Polygons, cell_mm: float) -> Floats:
-    """(n, 2) places that a branch has to come near to: along the outlines of an area, then on a grid inside."""
+    """(n, 2) target points for branches: along the outlines of an area, then on a grid inside."""
     if over.is_empty():
         return np.zeros((0, 2))
     step_mm = STEP * cell_mm
@@ -58,7 +58,7 @@ def _wanting(over: Polygons, cell_mm: float) -> Floats:
 
 
 def _every(loop: Floats, step_mm: float) -> Floats:
-    """Points of a loop (n, 2), at most step_mm apart along it."""
+    """Points along a loop (n, 2), at most step_mm apart."""
     steps = np.roll(loop, -1, axis=0) - loop
     many = np.maximum(np.ceil(np.hypot(*steps.T) / step_mm), 1.0).astype(np.int64)
     which = np.repeat(np.arange(len(loop)), many)
@@ -70,9 +70,8 @@ def _every(loop: Floats, step_mm: float) -> Floats:
 
 
 def _lower(trees: Trees, inside: Polygons, wanting: Floats, sizes_mm: tuple[float, float]) -> Trees:
-    """The trees of the layer below: shorter and straighter, clipped to its inside, with new branches to the places that want one.
-
-    sizes_mm: by how much a tip may lean, and a cell.
+    """The trees of the layer below: shorter and straighter, clipped to its inside, with new branches to target points without
+    one. sizes_mm: lean of a tip, and cell size.
     """
     nodes, parent = trees
     if inside.is_empty() or not len(nodes) + len(wanting):
@@ -89,7 +88,7 @@ def _lower(trees: Trees, inside: Polygons, wanting: Floats, sizes_mm: tuple[floa
 
 
 def _straighten(nodes: Floats, parent: Indices, most: float) -> Floats:
-    """The nodes, every one that has one child moved towards the middle between its neighbours, by at most a length."""
+    """The nodes with every one-child node moved towards the middle between its neighbours, by at most a length."""
     moved, held, child = nodes.copy(), np.flatnonzero(parent >= 0), np.zeros_like(parent)
     child[parent[held]] = held
     held = held[np.bincount(parent[held], minlength=len(nodes))[held] == 1]
@@ -100,7 +99,7 @@ def _straighten(nodes: Floats, parent: Indices, most: float) -> Floats:
 
 @kernel
 def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indices]:
-    """The trees with a length taken off every tip; roots without branches go."""
+    """The trees shortened by a length at every tip; roots without branches are removed."""
     n = len(nodes)
     children, cut, keep = longs(n, 0), floats(n, -1.0), flags(n)
     for k in range(n):
@@ -118,7 +117,7 @@ def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indic
         long = np.hypot(nodes[k, 0] - nodes[p, 0], nodes[k, 1] - nodes[p, 1])
         if left >= long:
             children[p] -= 1
-            cut[p] = min(cut[p], left - long) if cut[p] >= 0.0 else left - long  # of its branches the longest counts
+            cut[p] = min(cut[p], left - long) if cut[p] >= 0.0 else left - long  # the longest of its branches counts
             continue
         keep[k] = True
         for axis in range(2):
@@ -135,9 +134,10 @@ def _prune(nodes: Floats, parent: Indices, length: float) -> tuple[Floats, Indic
 @kernel
 def _ground(nodes: Floats, parent: Indices, border: EdgeIndex, step: float) -> tuple[Floats, Indices]:
     """The trees clipped to a border: a branch that is cut stands on the wall at the cut, and a root away from all walls is
-    continued to the nearest one."""
+    connected to the nearest wall.
+    """
     n, room = len(nodes), 0
-    ends = table(n, 2)  # where a node's way to its parent meets the wall, or the place of the wall that a root goes on to
+    ends = table(n, 2)  # crossing of a node's line to its parent with the wall, or the wall point to which a root is connected
     inside, cut = flags(n), flags(n)
     shares, crossed = floats(len(border.edges) + 1, 0.0), longs(len(border.edges) + 1, 0)
     for k in range(n):
@@ -171,7 +171,7 @@ def _ground(nodes: Floats, parent: Indices, border: EdgeIndex, step: float) -> t
 
 @helper
 def _on_wall(border: EdgeIndex, x: float, y: float) -> tuple[float, float]:
-    """The nearest place of a border."""
+    """The nearest point of a border."""
     reach = border.grid.size_mm
     while reach < 1e7:
         nx, ny, which = nearest(border, x, y, reach)
@@ -185,7 +185,7 @@ def _on_wall(border: EdgeIndex, x: float, y: float) -> tuple[float, float]:
 def _branch(
     out: Floats, above: Indices, m: int, since: int, begin: tuple[float, float], end: tuple[float, float], step: float
 ) -> int:
-    """Adds the nodes from a node, or from a root where since is -1, to a place; returns how many nodes there are then."""
+    """Add the nodes of a branch from a node, or from a new root if `since` is -1, to a point; returns the new number of nodes."""
     if since < 0:
         out[m, 0], out[m, 1], above[m] = begin[0], begin[1], -1
         since, m = m, m + 1
@@ -200,7 +200,7 @@ def _branch(
 
 @helper
 def _cell(grid: Grid, x: float, y: float) -> int:
-    """The number of the cell of a place, beyond the grid that of the nearest one."""
+    """The number of a point's cell; outside the grid, of the nearest cell."""
     column, row = int((x - grid.x) / grid.size_mm), int((y - grid.y) / grid.size_mm)
     return min(max(row, 0), grid.rows - 1) * grid.columns + min(max(column, 0), grid.columns - 1)
 
@@ -209,10 +209,10 @@ def _cell(grid: Grid, x: float, y: float) -> int:
 def _nearest_node(
     out: Floats, first: Indices, after: Indices, grid: Grid, place: tuple[float, float], lengths: tuple[float, float]
 ) -> tuple[int, bool]:
-    """The node nearest to a place, the first of several, and whether one holds it.
+    """The node nearest to a point, the first among equals, and whether any node supports the point.
 
-    first, after: the last node of each cell of the grid, and for each node the one before it in its cell; -1: none. lengths: how
-    near a node has to be to hold a place, and how near to be the nearest; -1: none is.
+    first, after: the last node of each cell of the grid, and for each node the one before it in its cell, -1 if none. lengths:
+    greatest distance for supporting the point, and for being the nearest; the node is -1 if none is near enough.
     """
     (x, y), (near, most) = place, lengths
     reach = max(near, grid.size_mm)
@@ -237,9 +237,9 @@ def _nearest_node(
 def _grow(
     nodes: Floats, parent: Indices, wanting: Floats, border: EdgeIndex, sizes: tuple[float, float]
 ) -> tuple[Floats, Indices]:
-    """The trees with a branch to every wanted place that none comes near to, from the nearest node or wall.
+    """The trees with a branch from the nearest node or wall to every target point that no branch supports.
 
-    sizes: how near a branch has to come, and how far apart nodes are.
+    sizes: distance within which a branch supports a point, and distance of nodes.
     """
     near, step = sizes
     ways = table(len(wanting), 2)
@@ -268,7 +268,7 @@ def _grow(
 
 
 def _chains(trees: Trees) -> list[Floats]:
-    """The trees as lines from root to tip, the longest first; every other line begins on the one that it leaves."""
+    """The trees as lines from root to tip, longest first; every other line begins on the line that it leaves."""
     nodes, parent = trees
     if not len(nodes):
         return []

@@ -1,9 +1,8 @@
-"""Lines: open lines over a box in a frame turned by an angle, clipped to an area, and joined along its border or to zigzags.
+"""Lines: open lines over a box in a rotated frame, clipped to an area, and joined along its border or to zigzags.
 
-Ends that follow each other on the border are joined by rising distance, unless that would close a ring or the distance
-is beyond a limit; an end left alone gets a short run along the border, towards the side with more room. Where a line of a
-solid fill meets the border aslant, a wedge stays open outside the sharp bend, between it and the next line: the joint reaches
-into it.
+Consecutive ends on the border are joined by ascending distance, unless that would close a ring or the distance exceeds a limit; a
+single end gets a short run along the border, towards the side with more room. Where a line of a solid fill meets the border at an
+angle, a wedge stays open outside the sharp bend, between it and the next line: the joint extends into it.
 """
 
 from collections.abc import Callable
@@ -22,21 +21,22 @@ from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 
 Box = tuple[float, float, float, float]
 Lines = tuple[Floats, Indices]  # points (n, 2) mm and the start of each line
-Draw = Callable[[Box], Lines]  # for a box x0 y0 x1 y1
-LinePattern = tuple[float, Draw]  # the angle of the frame, deg, in which it is drawn
-# A border, (m + 1,) way along all its contours to each edge, (k, 2) edges on which pieces end, and (2 k,) way to each end.
+Draw = Callable[[Box], Lines]  # draws the lines of a box x0 y0 x1 y1
+LinePattern = tuple[float, Draw]  # angle of the pattern's frame, deg, and its function
+# A border, (m + 1,) distance along all its contours to each edge, (k, 2) edges on which pieces end, and (2 k,) distance to each
+# end.
 BorderEnds = tuple[EdgeIndex, Floats, Indices, Floats]
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
-WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: farther in it is too narrow for a bead
-LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a wedge that is smaller stays as it is
-LEAST_RUN = 0.5  # spacings: nor does a line go round a corner for less
-FLAT = 0.05  # sine of the angle between a line and the border: they hardly part
-BEND = 0.6  # spacings before the border at which a line turns into its wedge
-TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
+WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: beyond it the wedge is too narrow for a bead
+LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a smaller wedge stays open
+LEAST_RUN = 0.5  # spacings: shortest run of a line around a corner
+FLAT = 0.05  # sine of the angle between line and border below which they hardly separate
+BEND = 0.6  # spacings before the border at which a line bends into its wedge
+TIE_MM = 1e-6  # distances that differ less are equal: rounding must not choose between the sides of a zigzag
 
 
 def clip_pattern(border: EdgeIndex, angle_deg: float, draw: Draw) -> Pieces:
-    """The part of a pattern inside a border, in the border's frame; the pattern is drawn in a frame turned by an angle."""
+    """The part of a pattern inside a border, in the border's frame. The pattern is drawn in a frame turned by its angle."""
     if not len(border.edges):
         return NO_PIECES
     turn = rotation_2d(angle_deg)
@@ -47,7 +47,7 @@ def clip_pattern(border: EdgeIndex, angle_deg: float, draw: Draw) -> Pieces:
 
 
 def parallel_lines(angle_deg: float, apart_mm: float, shift_mm: float = 0.0) -> LinePattern:
-    """Straight lines at an angle, on a grid that is the same in every layer but for a shift across the lines."""
+    """Straight lines at an angle, on a grid fixed for all layers except for a shift across the lines."""
 
     def draw(box: Box) -> Lines:
         return horizontal_lines((grid_numbers(box[1] - shift_mm, box[3] - shift_mm, apart_mm) + 0.5) * apart_mm + shift_mm, box)
@@ -56,12 +56,12 @@ def parallel_lines(angle_deg: float, apart_mm: float, shift_mm: float = 0.0) -> 
 
 
 def grid_numbers(low: float, high: float, apart_mm: float) -> Floats:
-    """Whole numbers k for which (k + 1/2) apart lies between low and high: a grid that is the same in every layer."""
+    """Integers k for which (k + 1/2) apart lies between low and high: a grid that is fixed for all layers."""
     return np.arange(ceil(low / apart_mm - 0.5), ceil(high / apart_mm - 0.5), dtype=np.float64)
 
 
 def concentric_lines(area: Polygons, apart_mm: float) -> list[Floats]:
-    """The outlines of an area, and those of what is left when they have shrunk by a distance, and so on; all closed."""
+    """The outlines of an area and of its successive insets by a distance; all closed."""
     lines = list[Floats]()
     while not area.is_empty():
         lines += [close_loop(loop) for loop in contours(area)]
@@ -84,9 +84,11 @@ def anchor_lines(
     solid_mm: tuple[float, float] = (0.0, 0.0),
     group: Indices | None = None,
 ) -> tuple[list[Floats], Indices]:
-    """Pieces as long lines (n, 2), those of one group (k,) joined where ends are near along the border, else with hooks; and the
-    group of each line. limits_mm: how near, the length of a hook, and how far it keeps from the next end or hook, for which it
-    may be shorter. solid_mm: of straight pieces that fill an area their distance and how far inside it they end, else zeros."""
+    """Join pieces to long lines (n, 2), within one group (k,), where ends are near along the border, otherwise end them with
+    hooks; returns lines and their groups. limits_mm: greatest joint, length of a hook, and its distance from the next end or
+    hook, for which it may be shortened. solid_mm: for straight pieces of a solid fill, their spacing and the inset of their ends,
+    else zeros.
+    """
     group = np.zeros(len(pieces.ends), np.int64) if group is None else group
     if not len(pieces.ends):
         return [], group
@@ -105,7 +107,7 @@ def _lay_lines(
     solid_mm: tuple[float, float],
     filled: tuple[Floats, Indices, Indices],
 ) -> tuple[int, int]:
-    """Fills in the lines, where each begins and its group; returns the number of points and of lines."""
+    """Fill in the lines, their starts and groups; returns the number of points and of lines."""
     most_mm, hook_mm, apart_mm = limits_mm
     out, starts, of = filled
     way = _way(border.edges)
@@ -155,7 +157,7 @@ def _lay_lines(
 
 @helper
 def _way(edges: Floats) -> Floats:
-    """(m + 1,) way along all contours to the beginning of each edge, mm."""
+    """(m + 1,) distance along all contours to the start of each edge, mm."""
     way: Floats = floats(len(edges) + 1, 0.0)
     for e in range(len(edges)):
         way[e + 1] = way[e] + np.hypot(edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1])
@@ -164,7 +166,7 @@ def _way(edges: Floats) -> Floats:
 
 @helper
 def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
-    """(2 k,) way along all contours to each end."""
+    """(2 k,) distance along all contours to each end, mm."""
     points, bounds, ends = pieces
     along_border: Floats = floats(2 * len(ends), 0.0)
     for k in range(len(ends)):
@@ -177,7 +179,9 @@ def _ways_along_border(pieces: Pieces, edges: Floats, way: Floats) -> Floats:
 
 @helper
 def _next_ends(along_border: Floats, ends: Indices, border: EdgeIndex, way: Floats) -> tuple[Indices, Floats]:
-    """The next end along the contour from each end (itself if it is alone), and its distance. ends: (k, 2) edges they lie on."""
+    """The next end along the contour from each end (itself if it is alone), and the distance to it. ends: (k, 2) edges on which
+    they lie.
+    """
     order, contour = argsort(along_border), longs(len(along_border), 0)
     for end in range(len(contour)):
         contour[end] = border.loop[ends[end // 2, end % 2]]
@@ -199,7 +203,7 @@ def _next_ends(along_border: Floats, ends: Indices, border: EdgeIndex, way: Floa
 
 @helper
 def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> tuple[Indices, Indices]:
-    """For each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
+    """For each end its partner (-1 if none), and 1 if the joint runs forward, -1 backward, 0 without one."""
     partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
     for here in range(len(after)):
         ties[here] = np.rint(gap[here] / TIE_MM)
@@ -219,7 +223,7 @@ def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> t
 
 @helper
 def _runs(sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm: float) -> Floats:
-    """The length of each end's run along the border, to its partner or as a hook; negative: backward."""
+    """The length of each end's run along the border, to its partner or as a hook; negative if backward."""
     runs: Floats = floats(len(after), 0.0)
     free, before = floats(len(after), 0.0), longs(len(after), 0)
     for here in range(len(after)):
@@ -242,11 +246,11 @@ def _runs(sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm:
 def _wedges(
     pieces: Pieces, edges: Floats, sense: Indices, after: Indices, gap: Floats, runs: Floats, solid_mm: tuple[float, float]
 ) -> Floats:
-    """How far the path of each end reaches beyond it along the border into what lies open there, mm, negative: backward.
+    """Extension of each end's path along the border into the open wedge beside it, mm, negative if backward.
 
-    Between two ends the border is covered by the beads of their lines, half a spacing to both sides and round the end; the rest
-    of it stays open. That is much at the sharp side of a line, and round a corner with room for a line but without one: there
-    the line gets a run along the border.
+    Between two ends, the beads of their lines cover the border by half a spacing to both sides and round the end; the rest stays
+    open. The open part is large at the sharp side of a line, and around a corner with room for a line but without one: there the
+    line gets a run along the border.
     """
     spacing, deep = solid_mm
     wedges, before = floats(len(sense), 0.0), longs(len(sense), 0)
@@ -270,12 +274,13 @@ def _wedges(
             left = 0.5 * free - round_mm if faced else WEDGE * (free - round_mm - blunt_mm)
         beyond, free = (before[here], gap[before[here]]) if sharp > 0 else (after[here], gap[here])
         beyond_mm, alone = free - blunt_mm - round_mm, here % 2 == 1 or sense[here ^ 1] != 0
-        corner = beyond == here ^ 1 and slants[here] * slants[beyond] < 0.0  # one corner lies blunt beyond both ends of the line
+        # one corner lies beyond both ends of the line, on their blunt sides
+        corner = beyond == here ^ 1 and slants[here] * slants[beyond] < 0.0
         if sense[here] == 0 and corner and alone and beyond_mm > max(left, LEAST_RUN * spacing):
             runs[here] = -sharp * min(beyond_mm, MOST_WEDGE * spacing)
         elif left > LEAST_WEDGE * spacing:
             wedge = sharp * min(left, MOST_WEDGE * spacing)
-            if sense[here] == 0 and abs(wedge) > spacing:  # an end that is left alone follows the border
+            if sense[here] == 0 and abs(wedge) > spacing:  # a single end follows the border
                 runs[here] = wedge
             else:
                 wedges[here] = wedge
@@ -284,7 +289,9 @@ def _wedges(
 
 @helper
 def _slant(pieces: Pieces, edges: Floats, end: int) -> tuple[float, float]:
-    """Cosine of the angle between the border's way and a straight piece that begins at its end, and the piece's length."""
+    """Cosine of the angle between the border's direction and a straight piece that begins at an end, and the piece's length,
+    mm.
+    """
     k, side = end // 2, end % 2
     first, last, e = pieces.starts[k], pieces.starts[k + 1] - 1, pieces.ends[k, side]
     near, far = (last, first) if side else (first, last)
@@ -297,7 +304,7 @@ def _slant(pieces: Pieces, edges: Floats, end: int) -> tuple[float, float]:
 
 @no_nrt
 def _bend(out: Floats, end: int, before: int, wedge_mm: float, spacing_mm: float) -> None:
-    """Takes the end of a line back from the border where it turns into a wedge."""
+    """Move the end of a line back from the border where it bends into a wedge."""
     if wedge_mm != 0.0:
         step = out[before, 0] - out[end, 0], out[before, 1] - out[end, 1]
         share = min(BEND * spacing_mm / max(np.hypot(step[0], step[1]), TIE_MM), 0.5)
@@ -307,7 +314,7 @@ def _bend(out: Floats, end: int, before: int, wedge_mm: float, spacing_mm: float
 
 @no_nrt
 def _append_tip(out: Floats, n: int, end: int, length: float, border_ends: BorderEnds) -> int:
-    """Appends only the last point of a run; returns the new n."""
+    """Append only the last point of a run; returns the new n."""
     last = _append_run(out, n, end, length, border_ends) - 1
     out[n, 0], out[n, 1] = out[last, 0], out[last, 1]
     return n + 1
@@ -315,8 +322,9 @@ def _append_tip(out: Floats, n: int, end: int, length: float, border_ends: Borde
 
 @no_nrt
 def _append_run(out: Floats, n: int, end: int, length: float, border_ends: BorderEnds) -> int:
-    """Appends the vertices of the contour passed on a run from one of the ends, backward where the length is negative, and the
-    run's last point; returns the new n."""
+    """Append the contour's vertices along a run from one of the ends, backward if the length is negative, and the run's last
+    point; returns the new n.
+    """
     border, way, sides, along_border = border_ends
     e, way_mm = sides[end // 2, end % 2], along_border[end]
     edges, first, last = border.edges, border.begins[border.loop[e]], border.begins[border.loop[e] + 1]
@@ -340,7 +348,7 @@ def _append_run(out: Floats, n: int, end: int, length: float, border_ends: Borde
 
 @no_nrt
 def _append_piece(out: Floats, n: int, pieces: Pieces, end: int) -> int:
-    """Appends the points of a piece, beginning at one of its ends; returns the new n."""
+    """Append the points of a piece, beginning at one of its ends; returns the new n."""
     first, last = pieces.starts[end // 2], pieces.starts[end // 2 + 1] - 1
     for i in range(last - first + 1):
         p = first + i if end % 2 == 0 else last - i
@@ -351,7 +359,7 @@ def _append_piece(out: Floats, n: int, pieces: Pieces, end: int) -> int:
 
 @helper
 def _reverse(out: Floats, first: int, end: int) -> None:
-    """Turns round the order of points first .. end - 1."""
+    """Reverse the order of points first .. end - 1."""
     for k in range((end - first) // 2):
         for axis in range(2):
             out[first + k, axis], out[end - 1 - k, axis] = out[end - 1 - k, axis], out[first + k, axis]

@@ -1,4 +1,4 @@
-"""Regions: which places of each layer are solid skin and which are sparse infill."""
+"""Regions: division of each layer into solid skin and sparse infill."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,19 +8,21 @@ from slicer.geometry.polygons import Polygons, larger, offset, opening, union
 from slicer.heights import SHELL_KEYS, shell_layers
 from slicer.modifiers import Place, combined, most_shell_layers, overlaid
 
-THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
-BESIDE = 0.75  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
-ANCHOR = 2.0  # line widths that solid layers under walls reach into the infill around, as a bridge reaches over its anchors
-FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
-LEAST_IRONED_MM2 = 2.0  # a speck: the flat around the orifice is about as wide, and smooths it as it is printed
+# of the line width: a narrower strip beside the wall along a cut needs no skin, since the walls of the two layers meet
+THIN = 0.2
+BESIDE = 0.75  # of the line width: offset at which a wall, as on slopes, still rests on the one below
+ANCHOR = 2.0  # line widths by which solid layers under walls overlap the infill around, like a bridge its anchors
+FEW_MM2 = 25.0  # of the line width squared: a smaller sparse area left beside a cut becomes solid
+# smallest ironed area: the flat around the orifice has about this size and smooths such an area while it is printed
+LEAST_IRONED_MM2 = 2.0
 SOLID_KEYS = (*SHELL_KEYS, "infill_density", "solid_below_mm2")
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A layer's inside: top is skin that is seen, as far as it reaches under walls; solid other skin; sparse takes the infill.
+    """A layer's inside: top is visible skin including its part under walls; solid is other skin; sparse takes the infill.
 
-    bare: where top has nothing above it. uncut: what would be sparse if the model were in one piece, not clipped to the part.
+    bare: area of top with nothing above it. uncut: sparse area of the uncut model, not clipped to the part.
     """
 
     bare: Polygons
@@ -34,9 +36,9 @@ class Region:
 class Cover:
     """The uncut model around a part's layers.
 
-    sections, insides: of each layer, and what walls would enclose of it; below, above: of as many layers under the first and
-    over the last one as shells look, the nearest first. later: the areas of each layer, and of those over the last one, that
-    parts printed later take; (): none.
+    sections, insides: of each layer, and the area that walls would enclose; below, above: sections of as many layers under the
+    first and over the last one as shells need, nearest first. later: areas of later parts in each layer, and in those over the
+    last one; () if there are none.
     """
 
     sections: Sequence[Polygons]
@@ -46,7 +48,9 @@ class Cover:
     later: Sequence[Polygons] = ()
 
     def section(self, layer: int) -> Polygons:
-        """The model in a layer, one under the first (-1, ...) or over the last one too; nothing farther than shells look."""
+        """The model's section in a layer, also below the first (-1, ...) or above the last one; empty beyond the layers that
+        shells need.
+        """
         count = len(self.sections)
         beyond, k = (self.below, -1 - layer) if layer < 0 else (self.above, layer - count)
         return self.sections[layer] if 0 <= layer < count else beyond[k] if k < len(beyond) else Polygons()
@@ -60,16 +64,16 @@ def regions(
     runs: Sequence[range] | None = None,
     places: Sequence[Place] = (),
 ) -> list[Region]:
-    """Regions of every layer of a part from what its walls enclose; runs: of layers that are asked for, all where None; places:
-    where other settings hold.
+    """The regions of every layer of a part from the areas that its walls enclose. runs: requested ranges of layers, None for all;
+    places: areas with modified settings.
 
-    A place is solid when one of the model's next top_layers sections above or bottom_layers below does not cover it: so every
-    vertical line meets that many layers of wall or skin below a surface, on slopes too. It is also solid where a later part
-    will lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
+    A point is solid if one of the model's next top_layers sections above or bottom_layers below does not cover it: so every
+    vertical line meets that many layers of wall or skin below a surface, also on slopes. It is also solid if a later part will
+    lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
     """
     found = [Region(*[Polygons()] * 5)] * len(insides)
     ruled, rules = combined(places, SOLID_KEYS), set()
-    for own in (process, *(place.over(process) for place in ruled)):  # what decides which places become solid
+    for own in (process, *(place.over(process) for place in ruled)):  # the settings that decide which areas become solid
         rules.add((shell_layers(own), own.infill_density >= 1.0, own.infill_density > 0.0, own.solid_below_mm2))
     ruled = ruled if len(rules) > 1 else []
     tops = most_shell_layers(process, places)[0] > 0
@@ -83,7 +87,7 @@ def regions(
 
 
 def _hollow(run: range, cover: Cover, process: Process) -> list[Polygons]:
-    """The area of each layer of a run that would be sparse if the model were in one piece."""
+    """The sparse area of each layer of a run in the uncut model."""
     top, bottom = shell_layers(process)
     inner = cover.insides[run.start : run.stop + max(top, 1)]  # walls that begin above make infill solid
     end = run.start + len(inner)
@@ -95,8 +99,9 @@ def _hollow(run: range, cover: Cover, process: Process) -> list[Polygons]:
 
 
 def _hollow_with(hollow: Sequence[Polygons], run: range, cover: Cover, place: Place, process: Process) -> list[Polygons]:
-    """The sparse areas of a run of layers with those by a place's settings within it; strips along its border that are too narrow
-    for infill become solid."""
+    """The sparse areas of a run of layers, replaced within a modified area by those with its settings; strips along its border
+    that are too narrow for infill become solid.
+    """
     own, width_mm, areas = place.over(process), process.line_width_mm, place.areas
     there = [layer for layer in run if not areas[layer].is_empty()]
     if not there:
@@ -113,7 +118,7 @@ def _hollow_with(hollow: Sequence[Polygons], run: range, cover: Cover, place: Pl
 def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
     """For each i the intersection of layers i .. i + count - 1; nothing beyond the end.
 
-    Running intersections of blocks from both sides (van Herk 1992): three booleans a layer, however many are common.
+    Running intersections of blocks from both sides (van Herk 1992): three booleans per layer, whatever the count.
     """
     if count <= 0:
         return list(layers)
@@ -130,7 +135,7 @@ def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
 
 
 def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
-    """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
+    """The area of the inside that is covered above and below, a line width away from every skin that is anchored in it."""
     if process.infill_density >= 1.0 or inside.is_empty():
         return Polygons()
     width_mm = process.line_width_mm
@@ -143,17 +148,18 @@ def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Pro
 
 
 def _large(sparse: Polygons, process: Process) -> Polygons:
-    """The sparse pieces that are worth leaving sparse; without infill all are."""
+    """The sparse pieces that are large enough; all of them without infill."""
     return larger(sparse, process.solid_below_mm2) if process.infill_density > 0.0 else sparse
 
 
 def _without_footings(
     sparse: Sequence[Polygons], sections: Sequence[Polygons], insides: Sequence[Polygons], process: Process
 ) -> list[Polygons]:
-    """The sparse places without those under walls which begin on them: a pocket's on its floor, a pillar's on its plate.
+    """The sparse areas without those under walls that begin on them, like the wall of a pocket on its floor or of a pillar on its
+    plate.
 
-    sections, insides: of the layers over those of the sparse places, but for the last one, over which nothing is known.
-    The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill.
+    sections, insides: of the layers over those of the sparse areas, except for the last one. Under such walls as many layers
+    become solid as under a top, extended by ANCHOR lines into the infill.
     """
     width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
     footings = [
@@ -171,12 +177,11 @@ def _without_footings(
 def _region_of(
     inside: Polygons, uncut: Polygons, cover: Cover, layer: int, on_plastic: bool, process: Process, tops: bool
 ) -> Region:
-    """The region of one layer; uncut: what would be sparse there if the model were in one piece; tops: whether there is skin
-    under what nothing lies on."""
+    """The region of one layer. uncut: sparse area of the uncut model; tops: whether uncovered areas get skin."""
     empty, width_mm = Polygons(), process.line_width_mm
     if inside.is_empty():
         return Region(empty, empty, empty, empty, empty)
-    # on plastic grooves are filled by skin, and pins hang on it
+    # on plastic, skin fills the grooves and holds the pins
     wholly = on_plastic and layer < max(process.interface_bottom_layers, 0 if process.interlock == "none" else 1)
     sparse = empty if wholly else _beside_cuts(inside, uncut, cover, layer, process)
     if not sparse.is_empty() and abs(sparse.area() - inside.area()) < 1e-6:
@@ -186,13 +191,14 @@ def _region_of(
     bare = bare if bare.is_empty() else opening(bare, width_mm)
     if bare.is_empty():
         return Region(bare, bare, solid, sparse, uncut)
-    # A top's lines go on under the walls around it and as far as its anchor: a frame of its own there would be all line ends.
+    # A top's lines continue under the walls around it and as far as its anchor: a separate frame there would consist of line
+    # ends.
     under = opening(solid - offset(bare, (process.walls + ANCHOR) * width_mm), width_mm)
     return Region(bare, solid - under, under, sparse, uncut)
 
 
 def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:
-    """What is sparse of a part where the uncut model is, without the skin under later parts."""
+    """The sparse area of a part within that of the uncut model, without the skin under later parts."""
     width_mm, reach = process.line_width_mm, process.interface_top_layers
     near = [area for area in cover.later[max(layer - reach, 0) : layer + reach + 1] if not area.is_empty()]
     if uncut.is_empty() or (not near and inside is cover.insides[layer]):
@@ -208,9 +214,9 @@ def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, pr
 def ironed_areas(
     regions: Sequence[Region], beside: Sequence[Polygons], process: Process, places: Sequence[Place] = ()
 ) -> list[Polygons]:
-    """The skin of each layer that has nothing above it, a line's width away from where a later part will stand.
+    """The skin of each layer with nothing above it, a line width away from later parts.
 
-    beside: what later parts have of each layer and of the one over the last; places: where other settings hold.
+    beside: areas of later parts in each layer and in the one over the last; places: areas with modified settings.
     """
     ironed = combined(places, ["ironing"])
     if not any(own.ironing for own in (process, *(place.over(process) for place in ironed))):

@@ -1,9 +1,9 @@
-"""Skin: solid fill by lines at alternating +-45 degrees or along the outline, by short beads where none fits, and ironing.
+"""Skin: solid fill by lines at alternating +-45 degrees or along the outline, gap fill by short beads, and ironing.
 
-Monotonic skins are printed in such an order that every line lies on the same side of its neighbour: where lines meet from both
-sides of a hole the sheen of a skin changes and a ridge may stand. So lines are taken together in cells, in which each has one
-neighbour above and one below; a cell waits for the cells that its first line lies beside. In ironing the nozzle goes once more
-over tops that stay visible, in dense lines that hardly push any plastic.
+Monotonic skins are printed in an order in which every line lies on the same side of its neighbour: where lines meet from both
+sides of a hole, the sheen of a skin would change and a ridge might form. So lines are grouped in cells, in which each has one
+neighbour above and one below; a cell waits for the cells beside its first line. In ironing, the nozzle passes once more over
+visible tops, in dense lines with hardly any extrusion.
 """
 
 from collections.abc import Sequence
@@ -24,24 +24,24 @@ from slicer.geometry.polyline import length_mm
 from slicer.paths import Kind
 from slicer.walls.walls import FEW, gaps, uncovered_area
 
-JOIN = 12.0  # spacings along the border: line ends nearer than this are joined
-EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
-TIP = 0.27  # and from a corner, where it would be a mere dot
-RANK = 2  # behind gaps (slicer.walls.walls), before infill
-TOUCHING = 0.01  # of the spacing: neighbouring lines overlap by this at least, however little flow a skin asks for
-MOST_FLOW = 1.15  # only specks whose lines hardly fit ask for more
-LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
-FEW_HIDDEN = 1.0  # of the line width squared: a smaller place beside lines that nobody sees stays open
-SINGLE_MM = 1e-6  # a path whose ends differ less in height is one line, which may be printed from either end
+JOIN = 12.0  # spacings along the border: closer line ends are joined
+EDGE = 0.15  # spacings between the outermost lines and the extreme points, where a line would only touch
+TIP = 0.27  # and from a corner, where it would be only a dot
+RANK = 2  # after gaps (slicer.walls.walls), before infill
+TOUCHING = 0.01  # of the spacing: least overlap of neighbouring lines, however low a skin's flow
+MOST_FLOW = 1.15  # only specks with hardly any room for lines need more
+LEVEL = 0.1  # of a spacing: heights that differ less are one row
+FEW_HIDDEN = 1.0  # of the line width squared: a smaller gap beside invisible lines stays open
+SINGLE_MM = 1e-6  # a path whose ends differ less in height is a single line, which may be printed from either end
 
 
 @dataclass(frozen=True)
 class SolidLines:
-    """How an area is filled completely: direction, width and height of the lines, and how they meet what is around.
+    """Solid fill of an area: direction, width and height of the lines, and their connection with the surroundings.
 
-    overlap: their reach into the walls around, share of a line width. pattern: monotonic, every line on the same side of its
-    neighbour; rectilinear, in any order; or concentric, without a direction. seen: from above or below, so that lines reach into
-    what stays open beside them, and small places are filled, too.
+    overlap: overlap with the walls around, as a share of a line width. pattern: monotonic, every line on the same side of its
+    neighbour; rectilinear, in any order; or concentric, without a direction. seen: visible from above or below, so that lines
+    extend into wedges beside them, and small gaps are filled, too.
     """
 
     angle_deg: float
@@ -53,31 +53,31 @@ class SolidLines:
 
     @property
     def spacing_mm(self) -> float:
-        """Distance of neighbouring lines."""
+        """Distance of neighbouring lines, mm."""
         return spacing_mm(self.width_mm, self.height_mm)
 
     @property
     def reach_mm(self) -> float:
-        """How far inside the area the lines end."""
+        """Inset of line ends from the border of the area, mm."""
         return 0.5 * self.spacing_mm - self.overlap * self.width_mm
 
 
 def lines_angle_deg(process: Process, layer: int) -> float:
-    """Direction of the solid lines of a layer: neighbouring layers cross at right angles."""
+    """Direction of the solid lines of a layer; neighbouring layers cross at right angles."""
     return process.infill_angle_deg + 90.0 * (layer % 2)
 
 
 def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
-    """Beads that fill an area completely: lines, and what fills the places that they leave."""
+    """Beads that fill an area completely: lines, and gap fill beside them."""
     beads, rests = skin_lines(area, kind, solid)
     return beads + gaps(rests, solid.width_mm, solid.height_mm)
 
 
 def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead], list[Polygons]]:
-    """The lines that fill an area, those of each connected piece spread evenly, and the places that they leave in each.
+    """The lines that fill an area, evenly spread in each connected piece, and the gaps left in each.
 
-    The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill
-    it. Where lines would no longer touch each other for that, in narrow places that are all line ends, they reach half as far.
+    The flow makes the plastic equal to area times height, so that neither the joints at the line ends nor the overlap overfill
+    it. In narrow areas that consist of line ends, where lines would then no longer touch each other, the overlap is halved.
     """
     in_order = solid.pattern == "monotonic"
     beads, rests = list[Bead](), list[Polygons]()
@@ -93,7 +93,7 @@ def skin_lines(area: Polygons, kind: Kind, solid: SolidLines) -> tuple[list[Bead
 
 
 def _filled(island: Polygons, solid: SolidLines) -> tuple[list[Floats], Polygons, float]:
-    """The lines of a connected piece, the places that they leave, and the flow that fills the rest; 0 without lines."""
+    """The lines of a connected piece, the gaps that they leave, and the flow that fills the rest; 0 without lines."""
     lines = _lines(offset(island, -solid.reach_mm), solid)
     rest = uncovered_area(island, lines, solid.width_mm, FEW if solid.seen else FEW_HIDDEN)
     total = sum(length_mm(line) for line in lines)
@@ -101,7 +101,7 @@ def _filled(island: Polygons, solid: SolidLines) -> tuple[list[Floats], Polygons
 
 
 def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
-    """The centrelines that fill a piece; inner: as far as they reach."""
+    """The centrelines that fill a piece. inner: the area for centrelines."""
     if inner.is_empty():
         return []
     if solid.pattern == "concentric":
@@ -126,7 +126,9 @@ def _lines(inner: Polygons, solid: SolidLines) -> list[Floats]:
 
 
 def _edges(pieces: Pieces, solid: SolidLines) -> tuple[float, float]:
-    """Spacings that the lowest and the highest line should keep from the extreme points: more where they are dots in a corner."""
+    """Distance of the lowest and the highest line from the extreme points, in spacings: larger if they would be dots in a
+    corner.
+    """
     ends = pieces.points.reshape(-1, 2, 2) @ rotation_2d(solid.angle_deg)
     long, height = np.abs(ends[:, 1, 0] - ends[:, 0, 0]), ends[:, 0, 1]
     rows = height < height.min() + LEVEL * solid.spacing_mm, height > height.max() - LEVEL * solid.spacing_mm
@@ -135,7 +137,7 @@ def _edges(pieces: Pieces, solid: SolidLines) -> tuple[float, float]:
 
 
 def _even(spacing: float, edges: tuple[float, float]) -> Draw:
-    """Lines spread evenly over the whole extent, at most a spacing apart; edges: spacings from its ends."""
+    """Lines spread evenly over the whole extent, at most a spacing apart. edges: margins at its ends, in spacings."""
 
     def draw(box: Box) -> Lines:
         low, high = box[1] + MARGIN_MM + edges[0] * spacing, box[3] - MARGIN_MM - edges[1] * spacing
@@ -147,8 +149,9 @@ def _even(spacing: float, edges: tuple[float, float]) -> Draw:
 
 
 def _cells(pieces: Pieces, angle_deg: float, spacing_mm: float) -> tuple[Indices, list[set[int]]]:
-    """(k,) the cell of each straight piece, numbered by the row of their first line, and of each cell those that come before it,
-    all of them lower numbers."""
+    """(k,) the cell of each straight piece, numbered by the row of its first line, and for each cell the cells that come before
+    it, all with lower numbers.
+    """
     ends = pieces.points.reshape(-1, 2, 2) @ rotation_2d(angle_deg)
     left, right = ends[:, :, 0].min(axis=1), ends[:, :, 0].max(axis=1)
     row = _rows(ends[:, 0, 1], spacing_mm)
@@ -171,7 +174,7 @@ def _cells(pieces: Pieces, angle_deg: float, spacing_mm: float) -> tuple[Indices
 
 
 def _rows(height_mm: Floats, spacing_mm: float) -> Indices:
-    """(k,) number of the row of each height; rows are evenly apart, but some may be empty."""
+    """(k,) row number of each height; rows are evenly spaced, and some may be empty."""
     order = np.argsort(height_mm, kind="stable")
     steps = np.diff(height_mm[order])
     steps[steps < LEVEL * spacing_mm] = 0.0
@@ -183,7 +186,7 @@ def _rows(height_mm: Floats, spacing_mm: float) -> Indices:
 
 
 def _order_lines(by_cell: Sequence[list[Floats]], before: Sequence[set[int]], turned: Floats) -> list[Floats]:
-    """Cell after cell, of those that wait for none the nearest; upward inside each."""
+    """Order the lines cell by cell, next the nearest cell that waits for no other; upward within each cell."""
     upward = [[line if (line[-1] - line[0]) @ turned[:, 1] > -SINGLE_MM else line[::-1] for line in lines] for lines in by_cell]
     rising = [sorted(lines, key=lambda line: float(line[0] @ turned[:, 1])) for lines in upward]
     waits = [len(earlier) for earlier in before]
@@ -196,7 +199,7 @@ def _order_lines(by_cell: Sequence[list[Floats]], before: Sequence[set[int]], tu
         cell = min(ready, key=lambda cell: float(np.hypot(*(rising[cell][0][0] - out[-1][-1])))) if out else ready[0]
         ready.remove(cell)
         for line in rising[cell]:
-            single = abs(float((line[-1] - line[0]) @ turned[:, 1])) < SINGLE_MM  # which a path upward is not
+            single = abs(float((line[-1] - line[0]) @ turned[:, 1])) < SINGLE_MM  # an upward path is not a single line
             turns = out and single and np.hypot(*(line[-1] - out[-1][-1])) < np.hypot(*(line[0] - out[-1][-1]))
             out.append(line[::-1] if turns else line)
         for later in after[cell]:

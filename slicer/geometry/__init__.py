@@ -1,1 +1,1 @@
-"""Plane geometry: polygons, polylines and segments, lines clipped to polygons, edges near a place, triangulations."""
+"""Plane geometry: polygons, polylines and segments, clipping of lines to polygons, nearest edges, triangulations."""

@@ -1,5 +1,6 @@
-"""Clip: open lines clipped to the inside of polygons, each piece with the edges of the border on which it ends, and lines cut
-where they enter and leave."""
+"""Clipping: open lines clipped to polygons, each piece with the border edges on which it ends, and lines split where they enter
+and leave.
+"""
 
 from itertools import pairwise
 from math import cos, radians, sin
@@ -15,11 +16,13 @@ from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import Segment
 
-SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
+SNAP = 1e-6  # of a step's length: a crossing this close to the step's end is at its end
 
 
 class Pieces(NamedTuple):
-    """points: (n, 2) mm; starts: (k + 1,) first point of each piece, and n; ends: (k, 2) edges on which its two ends lie."""
+    """Pieces of lines. points: (n, 2) mm; starts: (k + 1,) first point of each piece, and n; ends: (k, 2) edges on which the two
+    ends lie.
+    """
 
     points: Floats
     starts: Indices
@@ -53,7 +56,7 @@ def clip_lines(points: Floats, starts: Indices, border: EdgeIndex) -> Pieces:
 
 @kernel
 def _clip(points: Floats, bounds: Indices, border: EdgeIndex, out: Pieces) -> tuple[int, int]:
-    """Fills in the pieces; returns the number of points and of pieces, -1 where there is no room for them."""
+    """Fill in the pieces; returns the number of points and of pieces, -1 if the arrays are too small."""
     shares, crossed = floats(len(border.edges), 0.0), longs(len(border.edges), 0)
     n = count = 0
     for line in range(len(bounds) - 1):
@@ -82,14 +85,14 @@ def _clip(points: Floats, bounds: Indices, border: EdgeIndex, out: Pieces) -> tu
 
 
 def merge_pieces(several: list[Pieces]) -> Pieces:
-    """Pieces of several bundles of lines as one bundle."""
+    """The pieces of several bundles of lines as one bundle."""
     points, starts, ends = zip(NO_PIECES, *several, strict=True)
     sizes = np.concatenate([np.diff(of_bundle) for of_bundle in starts])
     return Pieces(np.concatenate(points), np.cumsum([0, *sizes]), np.concatenate(ends))
 
 
 def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
-    """The polyline (n, 2) with the places added where it enters and leaves an area, and which steps lie within."""
+    """The polyline (n, 2) with points added where it enters and leaves an area, and a mask of the steps inside."""
     index, size, room = index_edges(area), -1, 2 * len(points) + 64
     while size < 0:
         out, marks = np.empty((room, 2)), np.empty(room, np.bool_)
@@ -99,7 +102,7 @@ def cut_line(points: Floats, area: Polygons) -> tuple[Floats, Mask]:
 
 
 def runs_within(points: Floats, area: Polygons) -> list[Floats]:
-    """The parts of a polyline (n, 2) inside an area; of a closed one, the part over its first point in one piece."""
+    """The parts of a polyline (n, 2) inside an area; in a closed one, the part across its first point is one piece."""
     if area.is_empty():
         return []
     points, within = cut_line(points, area)
@@ -115,7 +118,7 @@ def runs_within(points: Floats, area: Polygons) -> list[Floats]:
 
 @kernel
 def cut_into(points: Floats, area: EdgeIndex, out: Floats, marks: Mask) -> int:
-    """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them.
+    """Fill in the points and the mask of steps inside; returns the number of points, -1 if the arrays are too small.
 
     points, out: (n, 2 or more), further columns are interpolated.
     """

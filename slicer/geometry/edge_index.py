@@ -1,7 +1,7 @@
-"""Edge index: the edges of polygons sorted into a grid of square cells, so that a query meets only the few edges near it.
+"""Edge index: the edges of polygons sorted into a grid of square cells, so that a query visits only the few edges near it.
 
-It finds where a segment crosses edges, whether a point lies inside, the nearest edge, and how deep inside points lie. All queries
-treat a point on an edge alike (slicer.geometry.polyline): no crossing is counted twice or missed at a vertex.
+It finds the crossings of a segment with edges, whether a point lies inside, the nearest edge, and the depth of points inside. All
+queries treat a point on an edge in the same way (slicer.geometry.polyline): no crossing is counted twice or missed at a vertex.
 """
 
 from math import inf, sqrt
@@ -18,8 +18,8 @@ from mdp.topology.cross_section import loop_edges
 from slicer.geometry.polygons import Polygons, contours
 from slicer.geometry.polyline import Segment, crossing, edge, level_crossing, nearest_share, squared_distance
 
-MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
-FARTHEST_MM = 1e7  # where the search for the nearest edge ends
+MARGIN_MM = 1e-6  # by which an edge extends into neighbouring cells, so that rounding never hides it
+FARTHEST_MM = 1e7  # limit of the search for the nearest edge
 
 
 class Grid(NamedTuple):
@@ -33,7 +33,8 @@ class Grid(NamedTuple):
 
 
 class EdgeIndex(NamedTuple):
-    """edges: (n, 4) x0 y0 x1 y1, loop after loop; loop: (n,) number of an edge's loop; begins: where each loop begins, and n.
+    """Edges sorted into a grid. edges: (n, 4) x0 y0 x1 y1, loop by loop; loop: (n,) number of an edge's loop; begins: start of
+    each loop, and n.
 
     Cell c of row r of the grid holds the edges items[first[r * columns + c] : first[r * columns + c + 1]].
     """
@@ -47,14 +48,14 @@ class EdgeIndex(NamedTuple):
 
 
 def index_edges(polygons: Polygons) -> EdgeIndex:
-    """The edges of all contours, about one edge a cell."""
+    """The edges of all contours, about one edge per cell."""
     loops = contours(polygons)
     begins = np.cumsum([0, *(len(loop) for loop in loops)]).astype(np.int64)
     return _index(loop_edges(loops), np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins)), begins)
 
 
 def index_segments(segments: Floats) -> EdgeIndex:
-    """Segments (n, 4) that bound nothing, for the search of the nearest."""
+    """Index of segments (n, 4) without an inside, for nearest-edge queries."""
     return _index(segments, np.zeros(len(segments), np.int64), np.array([0, len(segments)]))
 
 
@@ -74,7 +75,7 @@ def _index(edges: Floats, loop: Indices, begins: Indices) -> EdgeIndex:
 
 @helper
 def _cells(grid: Grid, r: int, segment: Segment) -> tuple[int, int]:
-    """First and last cell that a segment touches in a row; the last below the first: none."""
+    """First and last cell that a segment touches in a row; the last is less than the first if there is none."""
     x0, y0, x1, y1 = segment
     low, high = grid.y + r * grid.size_mm - MARGIN_MM, grid.y + r * grid.size_mm + grid.size_mm + MARGIN_MM
     bottom, top = min(y0, y1), max(y0, y1)
@@ -91,14 +92,14 @@ def _cells(grid: Grid, r: int, segment: Segment) -> tuple[int, int]:
 
 @helper
 def _rows(grid: Grid, y0: float, y1: float) -> tuple[int, int]:
-    """First and last row that what lies between two heights touches."""
+    """First and last row touched by an interval of heights."""
     first, last = int((min(y0, y1) - MARGIN_MM - grid.y) / grid.size_mm), int((max(y0, y1) + MARGIN_MM - grid.y) / grid.size_mm)
     return max(first, 0), min(last, grid.rows - 1)
 
 
 @helper
 def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
-    """first and items of an EdgeIndex. An edge is a run of cells in every row that it touches."""
+    """The `first` and `items` of an EdgeIndex. An edge is a run of cells in every row that it touches."""
     many = 0
     for e in range(len(edges)):
         low, high = _rows(grid, edges[e, 1], edges[e, 3])
@@ -119,14 +120,16 @@ def _into_cells(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
 
 @helper
 def _near(index: EdgeIndex, r: int, segment: Segment) -> tuple[int, int]:
-    """Which of the items lie in the cells that a segment touches in a row: from and to."""
+    """The range of items in the cells that a segment touches in a row: start and end."""
     a, b = _cells(index.grid, r, segment)
     return (index.first[a], index.first[b + 1]) if a <= b else (0, 0)
 
 
 @helper
 def crossings(index: EdgeIndex, segment: Segment, shares: Floats, crossed: Indices) -> int:
-    """Fills in where (0..1, rising) and which edges a segment crosses; returns how many, -1 where there is no room for them."""
+    """Fill in the positions (0..1, ascending) and edges at which a segment crosses edges; returns their number, -1 if the arrays
+    are too small.
+    """
     low, high = _rows(index.grid, segment.y0, segment.y1)
     n = 0
     for r in range(low, high + 1):
@@ -164,7 +167,7 @@ def free(index: EdgeIndex, segment: Segment) -> bool:
 
 @no_nrt
 def within(index: EdgeIndex, x: float, y: float) -> bool:
-    """Whether a point lies in the polygons: the edges that a ray to the right crosses, each counted in one cell."""
+    """Whether a point lies in the polygons, by the edges that a ray to the right crosses, each counted in one cell."""
     grid = index.grid
     row, column = int((y - grid.y) / grid.size_mm), max(int((x - grid.x) / grid.size_mm), 0)
     if y < grid.y or row >= grid.rows:
@@ -181,7 +184,7 @@ def within(index: EdgeIndex, x: float, y: float) -> bool:
 
 @helper
 def nearest(index: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, float, int]:
-    """The nearest point of any edge within reach, and its edge; edge -1: none."""
+    """The nearest point of any edge within reach, and its edge; edge -1 if there is none."""
     grid = index.grid
     best, which, nx, ny = reach, -1, x, y
     low, high = _rows(grid, y - reach, y + reach)
@@ -219,7 +222,7 @@ def lie_within(index: EdgeIndex, points: Floats) -> Mask:
 
 @kernel
 def depths(points: Floats, index: EdgeIndex) -> Floats:
-    """(n,) mm from points (n, 2) to the nearest edge, negative outside the polygons; -inf where there are none."""
+    """(n,) distance from points (n, 2) to the nearest edge, mm, negative outside the polygons; -inf without edges."""
     out: Floats = floats(len(points), -inf)
     for k in range(len(points) if len(index.edges) else 0):
         x, y = points[k, 0], points[k, 1]

@@ -1,4 +1,4 @@
-"""Polygons: sets of closed contours in the plane with their booleans and offsets, all of it over manifold3d.CrossSection.
+"""Polygons: sets of closed contours in the plane with booleans and offsets by manifold3d.CrossSection.
 
 Outer contours run counter-clockwise, holes clockwise. Only the Positive fill rule is used, so every input must be oriented.
 """
@@ -17,17 +17,17 @@ from slicer.geometry.polyline import length_mm
 
 Polygons: TypeAlias = CrossSection
 
-RESOLUTION_MM = 0.004  # finer detail no printer shows; keeps outer walls within 0.005 mm and the area of a layer within 0.05 mm2
-CLOSING_MM = 0.018  # so far plastic may reach over a section, 4 % of a usual line, where a slit of twice that is closed
-TOUCHING_MM = 0.01  # places so near to each other are one
+RESOLUTION_MM = 0.004  # no printer shows finer detail; keeps outer walls within 0.005 mm and the area of a layer within 0.05 mm2
+CLOSING_MM = 0.018  # excess of plastic over a section, 4 % of a usual line, where a slit of twice this width is closed
+TOUCHING_MM = 0.01  # points this close are equal
 MITRE = 3.0  # times the distance: corners sharper than 39 degrees are cut off
-ARC_SEGMENTS = 32  # of a full turn: a corner of half a line, 0.2 mm, is round to a micrometre
-ROUNDING_MM2 = 1e-9  # an offset inward that leaves less leaves nothing
-NEAR_MM, LEAST_MM2 = 1e-6, 1e-6  # a contour that is higher by more than this, and larger, is so for Clipper2 too
+ARC_SEGMENTS = 32  # in a full circle: a corner of half a line, 0.2 mm, is round to a micrometre
+ROUNDING_MM2 = 1e-9  # an inward offset with less area left is empty
+NEAR_MM, LEAST_MM2 = 1e-6, 1e-6  # a contour that is higher by more than this, and larger, is higher for Clipper2 as well
 
 
 def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
-    """Loops of a section, (n, 2) mm each, as overlap-free polygons without detail too fine to print.
+    """Loops of a section, (n, 2) mm each, as overlap-free polygons without unprintably fine detail.
 
     Slits narrower than twice closing_mm are closed.
     """
@@ -38,7 +38,7 @@ def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
 
 
 def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polygons:
-    """Every boundary moved outward (negative: inward) by the distance, corners mitred up to `mitre` distances.
+    """The polygons offset outward (negative: inward) by a distance, corners mitred up to `mitre` distances.
 
     >>> offset(Polygons.square((2.0, 1.0)), 0.5).area()
     6.0
@@ -47,16 +47,16 @@ def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Poly
 
 
 def offset_round(polygons: Polygons, distance_mm: float, segments: int = ARC_SEGMENTS) -> Polygons:
-    """Every boundary moved outward (negative: inward) by the distance, corners round, a full turn in that number of segments."""
+    """The polygons offset outward (negative: inward) by a distance, with round corners; segments: of a full circle."""
     return _moved(polygons, distance_mm, JoinType.Round, MITRE, segments)
 
 
 def _moved(polygons: Polygons, distance_mm: float, corners: JoinType, mitre: float, segments: int) -> Polygons:
-    """The offset, also where Clipper2 takes the polygons for inside out.
+    """The offset, with a workaround for polygons that Clipper2 takes to be inside out.
 
-    It tells outside from inside by the contour that reaches farthest along y (ClipperOffset, GetLowestClosedPathInfo); where that
-    is a hole which touches its outer contour there, or a speck whose sign has been rounded away, nothing is left. A square
-    beyond it settles the question.
+    It distinguishes outside and inside by the contour that reaches farthest along y (ClipperOffset, GetLowestClosedPathInfo); if
+    that is a hole that touches its outer contour there, or a speck whose sign was lost by rounding, the result is empty. A square
+    beyond it avoids that.
     """
     area_mm2, (x0, y0, x1, y1) = polygons.area(), polygons.bounds()
     has_room = area_mm2 >= pi * distance_mm**2 and min(x1 - x0, y1 - y0) >= -2.0 * distance_mm  # for a disc, on the way inward
@@ -72,7 +72,7 @@ def _moved(polygons: Polygons, distance_mm: float, corners: JoinType, mitre: flo
 
 
 def _is_outer_highest(polygons: Polygons) -> bool:
-    """Whether the contour that reaches farthest along y is surely one that runs round plastic."""
+    """Whether the contour that extends farthest along y is certainly an outer one."""
     if polygons.num_contour() == 1:
         return bool(polygons.area() > LEAST_MM2)
     loops = contours(polygons)
@@ -83,31 +83,31 @@ def _is_outer_highest(polygons: Polygons) -> bool:
 
 
 def opening(polygons: Polygons, radius_mm: float) -> Polygons:
-    """The polygons without what is narrower than twice the radius."""
+    """Morphological opening: the polygons without parts narrower than twice the radius."""
     core = offset(polygons, -radius_mm)
     return core if core.is_empty() else offset(core, radius_mm) ^ polygons
 
 
 def closing(polygons: Polygons, radius_mm: float) -> Polygons:
-    """The polygons and every slit in or between them that is narrower than twice the radius."""
+    """Morphological closing: the polygons with slits narrower than twice the radius filled."""
     return offset(offset(polygons, radius_mm), -radius_mm)
 
 
 def union(several: Sequence[Polygons]) -> Polygons:
-    """What lies in any of several polygons."""
+    """The union of several polygons."""
     return Polygons.batch_boolean(list(several), OpType.Add) if several else Polygons()
 
 
 def unite_layers(some: Sequence[Polygons], others: Sequence[Polygons]) -> list[Polygons]:
-    """What lies in either of two polygons, layer by layer."""
+    """The unions of two sequences of polygons, layer by layer."""
     return [union(pair) for pair in zip(some, others, strict=True)]
 
 
 def islands(polygons: Polygons) -> list[Polygons]:
     """The connected pieces, each with its holes.
 
-    A hole that touches the contour round it in some points is a piece of its own for manifold3d, of negative area: it belongs to
-    the piece that it lies in.
+    For manifold3d, a hole that touches its outer contour in some points is a separate piece of negative area; it is subtracted
+    from the piece around it.
     """
     pieces = polygons.decompose() if not polygons.is_empty() else []
     whole = [piece for piece in pieces if piece.area() > 0.0]
@@ -120,7 +120,7 @@ def islands(polygons: Polygons) -> list[Polygons]:
 
 
 def larger(polygons: Polygons, least_mm2: float) -> Polygons:
-    """The connected pieces that have at least that area."""
+    """The connected pieces with at least the given area."""
     if polygons.area() < least_mm2:
         return Polygons()
     pieces = islands(polygons)
@@ -129,25 +129,25 @@ def larger(polygons: Polygons, least_mm2: float) -> Polygons:
 
 
 def strips_beside(area: Polygons, whole: Polygons, least_mm: float) -> list[Polygons]:
-    """The strips that an area leaves of what is around it, narrower than least_mm."""
+    """The strips narrower than least_mm between an area and the border of the whole."""
     left, touched = whole - area, offset(area, TOUCHING_MM)
     narrow = (left - opening(left, 0.5 * least_mm)) ^ offset(area, least_mm)
     return [piece for piece in islands(narrow) if not (piece ^ touched).is_empty()]
 
 
 def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
-    """The upright rectangle round polygons, farther out by the reach."""
+    """The axis-parallel bounding rectangle, extended by a reach."""
     x0, y0, x1, y1 = polygons.bounds()
     return rectangle(x0 - reach_mm, y0 - reach_mm, x1 + reach_mm, y1 + reach_mm)
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> Polygons:
-    """The upright rectangle between two corners."""
+    """The axis-parallel rectangle between two corners."""
     return Polygons.square((x1 - x0, y1 - y0)).translate((x0, y0))
 
 
 def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
-    """The part of polygons where a x + b y + c > 0; all of them where it is nowhere less than 0."""
+    """The part of polygons where a x + b y + c > 0; unchanged if that is nowhere negative."""
     if polygons.is_empty():
         return polygons
     x0, y0, x1, y1 = polygons.bounds()
@@ -164,7 +164,7 @@ def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
 
 
 def strips(lines: Sequence[Floats], reach_mm: float | Floats) -> Polygons:
-    """Everything nearer than the reach to lines (n, 2), with square ends; an array holds the reach of every segment."""
+    """Area within a reach of lines (n, 2), with square ends; an array gives the reach of every segment."""
     starts, ends = np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines])
     steps = ends - starts
     along = steps * (reach_mm / np.maximum(np.hypot(*steps.T), 1e-9))[:, None]
@@ -174,17 +174,17 @@ def strips(lines: Sequence[Floats], reach_mm: float | Floats) -> Polygons:
 
 
 def of_contours(loops: Sequence[Floats]) -> Polygons:
-    """The polygons of oriented contours; those of other polygons may come out rounded."""
+    """The polygons of oriented contours; contours taken from polygons may come out rounded."""
     return Polygons(list(loops), FillRule.Positive)
 
 
 def contours(polygons: Polygons) -> list[Floats]:
-    """Contours as (n, 2) arrays, the first point not repeated."""
+    """The contours as (n, 2) arrays, without repeating the first point."""
     return [np.asarray(loop, dtype=np.float64) for loop in polygons.to_polygons() if len(loop) > 2]
 
 
 def start_at(loop: Floats, at: int) -> Floats:
-    """The loop (n, 2) from another of its points on."""
+    """The loop (n, 2) rotated to start at another of its points."""
     return np.concatenate([loop[at:], loop[:at]])
 
 
@@ -194,7 +194,7 @@ def close_loop(loop: Floats) -> Floats:
 
 
 def perimeter_mm(polygons: Polygons) -> float:
-    """Length of all contours."""
+    """Length of all contours, mm."""
     return float(sum(length_mm(close_loop(loop)) for loop in contours(polygons)))
 
 
@@ -205,7 +205,7 @@ def edges(polygons: Polygons) -> Floats:
 
 @kernel
 def area_mm2(loop: Floats) -> float:
-    """Signed area of a loop by the shoelace formula, positive when counter-clockwise."""
+    """Signed area of a loop by the shoelace formula, positive if counter-clockwise."""
     x0, y0 = loop[0, 0], loop[0, 1]
     doubled = 0.0
     for i in range(1, len(loop) - 1):

@@ -1,8 +1,8 @@
-"""Polylines: their length and their simplification, one by one or a table of them at once; and the predicates of segments that
-kernels share: orientation, crossing, nearest point.
+"""Polylines: length and simplification, singly or in tables, and the predicates of segments for kernels: orientation, crossing,
+nearest point.
 
-A point on a line counts as its right side, and a point at the height of an edge's end as below it, for all that meet there alike:
-no crossing is counted twice or missed at a vertex.
+A point on a line counts as on its right side, and a point at the height of an edge's end as below it, for all edges that meet
+there: so no crossing is counted twice or missed at a vertex.
 """
 
 from math import inf
@@ -15,7 +15,7 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 
-SHORT_MM = 0.25  # corners of a path that are nearer to each other slow a printer down
+SHORT_MM = 0.25  # corners of a path that are closer together slow a printer down
 
 
 class Segment(NamedTuple):
@@ -35,13 +35,13 @@ def edge(edges: Floats, e: int) -> Segment:
 
 @no_nrt
 def orientation(line: Segment, x: float, y: float) -> float:
-    """Twice the signed area of the triangle of a line's two points and a third: positive where that lies to the left."""
+    """Twice the signed area of the triangle of a line's two points and a third point: positive if that lies to the left."""
     return float((line.x1 - line.x0) * (y - line.y0) - (line.y1 - line.y0) * (x - line.x0))
 
 
 @no_nrt
 def crossing(segment: Segment, crossed: Segment) -> float:
-    """Where (0..1) a segment crosses another one; -1 where it does not."""
+    """Position (0..1) at which a segment crosses another one; -1 if it does not."""
     if (orientation(segment, crossed.x0, crossed.y0) > 0.0) == (orientation(segment, crossed.x1, crossed.y1) > 0.0):
         return -1.0
     start, end = orientation(crossed, segment.x0, segment.y0), orientation(crossed, segment.x1, segment.y1)
@@ -52,23 +52,23 @@ def crossing(segment: Segment, crossed: Segment) -> float:
 
 @no_nrt
 def clamp_projection(along: float, square: float) -> float:
-    """Where (0..1) on a segment its point nearest to another one lies.
+    """Position (0..1) on a segment of its point nearest to another point.
 
-    along: product of the vectors from the segment's beginning to the point and to its end; square: its length squared.
+    along: product of the vectors from the segment's start to the point and to its end; square: squared length of the segment.
     """
     return min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
 
 
 @no_nrt
 def nearest_share(segment: Segment, x: float, y: float) -> float:
-    """Where (0..1) on a segment the point nearest to x, y lies."""
+    """Position (0..1) on a segment of its point nearest to x, y."""
     dx, dy = segment.x1 - segment.x0, segment.y1 - segment.y0
     return clamp_projection((x - segment.x0) * dx + (y - segment.y0) * dy, dx * dx + dy * dy)
 
 
 @no_nrt
 def squared_distance(segment: Segment, x: float, y: float) -> float:
-    """Square of the distance between a point and a segment."""
+    """Squared distance between a point and a segment."""
     share = nearest_share(segment, x, y)
     px, py = x - segment.x0, y - segment.y0
     return float((px - share * (segment.x1 - segment.x0)) ** 2 + (py - share * (segment.y1 - segment.y0)) ** 2)
@@ -76,7 +76,7 @@ def squared_distance(segment: Segment, x: float, y: float) -> float:
 
 @no_nrt
 def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
-    """Square of the distance between a point and the segment from a to b; each three numbers."""
+    """Squared distance in space between a point and the segment from a to b, each with three coordinates."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
     share = clamp_projection(x * dx + y * dy + z * dz, dx * dx + dy * dy + dz * dz)
@@ -86,14 +86,14 @@ def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
 
 @no_nrt
 def level_crossing(segment: Segment, y: float) -> float:
-    """Where (x) a segment goes through the height y; -inf where it does not. What an even-odd test counts to one side."""
+    """The x at which a segment crosses the height y, for even-odd tests; -inf if it does not."""
     if (segment.y0 > y) == (segment.y1 > y):
         return -inf
     return float(segment.x0 + (y - segment.y0) / (segment.y1 - segment.y0) * (segment.x1 - segment.x0))
 
 
 def near_height(segments: Floats, z_mm: float, reach_mm: float) -> Floats:
-    """Those of (n, 6) segments in space that come nearer than that to a height."""
+    """The (n, 6) segments in space that come within a distance of a height."""
     off = segments[:, [2, 5]] - z_mm
     near: Floats = segments[(off.min(axis=1) < reach_mm) & (off.max(axis=1) > -reach_mm)]
     return near
@@ -101,18 +101,18 @@ def near_height(segments: Floats, z_mm: float, reach_mm: float) -> Floats:
 
 @kernel
 def length_mm(points: Floats) -> float:
-    """Length of a polyline (n, 2 or more) seen from above."""
+    """Length of a polyline (n, 2 or more) projected to the plane, mm."""
     return length_between(points, 0, len(points))
 
 
 def along_mm(points: Floats) -> Floats:
-    """(n,) mm along a polyline (n, 2 or more), seen from above, to each of its points."""
+    """(n,) distance along a polyline (n, 2 or more), projected to the plane, to each of its points, mm."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
 
 
 @kernel
 def lengths_mm(points: Floats, starts: Indices) -> Floats:
-    """(k,) lengths, seen from above, of polylines one after the other; points: (n, 2 or more); starts: (k + 1,)."""
+    """(k,) lengths of consecutive polylines projected to the plane, mm. points: (n, 2 or more); starts: (k + 1,)."""
     out: Floats = floats(len(starts) - 1, 0.0)
     for k in range(len(out)):
         out[k] = length_between(points, starts[k], starts[k + 1])
@@ -121,7 +121,7 @@ def lengths_mm(points: Floats, starts: Indices) -> Floats:
 
 @no_nrt
 def length_between(points: Floats, first: int, end: int) -> float:
-    """Length of the polyline of some of the points, seen from above."""
+    """Length of the polyline of a range of points, projected to the plane."""
     total = 0.0
     for i in range(first + 1, end):
         total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
@@ -130,10 +130,10 @@ def length_between(points: Floats, first: int, end: int) -> float:
 
 @kernel
 def mark_corners(points: Floats, starts: Indices, tolerance_mm: float) -> Mask:
-    """(n,) points that simplified polylines keep (Douglas and Peucker 1973); the chord of a loop is its first point.
+    """(n,) mask of the points that simplified polylines keep (Douglas and Peucker 1973); the chord of a loop is its first point.
 
-    Where one point does in place of two that are nearer to each other than SHORT_MM, it is kept instead of them. points: (n, 2 or
-    more), one polyline after the other; starts: (k + 1,).
+    Two points closer than SHORT_MM are replaced by a single point where that suffices. points: (n, 2 or more), one polyline after
+    the other; starts: (k + 1,).
     """
     corner: Mask = flags(len(points))
     for k in range(len(starts) - 1):
@@ -152,7 +152,7 @@ def mark_corners(points: Floats, starts: Indices, tolerance_mm: float) -> Mask:
 
 @no_nrt
 def _farthest(points: Floats, a: int, b: int, tolerance_mm: float) -> int:
-    """The point between two others that is farthest from their chord; -1 where none is beyond the tolerance."""
+    """The point between two others farthest from their chord; -1 if none is beyond the tolerance."""
     chord = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
     farthest, at = tolerance_mm * tolerance_mm, -1
     for i in range(a + 1, b):
@@ -164,7 +164,7 @@ def _farthest(points: Floats, a: int, b: int, tolerance_mm: float) -> int:
 
 @no_nrt
 def _join_near_corners(points: Floats, corner: Mask, first: int, last: int, tolerance_mm: float) -> None:
-    """Keeps one point in place of two corners of a polyline first .. last that are near to each other, where that is enough."""
+    """Replace close pairs of corners of a polyline first .. last by one point, where that suffices."""
     before, p = first, _next_corner(corner, first) if last > first else last
     while p < last:
         q = _next_corner(corner, p)
@@ -187,7 +187,7 @@ def _join_near_corners(points: Floats, corner: Mask, first: int, last: int, tole
 
 @no_nrt
 def _next_corner(corner: Mask, at: int) -> int:
-    """The next point that is kept; the last of a polyline is."""
+    """The next point that is kept; the last point of a polyline is always kept."""
     at += 1
     while not corner[at]:
         at += 1
@@ -196,10 +196,12 @@ def _next_corner(corner: Mask, at: int) -> int:
 
 @kernel
 def lengthen_steps(points: Floats, starts: Indices, shortest_mm: Floats, most_mm: Floats) -> tuple[Floats, Mask]:
-    """Polylines without steps shorter than shortest_mm where no place moves by more than most_mm; and (n,) which points are left.
+    """Polylines without steps shorter than shortest_mm, unless a point would move by more than most_mm; and (n,) mask of
+    remaining points.
 
-    One end of a short step goes back along the step beside it, or is left out with it, whichever moves the line less. First and
-    last points stay. points: (n, 2 or more), one polyline after the other; shortest_mm, most_mm: (k,); shortest 0: as it is.
+    One end of a short step moves back along the adjacent step, or is dropped with it, whichever moves the line less. First and
+    last points stay. points: (n, 2 or more), consecutive polylines; shortest_mm, most_mm: (k,); shortest_mm 0 leaves a polyline
+    unchanged.
     """
     out, left, fixed = points.copy(), flags(len(points)), flags(len(points))
     for k in range(len(starts) - 1):
@@ -235,9 +237,9 @@ def lengthen_steps(points: Floats, starts: Indices, shortest_mm: Floats, most_mm
 
 @no_nrt
 def _drawn_back(points: Floats, ends: tuple[int, int, int], fixed: Mask, shortest_mm: float) -> tuple[float, float]:
-    """How far the line a, b, c moves if b goes back towards a until the step to c is long enough, and the share of the way there.
+    """Deviation of the line a, b, c if b moves towards a until the step to c is long enough, and the share of the way.
 
-    Share 1: b is left out. Infinitely far where that would make a step shorter or move what is fixed.
+    Share 1 drops b. The deviation is infinite if a step would become shorter or a fixed point would move.
     """
     a, b, c = ends
     ux, uy = points[a, 0] - points[b, 0], points[a, 1] - points[b, 1]

@@ -1,4 +1,4 @@
-"""Triangulation: the constrained Delaunay triangulation of polygons: any triangles, their inner sides flipped (Lawson 1977)."""
+"""Constrained Delaunay triangulation of polygons: arbitrary triangles whose inner sides are flipped (Lawson 1977)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,15 +12,15 @@ from mdp.mesh import Floats, Indices, Ints
 from mdp.topology.edges import opposites
 from slicer.geometry.polyline import Segment, orientation
 
-ROUNDING = 1e-14  # of the terms that are added up: ten times their error
-MOST_FLIPS = 2000  # for every side; a straight strip of 2 m needs 500, most polygons one, rounding must not make it endless
+ROUNDING = 1e-14  # of the summed terms: ten times their error
+MOST_FLIPS = 2000  # per side; a straight strip of 2 m needs 500, most polygons one; rounding must not make it endless
 
 
 class Triangulation(NamedTuple):
-    """points: (n, 2) mm. Half-edge 3 t + k runs from the point tails[3 t + k] of triangle t to its next one.
+    """Triangulation. points: (n, 2) mm. Half-edge 3 t + k runs from the point tails[3 t + k] of triangle t to its next one.
 
-    tails: (3 m,) counter-clockwise in every triangle; across: (3 m,) the half-edge on the other side, -1 on the boundary.
-    piece: (n,) the piece that each point belongs to.
+    tails: (3 m,) counter-clockwise in every triangle; across: (3 m,) the opposite half-edge, -1 on the boundary. piece: (n,) the
+    piece of each point.
     """
 
     points: Floats
@@ -37,13 +37,15 @@ def after(h: int) -> int:
 
 @no_nrt
 def before(h: int) -> int:
-    """The half-edge before in the same triangle."""
+    """The previous half-edge of the same triangle."""
     return h + 2 if h % 3 == 0 else h - 1
 
 
 def triangulate(pieces: Sequence[Sequence[Floats]], step_mm: float = np.inf) -> Triangulation | None:
-    """The Delaunay triangulation of several polygons given by their contours (k, 2), each by itself; None where none has an area.
-    step_mm: sides get points so that none is longer, put in after the polygons have been triangulated, a fraction of the time."""
+    """The Delaunay triangulation of several polygons, each given by its contours (k, 2) and triangulated separately; None if none
+    has an area. step_mm: greatest length of a side; points are added to longer sides after the triangulation, which takes a
+    fraction of the time.
+    """
     loops = [loop for piece in pieces for loop in piece]
     sizes = [sum(map(len, piece)) for piece in pieces]
     rows = zip(pieces, np.cumsum([0, *sizes]), strict=False)
@@ -59,10 +61,10 @@ def triangulate(pieces: Sequence[Sequence[Floats]], step_mm: float = np.inf) -> 
 
 
 def resample(points: Floats, starts: Indices, step_mm: float) -> tuple[Floats, Indices, Indices]:
-    """The points of loops one after the other with samples added so that no side is longer than the step.
+    """The points of consecutive loops with samples added so that no side is longer than the step.
 
-    points: (n, 2); starts: (k + 1,). Returns all points (m, 2), the number of each of the loops' own points among them, and how
-    many samples follow each.
+    points: (n, 2); starts: (k + 1,). Returns all points (m, 2), the index of each original point among them, and the number of
+    samples after each.
     """
     following = np.arange(1, len(points) + 1)
     following[starts[1:] - 1] = starts[:-1]
@@ -78,17 +80,17 @@ def resample(points: Floats, starts: Indices, step_mm: float) -> tuple[Floats, I
 def _with_samples(corners: Ints, across: Ints, first: Indices, between: Indices) -> tuple[Ints, Ints]:
     """Tails and opposites of triangles whose sides on the boundary are split at samples.
 
-    corners, across: (3 m,) of the triangles of the polygon's own points; first: number of each of these among all points;
-    between: how many samples follow it. A sample splits the triangle on its side in two, as seen from the opposite corner.
+    corners, across: (3 m,) of the triangles of the original points; first: index of each of these among all points; between:
+    number of samples after it. A sample splits the triangle on its side in two, towards the opposite corner.
     """
     size = len(corners)
     tails, twins = ints(size + 3 * int(between.sum()), -1), ints(size + 3 * int(between.sum()), -1)
-    on_side = longs(len(first), -1)  # the half-edge on the boundary that begins at each of the polygon's own points
+    on_side = longs(len(first), -1)  # the boundary half-edge that begins at each original point
     for h in range(size):
         tails[h], twins[h] = first[corners[h]], across[h]
         if across[h] < 0:
             on_side[corners[h]] = h
-    own = longs(len(tails), -1)  # the polygon's point at which a half-edge on the boundary begins
+    own = longs(len(tails), -1)  # the original point at which a boundary half-edge begins
     for point in range(len(first)):
         if on_side[point] >= 0:
             own[on_side[point]] = point
@@ -112,7 +114,7 @@ def _with_samples(corners: Ints, across: Ints, first: Indices, between: Indices)
 
 @no_nrt
 def doubled_area(points: Floats, a: int, b: int, c: int) -> float:
-    """Twice the signed area of a triangle of three of the points."""
+    """Twice the signed area of a triangle of three points."""
     return orientation(Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1]), points[c, 0], points[c, 1])
 
 
@@ -124,14 +126,14 @@ def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
     cx, cy = points[c, 0] - x, points[c, 1] - y
     a2, b2, c2 = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
     bc, ca, ab = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
-    # what rounding goes by (Shewchuk 1997, section 4.4): of four points on one circle no side must flip for ever
+    # error bound (Shewchuk 1997, section 4.4): with four points on one circle no side may flip forever
     size = a2 * (abs(bx * cy) + abs(by * cx)) + b2 * (abs(cx * ay) + abs(cy * ax)) + c2 * (abs(ax * by) + abs(ay * bx))
     return bool(a2 * bc + b2 * ca + c2 * ab > ROUNDING * size)
 
 
 @kernel
 def _flip(triangulation: Triangulation) -> int:
-    """Flips inner sides in place until every one is locally Delaunay; returns how many times."""
+    """Flip inner sides in place until every one is locally Delaunay; returns the number of flips."""
     points, tails, across, _ = triangulation
     waiting, stack, queued = len(tails), longs(len(tails), 0), flags(len(tails))
     for k in range(len(tails)):

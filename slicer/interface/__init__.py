@@ -1,1 +1,1 @@
-"""Interface: what a part is beside the others: where it lies on them, what they cover of it, how they hold together."""
+"""Interface: a part in relation to other parts: where it stands on them, what they cover of it, and how they hold together."""

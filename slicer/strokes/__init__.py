@@ -1,1 +1,1 @@
-"""Strokes: the beads of a layer in order, their seams, splits and speeds, and the ways between. Public: order.order_beads."""
+"""Strokes: the ordered beads of a layer, their seams, splits and speeds, and the travels between. Public: order.order_beads."""

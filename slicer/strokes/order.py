@@ -1,8 +1,8 @@
-"""Order: in which sequence the beads of a layer are printed, and which travels between them retract.
+"""Order: the sequence of a layer's beads, and which of the travels between them retract.
 
-Skirt and support come first. The pieces of support, then the islands of the section, follow each other in a short order; inside
-an island the walls come first, each outer wall right after the inner walls behind its seam, then by rising rank gaps, skin and
-infill. Every piece ends near the next one, and where a layer ends the next one begins.
+Skirt and support come first. The pieces of support, then the islands of the section, follow in a short order; within an island
+the walls come first, each outer wall right after the inner walls behind its seam, then, by ascending rank, gap fill, skin and
+infill. Every piece ends near the next one, and the next layer begins where a layer ends.
 """
 
 from collections import defaultdict
@@ -22,11 +22,11 @@ from slicer.strokes.speed import bead_speed_mm_s
 from slicer.strokes.strokes import Strokes, strokes_of
 from slicer.strokes.travels import travels
 
-SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
-NO_GOAL = np.zeros((0, 3))  # x, y and speed; a speed that is not known is NaN, which differs from every other
-ROUNDS = 2  # a phase ends well only once it is known where the next one begins
+SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings have a fixed start
+NO_GOAL = np.zeros((0, 3))  # x, y and speed; an unknown speed is NaN, which differs from every other
+ROUNDS = 2  # the end of a phase can be optimised only when the start of the next one is known
 SUPPORTS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
-FIRST = -1  # the number of what comes before all islands: skirt and brim
+FIRST = -1  # number for what comes before all islands: skirt and brim
 
 Speed = Callable[[Bead], float]
 
@@ -42,8 +42,8 @@ def order_beads(
 ) -> Strokes:
     """The beads of one layer in printing order.
 
-    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed; skin: outer walls
-    beside an edge of an interface, which no travel passes over; kind_mm_s: by number of the kind, replaces the process's.
+    tip: (2,) position of the nozzle before, None at the part's start; support: its area; skin: visible wall beside joints, which
+    no travel crosses; kind_mm_s: speeds by number of the kind, which replace the process's.
     """
     if not beads:
         return strokes_of([], np.zeros(0, np.bool_), {}, process.small_wall_mm)
@@ -67,7 +67,7 @@ def order_beads(
 
 
 def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> Ints:
-    """(n,) the number of each bead's island: the smallest outer contour round its start, of the section or of its support.
+    """(n,) number of each bead's island: the smallest outer contour around its start, in the section or in its support.
 
     Those of support come after those of the section; FIRST: skirt and brim.
     """
@@ -84,26 +84,26 @@ def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> I
 
 
 def _pieces_around(starts: Floats, area: Polygons) -> Ints:
-    """(n,) the number of the area's piece that each start lies in; those in none have a number of their own."""
+    """(n,) number of the area's piece that contains each start; starts outside all pieces share a separate number."""
     outer = sorted((loop for loop in contours(area) if area_mm2(loop) > 0), key=lambda loop: abs(area_mm2(loop)))
     if len(outer) < 2:
         return np.zeros(len(starts), np.int32)
-    import shapely  # 30 ms, which commands that slice nothing need not spend
+    import shapely  # import takes 30 ms, which commands without slicing save
 
     rings = shapely.linearrings(np.concatenate(outer), indices=np.repeat(np.arange(len(outer)), [len(loop) for loop in outer]))
     piece, start = shapely.STRtree(shapely.points(starts)).query(shapely.polygons(rings), "contains")
     pieces = np.full(len(starts), len(outer), np.int32)
-    np.minimum.at(pieces, start, piece.astype(np.int32))  # of an island in a hole of another one the inner, which is smaller
+    np.minimum.at(pieces, start, piece.astype(np.int32))  # for an island in a hole of another one the inner, which is smaller
     return pieces
 
 
 def _end(bead: Bead, end: int, speed_mm_s: Speed) -> Floats:
-    """(3,) where a bead begins, end = 0, or ends, end = -1, and its speed."""
+    """(3,) start (end = 0) or end (end = -1) of a bead, and its speed."""
     return np.append(bead.points[end], speed_mm_s(bead))
 
 
 def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: bool) -> list[int]:
-    """The islands in a short order after skirt and brim, support before the part where that is asked for."""
+    """The islands in a short order after skirt and brim; support_first: support before the part."""
     stages: defaultdict[int, list[int]] = defaultdict(list)
     for island in sorted(groups):
         stages[0 if island == FIRST else 1 if support_first and groups[island][0].kind in SUPPORTS else 2].append(island)
@@ -122,7 +122,7 @@ def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: b
 
 
 def _middle(beads: Sequence[Bead]) -> Floats:
-    """(2,) the place that stands for an island: where its first outer wall begins, of others the middle of all that they are."""
+    """(2,) representative point of an island: the start of its first outer wall, otherwise the centre of its beads."""
     leader = next((bead for bead in beads if bead.kind is Kind.OUTER_WALL), None)
     points = np.concatenate([bead.points for bead in beads]) if leader is None else leader.points[:1]
     middle: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -130,9 +130,9 @@ def _middle(beads: Sequence[Bead]) -> Floats:
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
-    """The beads of an island in the phases of its printing: by rank, but all walls at once, in families that stay together.
+    """The beads of an island in printing phases: by rank, except that all walls form one phase, in families that stay together.
 
-    Inner walls that are open lines and behind no seam are printed with the infill: most have its speed and lie beside it.
+    Inner walls that are open lines and not behind a seam are printed with the infill: most have its speed and lie beside it.
     """
     leaders = [bead for bead in beads if bead.kind is Kind.OUTER_WALL and BEFORE_WALLS < bead.rank <= 0]
     walls = [bead for bead in beads if leaders and BEFORE_WALLS < bead.rank <= 0]
@@ -168,10 +168,10 @@ def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]
 
 
 def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
-    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
+    """The chains of a family: in every rank, the wall that begins nearest to the leader's start joins the leader's chain.
 
-    The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
-    print them first would mean going there and back. Open lines among them begin beside no other wall and stay single.
+    The others, around separate areas where the walls behind an outer wall divide, form their own chains: printing them first
+    would need travels there and back. Open lines among them begin beside no other wall and stay single.
     """
     chain, others = [leader], list[Bead]()
     for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
@@ -187,7 +187,7 @@ def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
 
 
 def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], speed_mm_s: Speed, tip: Floats, goal: Floats) -> list[Bead]:
-    """The phases of an island one after the other, each once more when it is known where the next one begins."""
+    """Order the phases of an island one after the other, and once more when the start of each next phase is known."""
     goals = [NO_GOAL] * (len(phases) - 1) + [goal]
     for _ in range(min(len(phases), ROUNDS)):
         runs, at = list[list[Bead]](), tip
@@ -199,7 +199,7 @@ def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], speed_mm_s: Speed, ti
 
 
 def _short_order(items: Sequence[Sequence[Bead]], speed_mm_s: Speed, tip: Floats, goal: Floats) -> list[Bead]:
-    """Chains of beads in a short order from the tip on, with their points as they are printed."""
+    """Chains of beads in a short order starting from the tip, with their points in printing direction."""
     lines = [item[0].points if len(item) == 1 else np.array([item[0].points[0], item[-1].points[-1]]) for item in items]
     fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
     speeds = np.array([[speed_mm_s(item[end]) for end in (0, -1)] for item in items])
@@ -210,7 +210,7 @@ def _short_order(items: Sequence[Sequence[Bead]], speed_mm_s: Speed, tip: Floats
 
 
 def _freedom(chain: Sequence[Bead]) -> int:
-    """What may be done with a chain so that the ways to and from it are short."""
+    """The freedom of a chain to begin elsewhere, so that the travels to and from it are short."""
     bead = chain[0]
     if len(chain) > 1 or bead.kind in SEAMED:
         return AS_IT_IS

@@ -1,14 +1,14 @@
-"""Path order: a short order of paths that each have a start and an end: greedy nearest neighbour, then exchanges.
+"""Path order: a short order of paths with a start and an end each, by greedy nearest neighbour, then exchanges.
 
-A change of speed on the way from one path to the next counts as much as CHANGE_MM of travel, so that paths of one speed follow
-each other unless that means a long detour.
+A change of speed between two paths counts like CHANGE_MM of travel, so that paths of one speed are grouped unless that means a
+long detour.
 
-Exchanges are the classic ones of the travelling salesman's problem: 2-opt (a stretch of the order reversed) and Or-opt (up to
-three neighbours moved elsewhere), with true lengths also where a path must not be reversed.
+The exchanges are those of the travelling salesman problem: 2-opt (reverse a stretch of the order) and Or-opt (move up to three
+neighbours elsewhere), with true lengths also for paths that must not be reversed.
 
-Some lines may begin at any of their corners: closed ones without a seam, and long open ones, which are taken in two. A long line
-of infill often runs through the whole island and ends beside its beginning, far from where the tip is. It is begun at the corner
-beside the tip then, and after its end goes on at its beginning, wherever that saves travel.
+Some lines may begin at any of their corners: closed ones without a seam, and long open ones, which are split in two. A long line
+of infill often runs through the whole island and ends near its start, far from the tip. Where it saves travel, it begins at the
+corner nearest to the tip, and continues at its start after its end.
 """
 
 from collections.abc import Sequence
@@ -20,31 +20,31 @@ from mdp.kernels.arrays import flags, longs, table
 from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats, Indices
 
-CHANGE_MM = 3.0  # at 15 mm, prints with many small islands take 1 % longer, since most of their travels also retract
-TRIES = 2  # the order depends on where lines begin, and that on the order
-WORTH_MM = 5.0  # travel that taking a line in two has to save: a bead that ends and begins once more shows
-CLOSED, OPEN, AS_IT_IS = 2, 1, 0  # what may be done with a line: begun anywhere, begun anywhere in two pieces, nothing
-REACH = 200  # exchanges reach so far along the order, less far in an order of more than a thousand paths
-# Random lines of 1 to 8 mm on a plate of 100 mm, commit 5c72b83f: with up to 900 of them nothing is gained after 12 passes,
-# 4 leave the way 0.6 to 1 % longer for half the time, 1 leaves it 6 to 13 % longer; with 2,500 of them 4 leave it 0.3 % longer.
+CHANGE_MM = 3.0  # at 15 mm, prints with many small islands take 1 % longer, since most of the travels also retract
+TRIES = 2  # the order depends on where lines begin, which in turn depends on the order
+WORTH_MM = 5.0  # travel that splitting a line must save, since the extra end and start of a bead are visible
+CLOSED, OPEN, AS_IT_IS = 2, 1, 0  # freedom of a line: begin anywhere, begin anywhere in two pieces, none
+REACH = 200  # range of exchanges along the order; shorter for more than a thousand paths
+# Random lines of 1 to 8 mm on a plate of 100 mm, commit 5c72b83f: with up to 900 of them nothing is gained after 12 passes; 4
+# passes give a path 0.6 to 1 % longer in half the time, 1 pass 6 to 13 % longer; with 2,500 lines 4 passes give 0.3 % longer.
 PASSES, FEW_PASSES = 12, 4
-MANY = 1000  # paths, from which on there are few passes
-GAIN_MM = 1e-6  # less is rounding, and an exchange back and forth would never end
-MOST_MOVED = 3  # as Or (1976); one leaves the same ways 0.3 to 0.8 % longer, four change them by -0.4 to +0.5 %
+MANY = 1000  # number of paths from which few passes are made
+GAIN_MM = 1e-6  # smaller gains are rounding, and might exchange back and forth forever
+MOST_MOVED = 3  # as in Or (1976); one gives paths 0.3 to 0.8 % longer, four change them by -0.4 to +0.5 %
 
-# Paths in their present order: (n,) number of each, (n,) reversed, (n,) must not be, and (2 n + 1 + goals, 3) places with their
-# speeds: where all begins, then where each path is entered and left as it runs now, then the goal.
+# Paths in their present order: (n,) number of each, (n,) whether it is reversed, (n,) whether it must not be, and (2 n + 1 +
+# goals, 3) points with speeds: the start of all, then entry and exit of each path in its present direction, then the goal.
 Paths = tuple[Indices, NDArray[np.bool_], NDArray[np.bool_], Floats]
 
 
 def order_lines(
     lines: Sequence[Floats], speeds: Floats, fixed: NDArray[np.bool_], freedom: Sequence[int], tip: Floats, goal: Floats
 ) -> list[tuple[int, list[Floats]]]:
-    """Lines (n, 2) in a short order from the tip on, as order_paths, begun where their freedom allows it: the number of each and
-    the pieces (n, 2) of it as they are printed.
+    """Lines (n, 2) in a short order starting from the tip, as in order_paths, with starts chosen where their freedom allows it:
+    the number of each line and its pieces (n, 2) in printing direction.
 
-    speeds: (n, 2) with which each begins and ends; fixed: (n,) must not be reversed; tip: (3,) where and with which speed all
-    begins; goal: (1, 3) where and with which it ends up, or (0, 3).
+    speeds: (n, 2) at start and end of each line; fixed: (n,) whether it must not be reversed; tip: (3,) initial position and
+    speed; goal: (1, 3) final position and speed, or (0, 3).
     """
     held, cut, pairs = fixed.copy(), [0] * len(lines), zip(lines, freedom, strict=True)
     begun = [_begin_at(line, _corner(line, tip[:2], tip[:2], True)) if free == CLOSED else line for line, free in pairs]
@@ -69,7 +69,7 @@ def order_lines(
 
 
 def _corner(line: Floats, since: Floats, to: Floats, closed: bool) -> int:
-    """The corner to begin a line at, so that the way from one place over it to another is shortest; 0: its beginning."""
+    """The corner at which a line should begin so that the path between two points via the line is shortest; 0 for its start."""
     return int(_best_corner(np.ascontiguousarray(line), since[0], since[1], to[0], to[1], closed))
 
 
@@ -90,7 +90,7 @@ def _best_corner(line: Floats, x0: float, y0: float, x1: float, y1: float, close
 
 
 def _begin_at(line: Floats, at: int) -> Floats:
-    """A line (n, 2) from one of its corners on to its end, and on from its beginning to that corner."""
+    """A line (n, 2) from one of its corners to its end, continued from its start to that corner."""
     closed = bool((line[0] == line[-1]).all())
     return np.concatenate([line[at:], line[int(closed) : at + 1]]) if at else line
 
@@ -104,9 +104,9 @@ def _nearer_from_its_end(line: Floats, since: Floats, to: Floats) -> bool:
 def order_paths(
     starts: Floats, ends: Floats, fixed: NDArray[np.bool_], tip: Floats, goal: Floats
 ) -> tuple[Indices, NDArray[np.bool_]]:
-    """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) must not be reversed.
+    """Order and reversals of n paths; starts, ends: (n, 3) mm, mm and speed; fixed: (n,) whether a path must not be reversed.
 
-    tip: (3,) place and speed from which the order starts; goal: (1, 3) those at which it should end, or (0, 3).
+    tip: (3,) initial position and speed; goal: (1, 3) desired final position and speed, or (0, 3).
     """
     n = len(starts)
     given, at = table(2 * n + 1, 3), table(2 * n + 1 + len(goal), 3)
@@ -136,7 +136,7 @@ def order_paths(
 
 @no_nrt
 def _greedy(given: Floats, fixed: NDArray[np.bool_], order: Indices, flips: NDArray[np.bool_]) -> None:
-    """Fills in the order that goes to the nearest path each time; given: places as in Paths, in the order of the numbers."""
+    """Fill in the greedy order, always to the nearest path. given: points as in Paths, in the order of the numbers."""
     for k in range(len(order)):
         order[k] = k
     since = 0
@@ -159,7 +159,7 @@ def _greedy(given: Floats, fixed: NDArray[np.bool_], order: Indices, flips: NDAr
 
 @no_nrt
 def _way(at: Floats, a: int, b: int) -> float:
-    """Travel from one place to another, and CHANGE_MM where their speeds differ; no travel where b is no place."""
+    """Cost from one point to another: travel, plus CHANGE_MM if their speeds differ; 0 if b does not exist."""
     if b >= len(at):
         return 0.0
     travel = np.hypot(at[b, 0] - at[a, 0], at[b, 1] - at[a, 1])
@@ -168,12 +168,12 @@ def _way(at: Floats, a: int, b: int) -> float:
 
 @no_nrt
 def _reverse_stretches(paths: Paths, reach: int) -> float:
-    """2-opt: reverses stretches where that saves travel; returns how much."""
+    """2-opt: reverse stretches where that saves travel; returns the saving, mm."""
     order, _, fixed, at = paths
     n, gained = len(order), 0.0
     for i in range(n):
         before = _way(at, 2 * i, 2 * i + 1)
-        last = 2 * i + (2 if fixed[i] else 1)  # where the reversed stretch is left
+        last = 2 * i + (2 if fixed[i] else 1)  # exit of the reversed stretch
         forth = back = 0.0
         inner = last
         for j in range(i, min(i + reach, n)):
@@ -193,7 +193,7 @@ def _reverse_stretches(paths: Paths, reach: int) -> float:
 
 @no_nrt
 def _move_neighbours(paths: Paths, reach: int) -> float:
-    """Or-opt: moves up to MOST_MOVED neighbours elsewhere where that saves travel; returns how much."""
+    """Or-opt: move up to MOST_MOVED neighbours elsewhere where that saves travel; returns the saving, mm."""
     order, _, _, at = paths
     n, gained = len(order), 0.0
     for i in range(n):
@@ -204,7 +204,7 @@ def _move_neighbours(paths: Paths, reach: int) -> float:
             if saved <= GAIN_MM:
                 continue
             best, to = GAIN_MM, -2
-            for k in range(max(i - reach, -1), min(last + reach, n)):  # put between k and k + 1
+            for k in range(max(i - reach, -1), min(last + reach, n)):  # insert between k and k + 1
                 if i - 1 <= k <= last:
                     continue
                 left = 2 * k + 2
@@ -221,7 +221,7 @@ def _move_neighbours(paths: Paths, reach: int) -> float:
 
 @no_nrt
 def _reverse(paths: Paths, i: int, j: int) -> None:
-    """The stretch i..j the other way round."""
+    """Reverse the stretch i..j and its paths."""
     _mirror(paths, i, j)
     _, flips, fixed, at = paths
     for k in range(i, j + 1):
@@ -233,7 +233,7 @@ def _reverse(paths: Paths, i: int, j: int) -> None:
 
 @no_nrt
 def _rotate(paths: Paths, i: int, last: int, to: int) -> None:
-    """Paths i..last put behind path `to`, all as they run: what lies on both sides of a place changes sides."""
+    """Move paths i..last behind path `to` without reversing them, by three mirrorings."""
     low, high = (i, to) if to > last else (to + 1, last)
     middle = last + 1 if to > last else i  # what begins here comes first
     _mirror(paths, low, middle - 1)
@@ -243,7 +243,7 @@ def _rotate(paths: Paths, i: int, last: int, to: int) -> None:
 
 @no_nrt
 def _mirror(paths: Paths, i: int, j: int) -> None:
-    """The paths i..j in reverse order, each as it runs."""
+    """Reverse the order of paths i..j without reversing the paths."""
     order, flips, fixed, at = paths
     while i < j:
         order[i], order[j] = order[j], order[i]

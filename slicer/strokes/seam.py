@@ -1,9 +1,8 @@
-"""Seam: where a wall that runs round begins and ends.
+"""Z-seams: start and end of closed walls.
 
-Every outer wall begins at the place of least cost: the distance to a target (a planned place, the seam of the layer below, the
-rear, the tip), less a reward for corners, which hide a seam. Places near the edge of an interface are out of the question.
-Inner walls begin beside their outer wall. Where no seam is wanted anywhere along an outer wall, it begins and ends inside, over
-its inner walls (its lead).
+Every outer wall begins at the point of least cost: the distance to a target (a planned point, the seam of the layer below, the
+rear, the tip), less a reward for corners, which hide a seam. Points near the edge of an interface are excluded. Inner walls begin
+beside their outer wall. If no point of an outer wall is allowed, it begins and ends inside, over its inner walls (its lead).
 """
 
 from collections.abc import Sequence
@@ -21,28 +20,29 @@ from slicer.paths import Kind
 from slicer.strokes.seam_plan import NO_LIMITS, SeamLimits, corner_strength, is_clear
 from slicer.strokes.strokes import RINGS
 
-REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
-ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
-NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
-PLANNED = (1.0, 1.0)  # the same beside a planned place, whose corner of the outline a thin wall may lack
-NO_CORNER = (0.0, 0.0)  # no corner is worth a way
-FOLLOW_MM, FOLLOW = 2.0, 0.3  # a planned place so near to the seam below draws it by this share of the way, outside of corners
-KEPT = 0.25  # from this strength on a planned corner is kept to, however far the seam below is
-GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly, whatever the number of layers
-FORBIDDEN = 1e6  # mm, farther than any way: taken only where all of a loop is
+REACH_MM = 3.0  # a seam of the layer below that is closer to a wall than this is continued
+ANYWHERE = (1000.0, 300.0)  # reward for a sharp inner or outer corner, mm of distance: inner before outer before none
+NEARBY = (2.0, 1.0)  # that reward when a seam is continued: it moves into a corner that it passes
+PLANNED = (1.0, 1.0)  # that reward beside a planned point, whose corner of the outline a thin wall may lack
+NO_CORNER = (0.0, 0.0)  # no reward for corners
+# a planned point this close to the seam below attracts it by this share of the distance, outside corners
+FOLLOW_MM, FOLLOW = 2.0, 0.3
+KEPT = 0.25  # corner strength above which a planned corner is used however far the seam below is
+GOLDEN = 0.6180339887498949  # (sqrt(5) - 1) / 2: its multiples scatter seams most evenly for any number of layers
+FORBIDDEN = 1e6  # mm, above any distance: chosen only if all of a loop is forbidden
 NO_SEAMS = np.zeros((0, 2))
-# Where a seam is drawn to, and the distance, mm, that inner and outer corners are worth.
+# Target point of a seam, and the rewards of inner and outer corners, mm.
 Target = tuple[float, float, float, float]
-SAMPLE_MM = 2.0  # straight sides are tried at this distance, too
-OFF_WALL = 0.7  # of its length a lead has to reach inside: so far beside its middle the outer wall is out of the tip's way
+SAMPLE_MM = 2.0  # points on straight sides are tried at this spacing, too
+OFF_WALL = 0.7  # share of its length that a lead must extend inside so that the tip passes clear of the outer wall
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
+    """The surroundings of a layer's seams. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
 
-    tip: (2,) where the nozzle comes from. limits: what they keep clear of. layer: number. planned: (m, 2) where seams are hidden
-    best; aligned seams follow them.
+    tip: (2,) position of the nozzle before the layer. limits: edges that seams avoid. layer: number. planned: (m, 2) best hidden
+    points, which aligned seams follow.
     """
 
     rear: Floats
@@ -54,11 +54,11 @@ class Surroundings:
 
 
 def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -> tuple[list[Bead], Floats]:
-    """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls.
+    """The beads with walls that start at their seams, and the (k, 2) seams of the outer walls.
 
-    The walls that run round come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its
-    beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
-    inside instead, over its inner walls, and so does one on which a person wants no seam anywhere.
+    Closed walls are given as loops (n, 2), solid on their left, and become polylines that end seam_gap of their width before
+    their start. An outer wall that is near an interface's edge all around, or on which the user wants no seam anywhere, begins
+    and ends a line width inside instead, over its inner walls.
     """
     seams: dict[int, Floats] = {}
     out = list(beads)
@@ -82,7 +82,7 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
 
 
 def _target(loop: Floats, process: Process, around: Surroundings) -> Target:
-    """Where an outer wall's seam is drawn to."""
+    """The target of an outer wall's seam."""
     rear = float(around.rear[0]), float(around.rear[1])
     if process.seam == "rear":
         return (*rear, *NO_CORNER)
@@ -127,7 +127,7 @@ def _point_at(loop: Floats, share: float) -> tuple[float, float]:
 
 @kernel
 def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, float, float]:
-    """The point nearest to a loop as (distance, x, y); the distance is infinite when none is within reach."""
+    """The point nearest to a loop as (distance, x, y); the distance is infinite if none is within reach."""
     low_x, high_x, low_y, high_y = loop[0, 0], loop[0, 0], loop[0, 1], loop[0, 1]
     for i in range(len(loop)):
         low_x, high_x = min(low_x, loop[i, 0]), max(high_x, loop[i, 0])
@@ -145,7 +145,7 @@ def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, floa
 
 @helper
 def _project(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
-    """Distance from a point to a loop, the side that is nearest and how far along it."""
+    """Distance from a point to a loop, the nearest side, and the position along it (0..1)."""
     least, at, share = np.inf, 0, 0.0
     for i in range(len(loop)):
         side = _side(loop, i)
@@ -164,14 +164,14 @@ def _side(loop: Floats, i: int) -> Segment:
 
 
 def _begin_at(loop: Floats, at: int, share: float) -> Floats:
-    """The loop (n, 2) begun at a share of one of its sides."""
+    """The loop (n, 2) started at a share of one of its sides."""
     begun: Floats = (loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at]))[None]
     return np.concatenate([begun, loop[at + 1 :], loop[: at + 1]]) if share > 0.0 else start_at(loop, at)
 
 
 @kernel
 def _best(loop: Floats, target: Target, interfaces: SeamLimits) -> tuple[int, float, bool]:
-    """The place of least cost as (side, share of it), and whether it keeps clear of interface edges."""
+    """The point of least cost as (side, share of it), and whether it is clear of interface edges."""
     n, (x, y, inner_mm, outer_mm) = len(loop), target
     distance, at, share = _project(loop, x, y)
     if share >= 1.0 - 1e-6:
@@ -204,14 +204,14 @@ def _best(loop: Floats, target: Target, interfaces: SeamLimits) -> tuple[int, fl
 
 @kernel
 def _in_corner(loop: Floats, target: Target) -> bool:
-    """Whether the place of least cost is a corner that is sharp enough to be kept to."""
+    """Whether the point of least cost is a corner sharp enough to be kept."""
     at, share, _ = _best(loop, target, NO_LIMITS)
     return share == 0.0 and abs(corner_strength(loop, at)) > KEPT
 
 
 def _begin_with_room(loop: Floats, lead_mm: float) -> Floats:
-    """The loop, begun at the place nearest to its beginning from which a lead leaves its outer wall; the one with most room where
-    there is none: in a sharp corner the way inside runs along the wall.
+    """The loop started at the nearest point with room for a lead off its outer wall, or else at the point with most room: in a
+    sharp corner, the inward direction runs along the wall.
     """
     counts = (np.hypot(*(start_at(loop, 1) - loop).T) / SAMPLE_MM).astype(np.int64) + 1
     places = [_begin_at(loop, i, s / count) for i, count in enumerate(counts.tolist()) for s in range(count)]
@@ -226,7 +226,7 @@ def _begin_with_room(loop: Floats, lead_mm: float) -> Floats:
 
 
 def lead_in(loop: Floats, lead_mm: float) -> Floats:
-    """(2,) from the loop's beginning to where a lead inside begins, as far as there is room."""
+    """(2,) vector from the loop's start to the start of a lead inside, as far as there is room."""
     steps = np.array([loop[0] - loop[-1], loop[1] - loop[0]])
     steps /= np.maximum(np.hypot(*steps.T), 1e-12)[:, None]
     along = steps.sum(axis=0)
@@ -238,7 +238,7 @@ def lead_in(loop: Floats, lead_mm: float) -> Floats:
 
 
 def _room_mm(loop: Floats, way: Floats) -> float:
-    """How far the inside of a loop (n, 2) reaches from its beginning along a unit vector; 0 where that leads out of it."""
+    """Extent of the inside of a loop (n, 2) from its start along a unit vector, mm; 0 if that points outside."""
     sides, beside = start_at(loop, 1) - loop, (loop - loop[0]) @ np.array([-way[1], way[0]])
     following = start_at(beside, 1)
     crossed = np.flatnonzero((beside > 0.0) != (following > 0.0))
@@ -249,8 +249,9 @@ def _room_mm(loop: Floats, way: Floats) -> float:
 
 
 def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
-    """The loop as a polyline that ends a gap before its beginning; lead_mm: both ends are drawn inside by that, as far as
-    there is room."""
+    """The loop as a polyline that ends a gap before its start. lead_mm: both ends are moved inside by this, as far as there is
+    room.
+    """
     points = np.concatenate([loop, loop[:1]])
     steps = np.hypot(*np.diff(points, axis=0).T)
     if gap_mm > 0.0 and steps.sum() > 4.0 * gap_mm:

@@ -1,14 +1,14 @@
-"""Seam plan: where the outer walls of all layers of a part are to begin, so that they are seen little and lie in one line.
+"""Seam plan: seams of the outer walls in all layers of a part that are well hidden and lie in one line.
 
-Every outline offers places: its corners, and others SPACING_MM apart. A place costs what is seen of it, less what a corner is
-worth, an inner one more than an outer one, and a little for its way to the rear; the way from a seam to that of the outline below
-costs by the millimetre, up to a jump. The outlines are a forest, each on the nearest one of the layer below, so the cheapest
-choice of all is found exactly: from the top down every place sums up the best that can stand on it, from the bottom up each
-outline takes its best one.
+Every outline offers candidate points: its corners, and points SPACING_MM apart. A point costs its visibility, less the reward of
+a corner, higher for an inner than for an outer one, plus a little for its distance from the rear; the shift from the seam of the
+outline below costs per millimetre, up to a jump. The outlines form a forest, each on the nearest one of the layer below, so the
+optimum is found exactly: from the top down every point sums up the best costs above it, from the bottom up each outline takes its
+best point.
 
-What is seen of a place is the share of the light over the surface there that nothing of its body keeps from it; other bodies on
-the plate do not count, for they are taken apart when they are printed. It is worked out by rays for samples that lie farther
-apart than seams may, and looked up among those that face the same way.
+Visibility is the share of the light over the surface at a point that its body does not block; other bodies on the plate are
+ignored, since they are separated after printing. It is computed by rays for samples, which are coarser than the candidates, and
+interpolated among samples with similar normals.
 """
 
 from collections.abc import Sequence
@@ -28,29 +28,29 @@ from slicer.geometry.polygons import contours
 from slicer.geometry.polyline import near_height, squared_distance_in_space
 from slicer.sectioning import Sections
 
-SPACING_MM = 1.0  # of the places of an outline
-FEWEST = 8  # places of an outline
-INNER, OUTER = 0.7, 0.55  # what sharp inner and outer corners are worth; a place in full sight costs 1
-TO_REAR = 5e-4  # what a mm to the rear costs: among places that are seen alike, people look at the front
-SHIFT, JUMP = 0.14, 2.4  # what a mm of way between two layers costs, and a jump at most
-FORBIDDEN = 1e3  # more than all that a part's seams can cost otherwise
-APART_MM = 3.0  # outlines that are farther from each other have seams of their own
-ALONG_MM, UP_MM = 2.5, 2.0  # between samples: along an outline, and upward
-FEWEST_SAMPLES = 6  # samples of an outline
+SPACING_MM = 1.0  # of candidate points along an outline
+FEWEST = 8  # candidates per outline
+INNER, OUTER = 0.7, 0.55  # rewards of sharp inner and outer corners; a point in full sight costs 1
+TO_REAR = 5e-4  # cost per mm from the rear: between equally visible points, people look at the front
+SHIFT, JUMP = 0.14, 2.4  # cost per mm of shift between two layers, and greatest cost of a jump
+FORBIDDEN = 1e3  # above all other costs of a part's seams
+APART_MM = 3.0  # outlines farther apart than this have independent seams
+ALONG_MM, UP_MM = 2.5, 2.0  # spacing of samples along an outline, and upward
+FEWEST_SAMPLES = 6  # samples per outline
 RAYS = 24
-LIFT_MM = 0.1  # of a ray's beginning beside the outline
+LIFT_MM = 0.1  # of a ray's start beside the outline
 FAR_MM = 1e5
-INWARD_MM = 1.0  # within which a place meets the face that it lies on
-ROUNDED = 4  # decimals, in mm, of a vertex that two parts have in common
-BLUR_MM = 1.0  # samples so near count alike
-ASIDE = 1e-3  # what a sample that faces another way counts
-ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise is none
-SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, and from where on it does so fully
+INWARD_MM = 1.0  # distance within which a point finds the face on which it lies
+ROUNDED = 4  # decimals, in mm, for equal vertices of two parts
+BLUR_MM = 1.0  # samples closer than this have equal weight
+ASIDE = 1e-3  # weight of a sample with a different normal
+ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise does not count
+SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # turns from which a corner begins to hide a seam, and hides it fully
 SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
 
 
 class SeamLimits(NamedTuple):
-    """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
+    """Limits for seams. edges: (n, 6) segments, such as interface edges, that seams at height z avoid by keep_mm (n,)."""
 
     edges: Floats
     z: float
@@ -61,13 +61,13 @@ NO_LIMITS = SeamLimits(np.zeros((0, 6)), 0.0, np.zeros(0))
 
 
 def rear_of(bounds_mm: Floats) -> Floats:
-    """(2,) a point behind the middle of a part, as far as the part is deep; bounds_mm: (2, 3)."""
+    """(2,) a point behind the centre of a part, at a distance of the part's depth. bounds_mm: (2, 3)."""
     low, high = bounds_mm
     return np.array([0.5 * (low[0] + high[0]), 2.0 * high[1] - low[1]])
 
 
 def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Process) -> SeamLimits:
-    """Those of (n, 6) interface edges that lie within reach of a layer, and (k, 6) where a person wants no seam in it."""
+    """The (n, 6) interface edges within reach of a layer, and (k, 6) segments where the user wants no seam in it."""
     keep_mm = process.interface_seam_mm
     near = near_height(interfaces, z_mm, keep_mm)
     distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(unwanted)])
@@ -75,10 +75,7 @@ def seam_limits(interfaces: Floats, unwanted: Floats, z_mm: float, process: Proc
 
 
 def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]:
-    """(k, 2) places for each layer, one an outline, where its outer walls are to begin.
-
-    limits: what the seams of each layer keep clear of.
-    """
+    """(k, 2) planned seams for each layer, one per outline. limits: edges that the seams of each layer avoid."""
     outlines = [contours(area) for area in sections.outlines]
     loops = [(layer, loop) for layer, of_layer in enumerate(outlines) for loop in of_layer]
     if not loops:
@@ -97,8 +94,9 @@ def plan_seams(sections: Sections, limits: Sequence[SeamLimits]) -> list[Floats]
 
 
 def light_samples(sections: Sections, outlines: Sequence[Sequence[Floats]]) -> tuple[Indices, list[Floats]]:
-    """Some layers of a part, lowest first, and for each (n, 5) samples of its outlines: x, y, the unit vector out of the solid,
-    and how much is seen of the place, 0 to 1. outlines: loops (n, 2) of every layer, solid on their left."""
+    """Some layers of a part, lowest first, and for each (n, 5) samples of its outlines: x, y, outward unit vector, and
+    visibility, 0 to 1. outlines: loops (n, 2) of every layer, solid on their left.
+    """
     of, cuts_mm = sections.part, sections.heights.cut_mm
     filled = np.flatnonzero([bool(loops) for loops in outlines])
     near = np.searchsorted(cuts_mm[filled], np.arange(cuts_mm[0], cuts_mm[-1], UP_MM)).clip(max=len(filled) - 1)
@@ -124,7 +122,7 @@ def light_samples(sections: Sections, outlines: Sequence[Sequence[Floats]]) -> t
 
 
 def _samples(loops: Sequence[Floats]) -> Floats:
-    """(n, 4) places spread evenly over loops, and unit vectors out of the solid there."""
+    """(n, 4) points spread evenly over loops, with outward unit vectors."""
     samples = []
     for loop in loops:
         sides = np.roll(loop, -1, axis=0) - loop
@@ -140,7 +138,7 @@ def _samples(loops: Sequence[Floats]) -> Floats:
 
 
 def _bodies(mesh: Mesh) -> Indices:
-    """(m,) the body that each face belongs to, a number. Parts that a cut has made have the vertices of its rim in common."""
+    """(m,) number of each face's body. Parts separated by a cut share the vertices of its rim."""
     label = vertex_components(len(mesh.vertices), mesh.faces)
     if (label != label[0]).any():
         _, same = np.unique(np.round(mesh.vertices, ROUNDED), axis=0, return_inverse=True)
@@ -150,8 +148,9 @@ def _bodies(mesh: Mesh) -> Indices:
 
 @kernel
 def _offered(loop: Floats, limits: SeamLimits) -> tuple[Floats, Floats, Mask]:
-    """(n, 4) places spread over a loop, the corner of each stretch of it that has one, with the unit vectors out of the solid
-    there, (n,) how much of a corner each is, and (n,) whether it is clear of the limits."""
+    """(n, 4) candidate points of a loop, the corner of each stretch that has one, with outward unit vectors; (n,) corner
+    strengths; and (n,) whether each is clear of the limits.
+    """
     n, total = len(loop), 0.0
     for i in range(n):
         total += np.hypot(loop[i, 0] - loop[i - 1, 0], loop[i, 1] - loop[i - 1, 1])
@@ -188,8 +187,9 @@ def _offered(loop: Floats, limits: SeamLimits) -> tuple[Floats, Floats, Mask]:
 
 @helper
 def corner_strength(loop: Floats, i: int) -> float:
-    """How much a corner the vertex of a loop (n, 2), solid on its left, is: 0 up to SMOOTH_DEG of turn, from SHARP_DEG on 1 where
-    it is an inner one and -1 where it is an outer one."""
+    """Corner strength of a vertex of a loop (n, 2), solid on its left: 0 up to SMOOTH_DEG of turn, growing to 1 at SHARP_DEG for
+    an inner corner and -1 for an outer one.
+    """
     px, py = _arm(loop, i, -1)
     qx, qy = _arm(loop, i, 1)
     bx, by, cx, cy = loop[i, 0] - px, loop[i, 1] - py, qx - loop[i, 0], qy - loop[i, 1]
@@ -218,7 +218,7 @@ def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
 
 @helper
 def is_clear(interfaces: SeamLimits, x: float, y: float) -> bool:
-    """Whether a place at their height keeps clear of all interface edges."""
+    """Whether a point at their height is clear of all interface edges."""
     for e in range(len(interfaces.edges)):
         begin, end = interfaces.edges[e, :3], interfaces.edges[e, 3:]
         if squared_distance_in_space((x, y, interfaces.z), begin, end) < interfaces.keep_mm[e] * interfaces.keep_mm[e]:
@@ -226,25 +226,25 @@ def is_clear(interfaces: SeamLimits, x: float, y: float) -> bool:
     return True
 
 
-def light_at(layer: int, asked: Floats, cuts_mm: Floats, levels: Indices, samples: Sequence[Floats]) -> Floats:
-    """(n,) how much is seen of places of a layer, 0 to 1, between those of the levels below and above.
+def light_at(layer: int, outline_points: Floats, cuts_mm: Floats, levels: Indices, samples: Sequence[Floats]) -> Floats:
+    """(n,) visibility of points in a layer, 0 to 1, interpolated between the sampled levels below and above.
 
-    asked: (n, 4) x, y and the unit vector out of the solid; cuts_mm: heights of all layers; levels, samples: as light_samples.
+    outline_points: (n, 4) x, y and outward unit vector; cuts_mm: heights of all layers; levels, samples: from light_samples.
     """
     upper = min(int(np.searchsorted(levels, layer)), len(levels) - 1)
     lower = upper if levels[upper] <= layer else max(upper - 1, 0)
     low_mm, high_mm = cuts_mm[levels[[lower, upper]]]
     share = 0.0 if high_mm <= low_mm else float(np.clip((cuts_mm[layer] - low_mm) / (high_mm - low_mm), 0.0, 1.0))
-    below: Floats = _look_up(asked, samples[lower])
-    return below if share <= 0.0 else (1.0 - share) * below + share * _look_up(asked, samples[upper])
+    below: Floats = _look_up(outline_points, samples[lower])
+    return below if share <= 0.0 else (1.0 - share) * below + share * _look_up(outline_points, samples[upper])
 
 
 @kernel
-def _look_up(asked: Floats, samples: Floats) -> Floats:
-    """(n,) mean of what is seen of samples, those near by that face the same way counting most."""
-    out: Floats = floats(len(asked), 0.0)
+def _look_up(outline_points: Floats, samples: Floats) -> Floats:
+    """(n,) weighted mean of the visibility of samples; nearby samples with similar normals weigh most."""
+    out: Floats = floats(len(outline_points), 0.0)
     for k in range(len(out)):
-        x, y, nx, ny = asked[k, 0], asked[k, 1], asked[k, 2], asked[k, 3]
+        x, y, nx, ny = outline_points[k, 0], outline_points[k, 1], outline_points[k, 2], outline_points[k, 3]
         whole, total = 0.0, 0.0
         for s in range(len(samples)):
             dx, dy = samples[s, 0] - x, samples[s, 1] - y
@@ -258,10 +258,10 @@ def _look_up(asked: Floats, samples: Floats) -> Floats:
 
 @kernel
 def choose(xy: Floats, cost: Floats, first: Indices, layer: Indices) -> Floats:
-    """(k, 2) the place of each outline, chosen for the least total cost.
+    """(k, 2) point of each outline, chosen for the least total cost.
 
-    xy: (n, 2) places, outline after outline from the lowest layer up; cost: (n,) of each; first: (k + 1,) where each outline's
-    begin; layer: (k,) of each outline.
+    xy: (n, 2) points, outline by outline from the lowest layer up; cost: (n,) of each; first: (k + 1,) start of each outline's
+    points; layer: (k,) of each outline.
     """
     count = len(layer)
     below, best = longs(count, -1), cost.copy()
@@ -296,8 +296,9 @@ def choose(xy: Floats, cost: Floats, first: Indices, layer: Indices) -> Floats:
 
 @helper
 def _cheapest(xy: Floats, best: Floats, first: Indices, outline: int, below: int) -> tuple[int, float]:
-    """The cheapest place of an outline, counting all that stands on it and the way from a place below, and its cost; below -1:
-    there is none."""
+    """The cheapest point of an outline, including everything above it and the shift from a point below, and its cost; below: -1
+    if there is none.
+    """
     least, taken = np.inf, first[outline]
     for p in range(first[outline], first[outline + 1]):
         cost = best[p]

@@ -1,8 +1,8 @@
-"""Speed: how fast each kind of bead is laid and how hard it is accelerated, and how layers are cooled; with speeds and fan the
-strokes of a layer become the table that is printed.
+"""Speed: speed and acceleration of each kind of bead, and cooling of layers; strokes with speeds and fan become the printed
+table.
 
-A layer that would be done too soon is slowed down so that it has time to set; the fan follows the time of the layer, and is set
-for itself on bridges and overhangs.
+A layer that would be finished too soon is slowed down so that it has time to set; the fan follows the time of the layer, with
+separate values for bridges and overhangs.
 """
 
 from collections.abc import Sequence
@@ -41,26 +41,28 @@ SPEED_KEYS = {
 }
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
-LEAST_GAIN_S = 0.25  # a faster stretch that saves less is no speed of its own: the tip would hardly reach it
-LEAST_STEP_GAIN_S = 0.1  # nor is one between a slower and a faster one, which saves less: a step on the way from one to the other
-SHORTEST = 0.5  # line widths: the steps of skin lines are no shorter,
+LEAST_GAIN_S = 0.25  # a faster stretch that saves less is not worth its own speed, since the tip would hardly reach it
+LEAST_STEP_GAIN_S = 0.1  # nor is a step between a slower and a faster stretch that saves less
+SHORTEST = 0.5  # line widths: shortest step of a skin line
 SHORTEST_STROKE = 4.0  # line widths of a stroke whose steps are lengthened
-ASIDE, ASIDE_EXACT = 0.25, 0.15  # line widths that easing may move a line; exact: tops, whose gaps show, and bridges
-FAN_STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
+# line widths by which easing may move a line; exact for tops, whose gaps are visible, and for bridges
+ASIDE, ASIDE_EXACT = 0.25, 0.15
+FAN_STEP = 0.05  # fan values are rounded to this, since finer steps would only enlarge the file
 
 
 def timed(
     strokes: Strokes, profile: Profile, height_mm: float, kind_mm_s: Floats | None, flow: float, of_places: Sequence[Process] = ()
 ) -> tuple[Strokes, Floats]:
-    """The strokes of a layer, in pieces of one width and simplified, with their (k,) speeds. kind_mm_s, by number of the kind,
-    replaces the process's speeds, flow multiplies every stroke's flow. of_places: the processes of the places in which other
-    settings hold; none where kind_mm_s holds. Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed
-    down to last as long, but not below least_speed_mm_s."""
+    """The strokes of a layer, simplified and in pieces of one width, with their (k,) speeds. kind_mm_s: speeds by number of the
+    kind, which replace the process's; flow: factor on every stroke; of_places: processes of areas with modified settings, empty
+    if kind_mm_s is set. Speeds are limited by what the hot end can melt; a layer faster than least_layer_time_s is slowed down to
+    that time, but not below least_speed_mm_s.
+    """
     strokes, process = in_pieces(strokes, height_mm), profile.process
-    asked = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
+    nominal = _of_strokes(strokes, process) if kind_mm_s is None else kind_mm_s[strokes.kind]
     for number, own in enumerate(of_places, start=1):
-        asked = np.where(strokes.place == number, _of_strokes(strokes, own), asked)
-    speeds = steady(np.minimum(asked, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
+        nominal = np.where(strokes.place == number, _of_strokes(strokes, own), nominal)
+    speeds = steady(np.minimum(nominal, melting_speeds_mm_s(strokes, profile, height_mm, flow)), strokes.lengths_mm)
     time_s = process.least_layer_time_s - travel_time_s(strokes, profile)
     speeds = _slow_down(speeds, strokes.lengths_mm, time_s, process.least_speed_mm_s)
     corners = mark_corners(strokes.points, strokes.starts, process.resolution_mm)
@@ -69,8 +71,8 @@ def timed(
 
 
 def _without_short_steps(strokes: Strokes) -> Strokes:
-    """The strokes, those of skins without short steps where that moves them little; the plastic of each stays the same."""
-    # A shorter stroke is nothing but its two ends, which lie where the layer below holds them.
+    """The strokes without short steps in skins, where that moves them only a little; each keeps its amount of plastic."""
+    # A shorter stroke consists only of its two ends, which lie where the layer below holds them.
     eases = strokes.is_of(*SKINS) & (strokes.lengths_mm > SHORTEST_STROKE * strokes.width_mm)
     width_mm = np.where(eases, strokes.width_mm, 0.0)
     aside_mm = width_mm * np.where(strokes.is_of(Kind.TOP_SKIN, Kind.BRIDGE), ASIDE_EXACT, ASIDE)
@@ -79,7 +81,7 @@ def _without_short_steps(strokes: Strokes) -> Strokes:
 
 
 def melting_speeds_mm_s(strokes: Strokes, profile: Profile, height_mm: float, flow: float) -> Floats:
-    """(k,) speeds at which the hot end melts the most that it can; flow multiplies every stroke's flow."""
+    """(k,) speeds at the hot end's melting limit. flow: factor on every stroke."""
     areas = bead_area_mm2(strokes.width_mm, height_mm) * strokes.flow * flow
     speeds: Floats = profile.material.volumetric_limit_mm3_s / areas
     return speeds
@@ -87,10 +89,10 @@ def melting_speeds_mm_s(strokes: Strokes, profile: Profile, height_mm: float, fl
 
 @kernel
 def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
-    """(k,) speeds of strokes one after the other without what would change them for LEAST_GAIN_S or LEAST_STEP_GAIN_S or less.
+    """(k,) speeds of consecutive strokes, without changes that save LEAST_GAIN_S or LEAST_STEP_GAIN_S or less.
 
-    A stretch of one speed that is faster than those before and after it takes the faster one of theirs, a step between a slower
-    and a faster one the slower one; none gets faster.
+    A stretch of one speed that is faster than its neighbours takes the faster of their speeds, a step between a slower and a
+    faster stretch the slower one; no stroke becomes faster.
     """
     steadied, changes = speeds.copy(), True
     while changes:
@@ -111,7 +113,7 @@ def steady(speeds: Floats, lengths_mm: Floats) -> Floats:
 
 
 def _of_strokes(strokes: Strokes, process: Process) -> Floats:
-    """The speed of its kind, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
+    """The speed of each stroke's kind, or of bridges over sparse infill, limited by those of small closed walls and overhangs."""
     usual = stroke_speeds(process)[strokes.kind]
     hanging = np.array([np.inf, *(getattr(process, key) for key in BY_SHARE), process.bridge_speed_mm_s])[strokes.overhang]
     small = np.where(strokes.small & strokes.is_of(*RINGS), process.small_wall_speed_mm_s, np.inf)
@@ -120,9 +122,8 @@ def _of_strokes(strokes: Strokes, process: Process) -> Floats:
 
 
 def bead_speed_mm_s(bead: Bead, process: Process, kind_mm_s: Floats | None = None) -> float:
-    """Speed of a bead before it becomes a stroke: as in _of_strokes, but without overhangs and without slowing down to cool.
-
-    kind_mm_s: by number of the kind, in place of the process's.
+    """Speed of a bead before it becomes a stroke: as in _of_strokes, but without overhangs and cooling. kind_mm_s: speeds by
+    number of the kind, which replace the process's.
     """
     if kind_mm_s is not None:
         return float(kind_mm_s[KINDS.index(bead.kind)])
@@ -145,7 +146,7 @@ def kinds_apart(processes: Sequence[Process]) -> list[Kind]:
 
 
 def travel_time_s(strokes: Strokes, profile: Profile) -> float:
-    """What a layer's travels and retractions take at least."""
+    """Lower bound of the time for a layer's travels and retractions, s."""
     steps, passes = strokes.first_points[1:] - strokes.last_points[:-1], strokes.approach_starts
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     for k in np.flatnonzero(np.diff(passes)).tolist():
@@ -158,10 +159,10 @@ def travel_time_s(strokes: Strokes, profile: Profile) -> float:
 
 
 def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:
-    """Speeds by one factor slower so that the lengths take the time, none pushed below the least speed."""
+    """Speeds slowed down by one factor so that the lengths take a given time, none below the least speed."""
     floor = np.minimum(speeds, least_mm_s)
     factor = 1.0
-    for _ in range(4):  # beads that reach the floor leave the rest of the waiting to the others
+    for _ in range(4):  # beads at the lower limit leave the remaining time to the others
         slowed = np.maximum(speeds * factor, floor)
         free = slowed > floor
         missing = time_s - float((lengths / slowed).sum())
@@ -173,9 +174,9 @@ def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float
 
 
 def fan_share(material: Material, process: Process, time_s: float) -> float:
-    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then less and less.
+    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then decreasing.
 
-    Straight from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as PrusaSlicer has it.
+    Linear from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as in PrusaSlicer.
     """
     least = min(material.fan_least, material.fan)
     quick, slow = process.least_layer_time_s, material.fan_layer_time_s
@@ -185,15 +186,16 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
 
 
 def rising_fan(material: Material, layer: int) -> float:
-    """Factor on the fan of a layer of a part on the plate, counted from 0: 0 up to fan_off_layers, then rising, 1 from
-    fan_full_layer on."""
+    """Factor on the fan of a layer of a part on the plate, counted from 0: 0 up to fan_off_layers, then rising to 1 at
+    fan_full_layer.
+    """
     if layer < material.fan_off_layers:
         return 0.0
     return min((layer + 1 - material.fan_off_layers) / max(material.fan_full_layer - material.fan_off_layers, 1), 1.0)
 
 
 def own_fans(strokes: Strokes, material: Material, factor: float, layer_fan: float) -> Floats:
-    """(k,) part fan of bridges and overhanging walls, half way there of walls that lean; NaN: the layer's fan."""
+    """(k,) part fan of bridges and overhanging walls, and half-way values for walls that lean; NaN for the layer's fan."""
     hanging = factor * (material.fan if material.fan_bridge is None else material.fan_bridge)
     over_infill = hanging if material.fan_infill_bridge is None else factor * material.fan_infill_bridge
     own = np.where(strokes.over_infill, over_infill, hanging)
@@ -202,19 +204,19 @@ def own_fans(strokes: Strokes, material: Material, factor: float, layer_fan: flo
 
 
 def stroke_speeds(process: Process) -> Floats:
-    """(number of kinds,) mm/s of each kind of bead."""
+    """(number of kinds,) speed of each kind of bead, mm/s."""
     return np.array([getattr(process, SPEED_KEYS[kind]) for kind in KINDS])
 
 
 def first_layer_speeds(process: Process) -> Floats:
-    """(number of kinds,) mm/s of the first layer on the plate."""
+    """(number of kinds,) speed of each kind in the first layer on the plate, mm/s."""
     usual = process.first_layer_speed_mm_s
     inside = process.first_layer_infill_speed_mm_s or usual
     return np.array([inside if kind in INSIDE else usual for kind in KINDS])
 
 
 def stroke_accelerations(profile: Profile, first_layer: bool) -> Floats:
-    """(number of kinds,) mm/s2; inf where the process sets none, which leaves the firmware's own in force."""
+    """(number of kinds,) acceleration of each kind, mm/s2; inf if the process sets none, so that the firmware's value applies."""
     process = profile.process
     usual = process.acceleration_mm_s2 or _axes_mm_s2(profile)
     if first_layer:
@@ -226,12 +228,12 @@ def stroke_accelerations(profile: Profile, first_layer: bool) -> Floats:
 
 
 def travel_mm_s2(profile: Profile) -> float:
-    """mm/s2 of travels; inf as for strokes."""
+    """Acceleration of travels, mm/s2; inf as in stroke_accelerations."""
     return profile.process.travel_acceleration_mm_s2 or _axes_mm_s2(profile)
 
 
 def _axes_mm_s2(profile: Profile) -> float:
-    """mm/s2 that both X and Y allow; inf where the process sets no acceleration."""
+    """Acceleration allowed by both X and Y, mm/s2; inf if the process sets no acceleration."""
     process, machine = profile.process, profile.machine
     unset = all(getattr(process, key) is None for key in KEYS)
     return np.inf if unset else min(machine.x.acceleration_mm_s2, machine.y.acceleration_mm_s2)
@@ -251,11 +253,12 @@ def layer_of(
 ) -> Layer:
     """The layer of some strokes.
 
-    flow: factor on that of all; fan: on the part fan; add_c: how much hotter it is printed; skin: outer walls beside the edges of
-    interfaces.
+    flow, fan: factors on the flow of all strokes and on the part fan; add_c: increase of the nozzle temperature, deg C; skin:
+    visible wall beside joints.
     """
     process, material = profile.process, profile.material
-    time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)  # at least: accelerations are left out
+    # a lower bound, since accelerations are left out
+    time_s = float((strokes.lengths_mm / speeds).sum()) + travel_time_s(strokes, profile)
     layer_fan = fan * fan_share(material, process, time_s)
     return Layer(
         z_mm=z_mm,

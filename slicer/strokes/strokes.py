@@ -1,6 +1,6 @@
 """Strokes: the beads of a layer in printing order as one table, before their speed is known, and its refinements.
 
-Strokes are parted where they enter and leave an area, where they hardly lie on the layer below, and where their width changes.
+Strokes are split where they enter and leave an area, where they hardly lie on the layer below, and where their width changes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,28 +23,28 @@ from slicer.paths import NUMBER, Kind, bead_area_mm2, is_of
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 COLUMNS = ("kind", "width_mm", "flow", "overhang", "over_infill", "small", "varies", "retract", "place")
-# Of pieces: points (n, 3), (k + 1,) where each begins, (k,) the stroke of each and whether it lies within an area.
+# Pieces: points (n, 3), (k + 1,) start of each, (k,) source stroke of each and whether it lies inside an area.
 Buffers = tuple[Floats, Indices, Indices, Mask]
 HANGING = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
-ON_SUPPORT = 5  # overhang of a wall that lies over dense support
+ON_SUPPORT = 5  # overhang value of a wall over dense support
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
-SHORTEST_HANGING = 2.0  # line widths: no stretch is split off for less, the speed would flicker
-SHORTEST_FARTHER = 6.0  # line widths: nor within what hangs for less, because it hangs farther
-MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
-SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
-MOST_SPREAD_MM, LEAST_MM = 0.1, 0.045  # but for one where they change by that much, which is no shorter than this
+SHORTEST_HANGING = 2.0  # line widths: shortest stretch that is split off, otherwise the speed would flicker
+SHORTEST_FARTHER = 6.0  # line widths: shortest stretch with a larger overhang within an overhang
+MOST_OVER_MM = 0.022  # limit of a piece's width over its narrowest point: half of it extends over the section there
+SHORTEST_MM = 0.2  # shortest piece that ends because widths change by EVEN_MM
+MOST_SPREAD_MM, LEAST_MM = 0.1, 0.045  # unless they change by the first value: then shortest piece
 
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
     """One row per stroke, in printing order.
 
-    points: (n, 3) mm, x, y and the width of the bead there; starts: (k + 1,) where the points of each stroke begin.
-    approach: (m, 2) points that the travels to strokes pass; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS;
-    width_mm: mean; flow, over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or
-    nothing of it lies on plastic, ON_SUPPORT; small: a closed wall no longer than process.small_wall_mm, also the pieces of one
-    whose width varies; varies: the width changes along the stroke; retract: the travel to it pulls filament back; place: the
-    number of the place in which other settings hold, from 1; 0: none.
+    points: (n, 3) mm, x, y and the width of the bead there; starts: (k + 1,) start of each stroke's points. approach: (m, 2) via
+    points of the travels to strokes; approach_starts: (k + 1,). Columns, (k,) each: kind: index in KINDS; width_mm: mean; flow,
+    over_infill: as in Bead; overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its width or nothing of it lies on
+    plastic, or ON_SUPPORT; small: whether it is a closed wall no longer than process.small_wall_mm, or a piece of one of varying
+    width; varies: whether the width changes along the stroke; retract: whether the travel to it retracts; place: number of the
+    area with modified settings, from 1; 0 for none.
     """
 
     points: Floats
@@ -66,29 +66,29 @@ class Strokes:
 
     @property
     def lengths_mm(self) -> Floats:
-        """(k,) length of each stroke."""
+        """(k,) length of each stroke, mm."""
         return lengths_mm(self.points, self.starts)
 
     @property
     def first_points(self) -> Floats:
-        """(k, 2) where each stroke begins."""
+        """(k, 2) start of each stroke."""
         return self.points[self.starts[:-1], :2]
 
     @property
     def last_points(self) -> Floats:
-        """(k, 2) where each stroke ends."""
+        """(k, 2) end of each stroke."""
         return self.points[self.starts[1:] - 1, :2]
 
     def is_of(self, *kinds: Kind) -> Mask:
-        """(k,) which strokes are of some kinds."""
+        """(k,) whether each stroke is of one of some kinds."""
         return is_of(self.kind, kinds)
 
     def with_points(self, points: Floats, kept: Mask) -> "Strokes":
-        """The strokes with those of (n, 3) points that are kept; the first and last one of every stroke are."""
+        """The strokes with only the kept ones of (n, 3) points, which include the ends of every stroke."""
         return replace(self, points=points[kept], starts=np.append(0, np.cumsum(kept))[self.starts])
 
     def refined(self, points: Floats, starts: Indices, source: Indices) -> "Strokes":
-        """The strokes with other points; source: (j,) the stroke that each of the new ones is a piece of, in the same order.
+        """The strokes split into pieces. source: (j,) the stroke to which each piece belongs, ascending.
 
         The pieces of a stroke follow each other without a travel: only the first one keeps retraction and approach.
         """
@@ -100,7 +100,7 @@ class Strokes:
 
 
 def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Floats], small_wall_mm: float) -> Strokes:
-    """The table of beads in order, with their points (n, 2) as they are printed; approaches: by number of the stroke."""
+    """The table of beads in order, with their points (n, 2) in printing direction. approaches: by number of the stroke."""
     counts = [len(bead.points) for bead in beads]
     starts = np.cumsum([0, *counts])
     kind = np.array([NUMBER[bead.kind] for bead in beads], dtype=np.int8)
@@ -132,7 +132,7 @@ def strokes_of(beads: Sequence[Bead], retract: Mask, approaches: Mapping[int, Fl
 
 @kernel
 def _widths_at(places: Floats, course: Floats) -> Floats:
-    """(n,) widths at places (n, 2 or 3) on a course (k, 3); the search for a place begins at the step nearest to the last one."""
+    """(n,) widths at points (n, 2 or 3) on a course (k, 3); each search starts at the step nearest to the previous point."""
     out: Floats = floats(len(places), 0.0)
     steps, at = len(course) - 1, 0
     for i in range(len(places)):
@@ -153,9 +153,9 @@ def _widths_at(places: Floats, course: Floats) -> Floats:
 
 
 def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float, within_mm: float = 0.0) -> tuple[Strokes, Mask]:
-    """The strokes in the same order, those that are wanted (k,) in pieces; and (j,) which of all lie within the area.
+    """The strokes in order, with the wanted ones (k,) in pieces, and (j,) whether each piece lies inside the area.
 
-    No piece is shorter than shortest_mm, none within the area between two outside shorter than within_mm.
+    No piece is shorter than shortest_mm, and none inside the area between two outside is shorter than within_mm.
     """
     index = index_edges(area)
     count, room = -1, 2 * len(strokes.points) + 64
@@ -171,7 +171,7 @@ def split(strokes: Strokes, area: Polygons, wanted: Mask, shortest_mm: float, wi
 
 @kernel
 def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, shortest_mm: tuple[float, float], out: Buffers) -> int:
-    """Fills in the pieces and returns how many there are, -1 where there is no room for them."""
+    """Fill in the pieces; returns their number, -1 if the arrays are too small."""
     out_points, begins, source, is_within = out
     room = len(out_points)
     cut, within = table(room, 3), flags(room)
@@ -206,7 +206,7 @@ def _split(points: Floats, starts: Indices, wanted: Mask, area: EdgeIndex, short
 
 @no_nrt
 def _append(out: Floats, n: int, points: Floats, first: int, end: int) -> int:
-    """Appends the points first .. end - 1 from row n on; returns the new n."""
+    """Append the points first .. end - 1 at row n; returns the new n."""
     for i in range(first, end):
         for axis in range(3):
             out[n, axis] = points[i, axis]
@@ -216,9 +216,10 @@ def _append(out: Floats, n: int, points: Floats, first: int, end: int) -> int:
 
 @helper
 def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, float]) -> None:
-    """Runs of steps shorter than that take after their neighbours, those within last so that none is overlooked for a gap.
-    shortest_mm: of runs outside and within; within: of the steps between the first `size` points. A single run has no
-    neighbours."""
+    """Merge runs of steps that are too short into their neighbours, runs inside last, so that none is split by a gap.
+    shortest_mm: of runs outside and inside; within: whether each step between the first `size` points is inside. A single run has
+    no neighbours.
+    """
     for inner in range(2):
         a = 0
         while a < size - 1:
@@ -237,23 +238,23 @@ def _steady(points: Floats, within: Mask, size: int, shortest_mm: tuple[float, f
 def split_overhangs(
     strokes: Strokes, section: Polygons, below: Polygons | None, process: Process, support: Polygons | None = None
 ) -> Strokes:
-    """The strokes of a layer with its walls and gap lines split where less and less of their width lies on plastic.
+    """The strokes of a layer with its walls and gap lines split by the share of their width that lies on plastic.
 
-    below: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside what is below has the
-    share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share. support: dense, right under
-    the layer: over it an overhanging wall sags no farther than the gap, however little of it lies on plastic.
+    below: plastic under the layer, None for the build plate. A bead of width w whose centreline runs d outside it has the share
+    1/2 - d/w of its width on it; it overhangs if that is less than process.overhang_share. support: dense support right under the
+    layer: over it, an overhanging wall sags no farther than the gap, however little of it lies on plastic.
     """
     if below is None or process.overhang_share <= 0.0:
         return strokes
     width_mm, shortest_mm = process.line_width_mm, SHORTEST_HANGING * process.line_width_mm
     beyond = hanging_area(section, below, 0.5, width_mm)
     if beyond.area() < shortest_mm * NOISE_MM:
-        return strokes  # the section barely overhangs: no centreline, half a line inside it, can
+        return strokes  # the section barely overhangs, so no centreline, half a line inside it, can
     for share in sorted({*STEPS, process.overhang_share}, reverse=True):
         hanging = beyond if share == 0.5 else hanging_area(section, below, share, width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:
             break
-        kinds = HANGING if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
+        kinds = HANGING if share <= 0.5 else (Kind.OUTER_WALL,)  # inner walls lie a line width farther in
         within_mm = 0.0 if hanging is beyond else SHORTEST_FARTHER * width_mm
         strokes, within = split(strokes, hanging, strokes.is_of(*kinds), shortest_mm, within_mm)
         kind, overhang = strokes.kind, np.where(within, sum(step >= share for step in STEPS), strokes.overhang)
@@ -268,13 +269,12 @@ def split_overhangs(
 
 
 def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
-    """The strokes in the same order, those of varying width in pieces whose widths are the means of their stretches.
-
-    height_mm: of the layer; the pieces together hold the plastic of the whole.
+    """The strokes in order, those of varying width split into pieces with the mean width of their stretches. height_mm: of the
+    layer; the pieces together hold the plastic of the whole.
     """
     if not strokes.varies.any():
         return strokes
-    # Points are added where the width changes by more than EVEN_MM from one to the next.
+    # Points are added where the width changes by more than EVEN_MM between two points.
     points, starts = strokes.points, strokes.starts
     after = np.concatenate([points[1:], points[-1:]])
     many = np.maximum(np.ceil(np.abs(after[:, 2] - points[:, 2]) / EVEN_MM), 1.0).astype(np.int64)
@@ -291,7 +291,7 @@ def in_pieces(strokes: Strokes, height_mm: float) -> Strokes:
 
 @kernel
 def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats) -> tuple[Floats, Indices, Indices, Floats]:
-    """The pieces: points (n, 3), (k + 1,) where each begins, (k,) the stroke and the width of each."""
+    """The pieces: points (n, 3), (k + 1,) start of each, (k,) source stroke and width of each."""
     room = 2 * len(points)
     out, begins, source, widths = table(room, 3), longs(room, 0), longs(room, 0), floats(room, 0.0)
     count = n = 0
@@ -321,7 +321,7 @@ def _part(points: Floats, starts: Indices, varies: Mask, width_mm: Floats) -> tu
 
 @helper
 def _ends(line: Floats) -> Mask:
-    """(n,) True for the points of a line (n, 3) at which a piece ends: pieces are as long as the widths allow."""
+    """(n,) whether a piece ends at each point of a line (n, 3); pieces are as long as the widths allow."""
     ends = flags(len(line))
     length, left = 0.0, length_between(line, 0, len(line))
     low = high = 0.5 * (line[1, 2] + line[0, 2])

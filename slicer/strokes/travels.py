@@ -1,12 +1,12 @@
-"""Travels: which of them pull the filament back, which make a detour through the inside of an area instead, and wipes: the way of
-the tip while filament is pulled back, over what it has just printed, so that the drop stays there.
+"""Travels: retractions, detours through the inside of an area (combing), and wipes, the motion over the last bead while filament
+is pulled back, which leaves the drop there.
 
-A travel may ooze where it stays inside the section, or over one and the same piece of support. All other ways lead through open
-air or over a surface: what oozes there is a string or a blob on a wall. Beside the edge of an interface, where a blob is seen all
-along the joint, a travel does not pass over the outer walls either.
+A travel may ooze inside the section, or over one piece of support. All other travels cross open air or a surface, where ooze
+leaves a string or a blob on a wall. Beside the edge of an interface, where a blob would show along the joint, a travel does not
+cross the outer walls either.
 
-A detour follows the border of the area's inside from where the straight line leaves it to where it comes back, the shorter
-way round, and is then pulled taut. Every segment of it is tested against the border of the area's safe inside.
+A detour follows the border of the area's inside from where the straight line leaves it to where it returns, the shorter way
+around, and is then pulled taut. Every segment is tested against the border of the area's safe inside.
 """
 
 from dataclasses import dataclass, field
@@ -25,23 +25,23 @@ from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.polyline import Segment, length_between
 from slicer.strokes.strokes import Strokes
 
-SAFE = 0.4  # line widths inside the area within which travels ooze unseen; centrelines of outer walls lie at 0.5
-BEHIND = 1.1  # detours run behind the outer wall where the area is wide enough,
-AMONG = 0.45  # else as near to its middle as the walls themselves
-TAUT = 3.0  # a detour along the border may be longer than allowed by this factor before it is pulled taut
+SAFE = 0.4  # line widths inside the area where ooze is invisible; centrelines of outer walls lie at 0.5
+BEHIND = 1.1  # detours run behind the outer wall where the area is wide enough
+AMONG = 0.45  # otherwise as close to the area's border as the walls themselves
+TAUT = 3.0  # limit on a detour along the border before it is pulled taut, relative to the final limit
 NOWHERE = np.zeros((0, 2))
 STANDING_MM = 1e-6
-ROUND = 4.0  # a path whose ends lie nearer than its width, and that is longer than this many widths, runs round
+ROUND = 4.0  # a path longer than this many widths, whose ends are closer than its width, is a ring
 
 
 def travels(
     since: Floats, to: Floats, section: Polygons, support: Polygons, process: Process, skin: Polygons | None = None
 ) -> tuple[Mask, dict[int, Floats]]:
-    """Which of the n travels, (n, 2) by two, retract, and the detours (k, 2) of some others, by the travel's number.
+    """Which of n travels, (n, 2) from and to, retract, and the detours (k, 2) of some others, by the travel's number.
 
-    Those no shorter than process.retract_travel_mm retract that leave the inside both of the section and of its support and
-    find no short detour inside either. skin: outer walls beside an edge of an interface; short ones retract as well where they
-    would pass over it, unless they begin or end on it.
+    A travel no shorter than process.retract_travel_mm retracts if it leaves the inside of the section and of its support and has
+    no short detour inside either. skin: visible wall beside joints; shorter travels retract as well if they would cross it,
+    unless they begin or end on it.
     """
     retracts: Mask = np.hypot(*(to - since).T) >= process.retract_travel_mm
     detours: dict[int, Floats] = {}
@@ -74,13 +74,14 @@ def travels(
 
 @dataclass(eq=False)
 class Combing:
-    """Where the tip may travel over an area of one layer, a section or its support, without a retraction; barred: what of it no
-    travel passes."""
+    """Area of one layer, a section or its support, in which the tip may travel without a retraction. barred: the part of it that
+    no travel crosses.
+    """
 
     area: Polygons
     width_mm: float
     barred: Polygons | None = None
-    tracks: dict[float, EdgeIndex] = field(default_factory=dict)  # what detours follow, by line widths inside the area
+    tracks: dict[float, EdgeIndex] = field(default_factory=dict)  # lines that detours follow, by line widths inside the area
 
     @cached_property
     def safe(self) -> EdgeIndex:
@@ -89,11 +90,13 @@ class Combing:
         return index_edges(inside if self.barred is None else inside - self.barred)
 
     def leaves(self, since: Floats, to: Floats) -> Mask:
-        """(n, 2) by two whether the travels between these points leave the safe inside."""
+        """(n,) whether the travels between (n, 2) points leave the safe inside."""
         return ~lie_within(self.safe, since) | crosses(self.safe, since, to)
 
     def detour(self, start: Floats, end: Floats, most_mm: float) -> Floats | None:
-        """Points (k, 2) between start and end of a path inside, at most most_mm longer than the straight line; or None."""
+        """Points (k, 2) between start and end of a path inside, at most most_mm longer than the straight line; None if there is
+        none.
+        """
         straight = Segment(float(start[0]), float(start[1]), float(end[0]), float(end[1]))
         longest = float(np.hypot(*(end - start))) + most_mm
         for widths in (BEHIND, AMONG):
@@ -109,7 +112,7 @@ class Combing:
 
 @kernel
 def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, reach: float, path: Floats) -> int:
-    """Fills in the path from end to end, both included; returns how many points it has, 0 where there is none."""
+    """Fill in the path from end to end, both included; returns its number of points, 0 if there is none."""
     ax, ay, begins = _enter(safe, track, straight.x0, straight.y0, reach)
     if not begins:
         return 0
@@ -131,7 +134,7 @@ def _comb(safe: EdgeIndex, track: EdgeIndex, straight: Segment, longest: float, 
 
 @helper
 def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) -> tuple[float, float, bool]:
-    """Where a detour from a point begins: there, or where it reaches the track's inside; and whether it does."""
+    """Where a detour from a point begins: at the point, or where it reaches the track's inside; and whether it does."""
     if within(track, x, y):
         return x, y, True
     ax, ay, side = nearest(track, x, y, reach)
@@ -140,9 +143,8 @@ def _enter(safe: EdgeIndex, track: EdgeIndex, x: float, y: float, reach: float) 
 
 @helper
 def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -> int:
-    """Appends a straight line, each stretch of it outside replaced by the loop's that it leaves through and returns by.
-
-    From row 1 on; returns the number of rows, 0 where there is no such path.
+    """Append a straight line, with each stretch outside replaced by that of the loop through which it leaves and returns. Starts
+    at row 1; returns the number of rows, 0 if there is no such path.
     """
     shares, crossed = floats(len(track.edges), 0.0), longs(len(track.edges), 0)
     many = crossings(track, straight, shares, crossed)
@@ -154,7 +156,7 @@ def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -
         for j in range(k + 1, many):
             if track.loop[crossed[j]] == track.loop[crossed[k]]:
                 last = j
-        if last == k:  # the end lies beyond this loop: in another island
+        if last == k:  # the end lies beyond this loop, in another island
             return 0
         path[n, 0], path[n, 1] = x0 + shares[k] * (x1 - x0), y0 + shares[k] * (y1 - y0)
         back_x, back_y = x0 + shares[last] * (x1 - x0), y0 + shares[last] * (y1 - y0)
@@ -171,9 +173,8 @@ def _follow(track: EdgeIndex, straight: Segment, longest: float, path: Floats) -
 def _go_round(
     track: EdgeIndex, sides: tuple[int, int], end: tuple[float, float], longest: float, path: Floats, n: int
 ) -> tuple[int, float]:
-    """Appends the shorter of the two stretches of a loop from row n on, from one of its sides to a point on the other.
-
-    Returns the new number of rows, 0 when the stretch is too long, and its length.
+    """Append the shorter of the two stretches of a loop at row n, from one of its sides to a point on the other. Returns the new
+    number of rows, 0 if the stretch is too long, and its length.
     """
     least, shorter = np.inf, 1
     for sense in range(1, -2, -2):
@@ -189,7 +190,7 @@ def _go_round(
 def _walk(
     track: EdgeIndex, sides: tuple[int, int], end: tuple[float, float], longest: float, sense: int, path: Floats, n: int
 ) -> tuple[int, float]:
-    """Appends a stretch forward (1) or backward (-1) until it is too long; the new number of rows and the length."""
+    """Append a stretch forward (1) or backward (-1) until it is too long; returns the new number of rows and the length."""
     first, after = track.begins[track.loop[sides[0]]], track.begins[track.loop[sides[0]] + 1]
     side, length, corner = sides[0], 0.0, 1 + sense
     while side != sides[1] and length <= longest:
@@ -203,7 +204,7 @@ def _walk(
 
 @helper
 def _pull_taut(safe: EdgeIndex, path: Floats, count: int) -> int:
-    """Leaves as few points of a path as the border allows, in reverse order; returns how many, 0 when it crosses the border."""
+    """Reduce a path to as few points as the border allows, in reverse order; returns their number, 0 if it crosses the border."""
     n, i, last = 1, 0, count - 1
     while i < last:
         step = last - i
@@ -227,7 +228,7 @@ def _sees(safe: EdgeIndex, path: Floats, i: int, j: int) -> bool:
 
 
 def may_wipe_over(strokes: Strokes, skin: Polygons, wipe_mm: float) -> Mask:
-    """(k,) whether a wipe may go over each stroke: not where it ends beside the skin and such a wipe would lead onto it."""
+    """(k,) whether a wipe may pass over each stroke: not if it ends beside the skin and the wipe would lead onto it."""
     may = np.ones(len(strokes), np.bool_)
     if skin.is_empty() or not len(strokes):
         return may
@@ -242,13 +243,13 @@ def may_wipe_over(strokes: Strokes, skin: Polygons, wipe_mm: float) -> Mask:
 
 @kernel
 def way_of_wipe(points: Floats, width_mm: float, wipe_mm: float) -> Floats:
-    """The way (n, 2 or 3) of a wipe of wipe_mm after a stroke, over nothing but that."""
+    """The path (n, 2 or 3) of a wipe of wipe_mm after a stroke, over that stroke only."""
     return first_length(wipe_trail(points, width_mm), wipe_mm)
 
 
 @helper
 def wipe_trail(points: Floats, width_mm: float) -> Floats:
-    """The way of a wipe after a stroke (n, 2 or 3): on along a ring, over its seam; back along a line."""
+    """The path of a wipe after a stroke (n, 2 or 3): forward along a ring, across its seam; back along a line."""
     count, onward = len(points), runs_round(points, width_mm)
     across = 1 if onward and distance(points, 0, count - 1) > STANDING_MM else 0
     trail: Floats = table(count + across, points.shape[1])
@@ -261,13 +262,13 @@ def wipe_trail(points: Floats, width_mm: float) -> Floats:
 
 @no_nrt
 def runs_round(points: Floats, width_mm: float) -> bool:
-    """Whether a path ends where it begins, or nearly."""
+    """Whether a path is a ring: it ends at, or close to, its start."""
     return bool(distance(points, 0, len(points) - 1) <= width_mm and length_between(points, 0, len(points)) > ROUND * width_mm)
 
 
 @no_nrt
 def distance(points: Floats, i: int, k: int) -> float:
-    """Between two of the points (n, 2 or 3)."""
+    """Distance between two of the points (n, 2 or 3)."""
     squared = 0.0
     for axis in range(points.shape[1]):
         squared += (points[k, axis] - points[i, axis]) ** 2
@@ -276,7 +277,7 @@ def distance(points: Floats, i: int, k: int) -> float:
 
 @helper
 def first_length(way: Floats, length: float) -> Floats:
-    """The first `length` mm of a polyline (n, 2 or 3), or all of it; without points that repeat."""
+    """The first `length` mm of a polyline (n, 2 or 3), or all of it, without repeated points."""
     first: Floats = table(len(way), way.shape[1])
     count, run = 0, 0.0
     for i in range(len(way) if len(way) > 1 and length > 0.0 else 0):

@@ -1,7 +1,7 @@
-"""Vase: a model in one part as a bottom and one wall that climbs round and round without a seam.
+"""Spiral vase: a model in one part printed as a bottom and a single wall that climbs continuously without a seam.
 
-Each turn climbs by a layer's height to the outline of the layer it ends at. The first one lies on a level wall, so it begins
-with no plastic and ends with all; a last one at the height of the top ends with none.
+Each turn climbs by a layer's height to the outline of its layer. The first turn lies on a level wall, so its flow rises from zero
+to full; a last turn at the height of the top falls back to zero.
 """
 
 from collections.abc import Sequence
@@ -24,17 +24,17 @@ from slicer.sectioning import Sections
 from slicer.strokes.speed import fan_share, rising_fan
 
 SHRINKS = 0.999  # share of the area below: a layer with less is part of a tip
-MOST_IN_AIR, MOST_IN_AIR_MM = 0.5, 30.0  # share of a turn, and length of it: the dry run refuses more
-PIECES = 16  # of the first and the last turn, each with a flow of its own
+MOST_IN_AIR, MOST_IN_AIR_MM = 0.5, 30.0  # share and length of a turn over air; the dry run refuses more
+PIECES = 16  # of the first and the last turn, each with its own flow
 NO_APPROACH = np.zeros((0, 2))
 
 
 def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, tip: Floats) -> list[Layer]:
-    """The layers above the bottom, as far up as the model is wide enough for a wall; supported: where each layer's support is;
-    first: the lowest; tip: (2,) where the bottom ends.
+    """The layers above the bottom, up to where the model becomes too narrow for a wall. supported: area of support in each layer;
+    first: the lowest layer; tip: (2,) end of the bottom.
 
-    Raises SliceError where the model needs support, one of its layers is not one area without holes, or a turn would not lie on
-    the one below.
+    Raises SliceError if the model needs support, if one of its layers is not one area without holes, or if a turn would not lie
+    on the one below.
     """
     profile, heights, outlines = sections.profile, sections.heights, sections.outlines
     hanging = next((k for k, area in enumerate(supported) if not area.is_empty()), None)
@@ -64,13 +64,13 @@ def vase_layers(sections: Sections, supported: Sequence[Polygons], first: int, t
 
 
 def _is_tip(outline: Polygons, below: Polygons, half_mm: float) -> bool:
-    """Whether no wall fits into a layer, for the model ends in a point there: it gets narrower from layer to layer."""
+    """Whether a layer is too narrow for a wall because the model ends in a point there: it narrows from layer to layer."""
     shrinks = outline.is_empty() or outline.area() < SHRINKS * below.area()
     return bool(shrinks and offset(outline, -half_mm).is_empty())
 
 
 def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
-    """(n, 2) the wall's centreline, closed; half_mm: half of its width."""
+    """(n, 2) centreline of the wall, closed. half_mm: half of its width."""
     loops, outlines = contours(offset(outline, -half_mm)), sum(len(loop) > 2 for loop in outline.to_polygons())
     if outlines != 1 or len(loops) != 1:
         instead = f"{outlines or 'no'} outlines" if outlines != 1 else "a place too narrow for a wall"
@@ -82,9 +82,9 @@ def _loop(outline: Polygons, z_mm: float, half_mm: float) -> Floats:
 
 
 def _check_step(loop: Floats, below: Polygons, half_mm: float, *, lowest: bool, z_mm: float) -> None:
-    """Raises SliceError where too much of a turn's centreline is farther than a wall's width from that of the wall below.
+    """Raises SliceError if too much of a turn's centreline is farther than a wall's width from that of the wall below.
 
-    below: the outline of the layer below; lowest: that layer is solid.
+    below: the outline of the layer below; lowest: whether that layer is solid.
     """
     reached = offset(below, half_mm)
     points, within = cut_line(loop, reached if lowest else reached - offset(below, -3.0 * half_mm))
@@ -98,7 +98,7 @@ def _check_step(loop: Floats, below: Polygons, half_mm: float, *, lowest: bool, 
 
 
 def _begun_near(loop: Floats, tip: Floats, joined: bool) -> Floats:
-    """The closed loop begun at its point nearest to the tip, from the tip itself where it is joined."""
+    """The closed loop started at its point nearest to the tip, or at the tip itself if joined."""
     steps = np.diff(loop, axis=0)
     share = ((tip - loop[:-1]) * steps).sum(axis=1) / np.maximum((steps**2).sum(axis=1), 1e-18)
     nearest = loop[:-1] + np.clip(share, 0.0, 1.0)[:, None] * steps
@@ -111,7 +111,7 @@ def _begun_near(loop: Floats, tip: Floats, joined: bool) -> Floats:
 
 
 def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floats | None) -> Layer:
-    """One turn, climbing to its layer's height; shares: of the plastic at equal distances, None: all everywhere."""
+    """One turn, climbing to its layer's height. shares: flow at equal distances, None for full flow everywhere."""
     process, material = profile.process, profile.material
     z_mm, height_mm = float(heights.tip_mm[k]), float(heights.height_mm[k])
     width = outer_wall_width_mm(process)
@@ -122,14 +122,14 @@ def _turn(heights: Heights, k: int, turn: Floats, profile: Profile, shares: Floa
     slowed = length / least_s if least_s > 0.0 else fastest
     speed = max(min(fastest, slowed), min(fastest, process.least_speed_mm_s))
     fan = rising_fan(material, k + process.raft_layers) * fan_share(material, process, length / speed)
-    # No wipe goes back down a turn: the tip would plough through the ones below where they are small.
+    # No wipe returns over a turn: the tip would plough through the turns below where they are small.
     climb, pulled = (height_mm, 0.0), shares is not None
     whole = Path(Kind.OUTER_WALL, turn, width, speed, material.flow, NO_APPROACH, pulled, below_mm=climb, wiped=False)
     return Layer.of(z_mm, height_mm, (whole,) if shares is None else _pieces(whole, shares, height_mm), fan)
 
 
 def _pieces(path: Path, shares: Floats, climb_mm: float) -> tuple[Path, ...]:
-    """A path in equal pieces that climb together, each with the mean of the plastic at its ends."""
+    """Split a path into equal pieces that climb together, each with the mean flow of its ends."""
     steps = np.hypot(*np.diff(path.points, axis=0).T)
     done = np.concatenate([[0.0], np.cumsum(steps)])
     bounds = np.linspace(0.0, done[-1], len(shares))

@@ -1,1 +1,1 @@
-"""Support: where it may stand, how it grows down, its beads, why a place gets none. Public: support.own_supports."""
+"""Support: its possible area, its growth downward, its beads, and reasons for missing support. Public: support.own_supports."""

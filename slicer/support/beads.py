@@ -1,9 +1,9 @@
 """Auxiliary beads, which are printed for a part and removed from it: support, a pedestal, skirt and brim.
 
-Support has outlines, sparse lines that stand on each other, and dense lines next to the part. A pedestal lifts a model off the
-platform. It is printed like a raft, sparse under a closed roof, and breaks away: the roof ends a small gap below the model's
-first layer, which is printed at its own height: it bonds to the roof only here and there, enough to hold the model upright and
-tilted, and comes off by hand.
+Support has outlines, sparse lines that stack, and dense lines next to the part. A pedestal lifts a model off the build plate. It
+is printed like a raft, sparse under a closed roof, and breaks away: the roof ends a small gap below the model's first layer,
+which is printed at its own height: it bonds to the roof only in spots, enough to hold the model upright and tilted, and comes off
+by hand.
 """
 
 from collections.abc import Sequence
@@ -43,20 +43,20 @@ from slicer.support.reachable import SMOOTH_MM
 from slicer.support.support import Supports
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
-ROOF_LAYERS = 3  # of a pedestal: the first of them sags between the sparse lines, the last one is even
-PEDESTAL_DENSITY = 0.25  # of its inside: lines near enough for the roof to span, as a raft's base
-SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it
+ROOF_LAYERS = 3  # of a pedestal: the first one sags between the sparse lines, the last one is even
+PEDESTAL_DENSITY = 0.25  # of its inside: lines close enough for the roof to span, as in a raft's base
+SEAM = 0.1  # of a line width: overlap of lines with the outline, which holds them
 BRIM_RANK = -2000  # before all walls; the loops count down from it
-LEAST_COVERED_MM2 = 1e-3  # areas smaller than this are rounding
+LEAST_COVERED_MM2 = 1e-3  # smaller areas are rounding
 
 
 def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Bead]:
-    """Support, pedestal, skirt and brim of a layer; process: of the layer."""
+    """The support, pedestal, skirt and brim of a layer. process: of the layer."""
     sections = supports.sections
     outline, height_mm = sections.outlines[layer], float(sections.heights.height_mm[layer])
-    on_plate = layer == 0 and sections.on_platform
+    on_plate = layer == 0 and sections.on_plate
     if on_plate and sections.on_raft:
-        return []  # what lies beside the first layer there is the raft's (slicer.raft)
+        return []  # beside the first layer lies the raft (slicer.raft)
     support_process = with_line_width(process, process.support_line_width_mm)
     places = supports.areas[layer], supports.dense[layer], supports.hollow[layer]
     beads = support_beads(*places, support_process, height_mm, on_plate)
@@ -71,8 +71,9 @@ def auxiliary_beads(supports: Supports, process: Process, layer: int) -> list[Be
 def support_beads(
     area: Polygons, dense: Polygons, hollow: Polygons, process: Process, height_mm: float, first: bool
 ) -> list[Bead]:
-    """The beads of a layer's support, its dense places as an interface, hollow ones with nothing else inside their walls; first:
-    the first layer on the platform, which is filled everywhere."""
+    """The beads of a layer's support: its dense area as an interface, hollow pieces without lines inside their walls. first: the
+    first layer on the build plate, which is filled everywhere.
+    """
     if area.is_empty():
         return []
     width = process.line_width_mm
@@ -107,7 +108,7 @@ def _joined(dense: Polygons, radius_mm: float, width_mm: float) -> Polygons:
 
 
 def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process: Process, spacing: float) -> list[Floats]:
-    """Zigzags along each angle; where none meets the area its outline, unless it has one already."""
+    """Zigzag lines along each angle; if there are none, the area's outline, unless it already has one."""
     width = process.line_width_mm
     apart = spacing / density
     inner = offset(area, -0.5 * width)
@@ -121,7 +122,7 @@ def _lines(area: Polygons, angles_deg: Sequence[float], density: float, process:
 def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: float, reach_mm: float) -> list[Floats]:
     """Lines (n, 2) on the grid of parallel_lines that end on the border of an area.
 
-    Ends of neighbouring lines nearer than reach_mm are joined unless the fence lies between them.
+    Ends of neighbouring lines closer than reach_mm are joined unless the fence lies between them.
     """
     pieces = clip_pattern(index_edges(area), *parallel_lines(angle_deg, apart_mm))
     if not len(pieces.ends):
@@ -134,7 +135,7 @@ def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: fl
 
 @kernel
 def _join(lines: Floats, following: Indices, fence: EdgeIndex, reach_mm: float) -> tuple[Floats, Indices]:
-    """Lines (n, 4) joined end to end where one of the next row begins within reach and no edge of the fence lies between.
+    """Lines (n, 4) joined end to end where a line of the next row begins within reach and no edge of the fence lies between.
 
     following: (n, 2) first of the next row's lines, and first after them. Returns points (n, 2) and the start of each polyline.
     """
@@ -164,7 +165,7 @@ def _join(lines: Floats, following: Indices, fence: EdgeIndex, reach_mm: float) 
 
 
 def pedestal_beads(outline: Polygons, layer: int, layers: int, process: Process, height_mm: float) -> list[Bead]:
-    """One layer of the pedestal: a wall, sparse crossing lines, closed at the platform and at the roof."""
+    """One layer of the pedestal: a wall and sparse crossing lines, solid at the build plate and at the roof."""
     width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
     beads = [Bead(Kind.SUPPORT, close_loop(loop), width, OUTSIDE) for loop in contours(offset(outline, -0.5 * width))]
     inside = offset(outline, -0.5 * (width + spacing))
@@ -179,12 +180,12 @@ def pedestal_beads(outline: Polygons, layer: int, layers: int, process: Process,
 
 
 def beads_around(sections: Sections, footprint: Polygons, base: Polygons, process: Process, height_mm: float) -> list[Bead]:
-    """The brim of a first layer on the plate, outermost bead first so that it ends at the part; without a brim the skirt's loops.
+    """The brim of a first layer on the plate, outermost bead first so that it ends at the part, or else the loops of the skirt.
 
-    footprint: the whole area that the layer prints; base: the area of it on which the print stands. A base that would tip over
-    gets a brim of process.small_base_brim_mm, which goes no farther from it: round support it would hold nothing.
+    footprint: the layer's whole area; base: the area on which the print stands. A base that would tip over gets a brim of
+    process.small_base_brim_mm around it only, since around support it would hold nothing.
     """
-    own = (sections.part, *takewhile(lambda part: not part.on_platform, sections.later))  # until the next model begins
+    own = (sections.part, *takewhile(lambda part: not part.on_plate, sections.later))  # until the next model begins
     top_mm = max(float(part.mesh.bounds_mm[1, 2]) for part in own)
     spacing, beads = spacing_mm(process.line_width_mm, height_mm), list[Bead]()
     holds_base = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and tips_over(base, top_mm)
@@ -194,7 +195,7 @@ def beads_around(sections: Sections, footprint: Polygons, base: Polygons, proces
         beads = _loops_around(footprint, sections.plate, process, nearest, spacing, count)
     if holds_base:
         beads = _near_base(beads, offset_round(base, nearest + (count - 0.5) * spacing), count)
-    if beads or sections.part.index > 1:  # where a skirt would go other models may stand
+    if beads or sections.part.index > 1:  # other models may stand where a skirt would go
         return beads
     nearest = process.skirt_distance_mm + 0.5 * process.line_width_mm
     return _loops_around(footprint, sections.plate, process, nearest, spacing, process.skirt_loops)
@@ -203,11 +204,13 @@ def beads_around(sections: Sections, footprint: Polygons, base: Polygons, proces
 def _loops_around(
     footprint: Polygons, plate: Polygons, process: Process, nearest_mm: float, spacing: float, count: int
 ) -> list[Bead]:
-    """Loops round an area as far as the plate has room, the first of them at a distance; outermost first, begun at the rear."""
+    """Loops around an area as far as the plate has room, the first of them at a distance; outermost first, starting at the
+    rear.
+    """
     outside = Polygons([loop for loop in contours(footprint) if area_mm2(loop) > 0])  # without its holes
     beads, half = list[Bead](), 0.5 * process.line_width_mm
     for k in reversed(range(count)):
-        # Along the plate's edge the loops lie beside each other as they do elsewhere; one that finds no room is left out.
+        # Along the plate's edge the loops lie beside each other as elsewhere; a loop without room is left out.
         around = offset_round(outside, nearest_mm + k * spacing) ^ offset(plate, -half - (count - 1 - k) * spacing)
         if (offset_round(outside, min(half, nearest_mm)) - around).area() > LEAST_COVERED_MM2:
             continue
@@ -220,7 +223,7 @@ def _loops_around(
 
 
 def _near_base(loops: Sequence[Bead], near: Polygons, count: int) -> list[Bead]:
-    """The pieces of a brim's loops that lie near a base, piece by piece of the base; count: ranks of loops."""
+    """The pieces of a brim's loops near a base, by piece of the base. count: number of loops, for their ranks."""
     return [
         replace(loop, points=run, rank=loop.rank - count * number)
         for number, place in enumerate(islands(near))

@@ -1,9 +1,9 @@
-"""Reachable areas: where support may stand in each layer and find ground below within the angle that it may lean.
+"""Reachable areas: area of each layer where support may stand and find ground below within its greatest lean.
 
-Everything here is about the middle of a branch: a place is free when a disc of the branch's least radius around it keeps
-all gaps, and reachable when a chain of such places, each within the lean of the one below, leads down to ground. (Cura's tree
-support has the complement, avoidance areas, and its word for what one may stand on, placeable.) Blocked is where support would be
-in the way of parts printed later, or the head in that of the table or of what stands beside a limb, or a person wants none.
+All areas refer to the centre of a branch: a point is free if a disc of the branch's least radius around it keeps all gaps, and
+reachable if a chain of such points, each within the lean of the one below, leads down to ground. (Cura's tree support has the
+complement, avoidance areas, and its term "placeable" for standing on the part.) Blocked are areas where support would be in the
+way of later parts, where the head would collide with the table or with parts beside a limb, or where the user wants none.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from math import radians, tan
 
 import numpy as np
 
-from mdp.clearance import Standing, highest_in_cells, least_tip_height_mm, subdivide
+from mdp.clearance import StandingColumns, highest_in_cells, least_tip_height_mm, subdivide
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.overhang import Mask
@@ -25,58 +25,59 @@ from slicer.heights import SAME_MM, Heights
 from slicer.interface.interface import BasePlane, frame_change, in_frame_of, plane_in_frame_of, room_of
 from slicer.sectioning import Sections
 
-COARSE_MM = 0.03  # sections are simplified by this before they are grown
-MARGIN_MM = 0.08  # and grown by this more, which leaves space for simplified support
-FINE_MM = 0.005  # reachable places are simplified by this
-SPARE = 0.15  # share of the lean that reachable places keep in reserve, so that more than a point of the layer below is near
-SMOOTH_MM = 0.05  # support is simplified by this: its edges come from single faces, and nobody needs them
-SLIVER_MM = 0.02  # an area narrower than twice this may be left out: its neighbours hold it
-SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
-LEAST_MM2 = 1e-5  # places smaller than this are rounding
-BEYOND = 0.75  # of the radius: how far from plastic the middle of a disc may stand; its inner beads then lie on the edge
-SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
+COARSE_MM = 0.03  # tolerance for simplifying sections before they are grown
+MARGIN_MM = 0.08  # additional growth, which leaves space for simplified support
+FINE_MM = 0.005  # tolerance for simplifying reachable areas
+SPARE = 0.15  # share of the lean that reachable areas keep in reserve, so that more than a point of the layer below is near
+SMOOTH_MM = 0.05  # tolerance for simplifying support, whose edges come from single faces
+SLIVER_MM = 0.02  # an area narrower than twice this may be left out, since its neighbours hold it
+SPECK_MM2 = 4.0 * SLIVER_MM**2  # smallest area that is not a sliver
+LEAST_MM2 = 1e-5  # smaller areas are rounding
+# of the radius: distance from plastic at which the centre of a disc may stand; its inner beads then lie on the edge
+BEYOND = 0.75
+SEGMENTS = 12  # of a full circle in round corners; corners lie on the circle, so the lean is never exceeded
 AROUND_MM = 20.0  # support needs no more space around a part than its lean and this
-CELL_MM, COARSER = 0.5, 1.5  # grid on which the height of the tip is computed, and the factor by which it is coarsened
-MOST_PAIRS = 200_000_000  # of a grid cell and a point that stands
-STEEPEST = 0.5  # mm that a slope leans out per mm of height: support at its distance cannot hold what is steeper
+CELL_MM, COARSER = 0.5, 1.5  # grid for the height of the tip, and the factor by which it is coarsened
+MOST_PAIRS = 200_000_000  # of a grid cell and a standing point
+STEEPEST = 0.5  # horizontal mm per mm of height of a slope: support at its distance cannot hold steeper ones
 LOW_MM = 0.05  # up to this height above the base plane is the cut face itself
 
 
 @dataclass(frozen=True, eq=False)
 class ReachableAreas:
-    """Where support of a part may stand, for each of the lowest layers that may need it.
+    """Possible areas for support of a part, for each of the lowest layers that may need it.
 
-    lean_mm: how far a layer of support may lean beyond the layer below, mm. placeable: ground beneath the layer on which a branch
-    may end, which is solid area grown by BEYOND of the radius. reachable: where the middle of a branch may be. shut: for a limb,
-    where the head cannot print support.
+    lean_mm: greatest lean of a layer of support beyond the layer below, mm. placeable: ground below the layer on which a branch
+    may end, which is solid area grown by BEYOND of the radius. reachable: area for centres of branches. blocked: for a limb, area
+    in which the head cannot print support.
     """
 
     sections: Sections
     lean_mm: Floats
     placeable: tuple[Polygons, ...]
     reachable: tuple[Polygons, ...]
-    shut: Sequence[Polygons] = ()
+    blocked: Sequence[Polygons] = ()
 
     @property
     def process(self) -> Process:
-        """The settings of support, with the width of its lines."""
+        """The settings of support, with its line width."""
         return self.sections.support_process
 
     @property
     def radius_mm(self) -> float:
-        """How far the beads of a branch reach round each place."""
+        """Extent of a branch's beads around its centres, mm."""
         return self.process.line_width_mm
 
     @property
     def heights(self) -> Heights:
-        """Those of all layers of the part."""
+        """The heights of all layers of the part."""
         return self.sections.heights
 
     def carrying_layers(self, layer: int) -> range:
         """The layers, from the highest down, on which the overhangs of a layer may rest.
 
-        The distance across keeps support as much lower under a slope that is just too flat, or as steep as one that a person may
-        want to be held up.
+        The horizontal distance keeps support lower under a slope: one that is just too flat, or any slope that the user may want
+        supported.
         """
         process, drop_mm = self.process, float(self.heights.bottom_mm[layer]) - self.process.support_gap_mm
         steepest = 0.0 if self.sections.enforced else tan(radians(process.self_supporting_angle_deg))
@@ -87,22 +88,22 @@ class ReachableAreas:
 
     @property
     def lowest_on_plastic(self) -> int:
-        """The layer in which support on what lies below the base plane begins; one more than the last where all are too low."""
+        """The layer in which support on plastic below the base plane begins; one more than the last if all are too low."""
         gap_mm = self.process.support_bottom_gap_mm
         return int(np.searchsorted(np.maximum(self.heights.bottom_mm, 0.0), gap_mm - SAME_MM))
 
     def next_above(self, layer: int) -> int:
-        """The first layer over one that support in it keeps no gap to."""
+        """The first layer above a layer that is far enough for support in it."""
         return int(np.searchsorted(self.heights.bottom_mm, self.heights.tip_mm[layer] + self.process.support_gap_mm - SAME_MM))
 
     def next_below(self, layer: int) -> int:
-        """How many layers lie so far under one that support in it may stand on them."""
+        """The number of layers below a layer that are far enough for support in it to stand on them."""
         drop_mm = self.heights.bottom_mm[layer] - self.process.support_bottom_gap_mm
         return min(int(np.searchsorted(self.heights.tip_mm, drop_mm + SAME_MM, side="right")), layer)
 
 
 def dilate(area: Polygons, distance_mm: float) -> Polygons:
-    """The area grown with round corners by at most a distance."""
+    """The area grown by at most a distance, with round corners."""
     return offset_round(area, distance_mm, SEGMENTS) if distance_mm > 0.0 else area
 
 
@@ -113,9 +114,9 @@ def drop_slivers(places: Polygons) -> Polygons:
 
 
 def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Polygons | None = None) -> ReachableAreas:
-    """The areas of as many layers of a part as there are `blocked`; all of the plate is placeable on the platform.
+    """The areas of as many layers of a part as there are `blocked` areas; on the build plate all of the plate is placeable.
 
-    handed: places on the base plane that support of an earlier part can reach.
+    handed: area of the base plane that support of an earlier part can reach.
     """
     process, count = sections.support_process, len(blocked)
     radius, angle = process.line_width_mm, min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
@@ -137,22 +138,22 @@ def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Pol
         if handed is not None and m == 0:
             stands.append(handed)
         placeable.append(union(stands))
-        start = offset(sections.plate, -radius) if m == 0 and sections.on_platform else placeable[m]
+        start = offset(sections.plate, -radius) if m == 0 and sections.on_plate else placeable[m]
         if m and not reachable[-1].is_empty():
             start = dilate(reachable[-1], (1.0 - SPARE) * float(lean_mm[m])) + start
         reachable.append((start - obstacles).simplify(FINE_MM))
     is_limb = sections.part.base.limbs_mm is not None
-    return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable), shut=blocked if is_limb else ())
+    return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable), blocked=blocked if is_limb else ())
 
 
 def support_reach_mm(sections: Sections) -> float:
-    """A distance from the origin that no support of a part ever reaches."""
+    """Upper bound of the distance of a part's support from the origin, mm."""
     low, high = sections.mesh.bounds_mm
     return float(np.hypot(*np.maximum(np.abs(low), np.abs(high))[:2]) + 2.0 * high[2]) + AROUND_MM
 
 
 def blocked_areas(sections: Sections, count: int, gap_mm: float, far_mm: float) -> list[Polygons]:
-    """For each of the lowest layers where support cannot be, or where a person wants none.
+    """For each of the lowest layers, the area in which support is impossible or unwanted.
 
     gap_mm: distance to later parts' base planes; far_mm: distance from the origin beyond which there is no support.
     """
@@ -166,7 +167,9 @@ def blocked_areas(sections: Sections, count: int, gap_mm: float, far_mm: float) 
 
 
 def unwanted_areas(sections: Sections) -> list[Polygons]:
-    """For each layer where a person wants no support: in the boxes, and over the faces as far as what would stand on them."""
+    """For each layer, the area in which the user wants no support: inside boxes, and over faces as far as support would stand on
+    them.
+    """
     heights, gap_mm = sections.heights, sections.process.support_bottom_gap_mm
     near = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + SAME_MM, side="right")
     return [union(sections.no_support[max(lowest - 1, 0) : k + 1]) for k, lowest in enumerate(near.tolist())]
@@ -175,10 +178,10 @@ def unwanted_areas(sections: Sections) -> list[Polygons]:
 def above_base_planes(
     part: Part, later: Sequence[Part], heights: Heights, gap_mm: float, far_mm: float, machine: Machine
 ) -> list[Polygons]:
-    """The area of each layer above the base plane of any later part, taken as lower by gap_mm.
+    """The area of each layer above the base plane of any later part, lowered by gap_mm.
 
-    While a part is printed the head moves above its base plane, so nothing may stand there, near that part or not. A limb only
-    forbids what the head could meet.
+    While a part is printed the head moves above its base plane, so nothing may stand there, whether near that part or not. A limb
+    only excludes what the head could meet.
     """
     limbs = [upper for upper in later if upper.base.limbs_mm is not None]
     whole = [upper for upper in later if upper.base.limbs_mm is None]
@@ -192,7 +195,7 @@ def above_base_planes(
 
 
 def beside_standing(sections: Sections, layers: slice, far_mm: float) -> list[Polygons]:
-    """For some layers of a limb the area that is too near to earlier parts, out of the head's reach or too far from the limb."""
+    """For some layers of a limb, the area that is too near to earlier parts, out of the head's reach or too far from the limb."""
     part, process, machine = sections.part, sections.support_process, sections.profile.machine
     gap_mm = max(process.support_gap_mm, process.support_bottom_gap_mm)
     heights, stands = sections.heights[layers], sections.standing[layers]
@@ -206,13 +209,13 @@ def beside_standing(sections: Sections, layers: slice, far_mm: float) -> list[Po
 
 
 def near_table(sections: Sections, heights: Heights, far_mm: float) -> list[Polygons]:
-    """The area of each layer so near to the table that the head would meet it."""
+    """The area of each layer in which the head would meet the table."""
     least_mm = least_tip_height_mm(sections.profile.machine, sections.part.pose)
     return _above_planes([plane_in_frame_of(sections.part, -UP, -least_mm)], heights, far_mm)
 
 
 def _above_planes(planes: Sequence[Floats], heights: Heights, far_mm: float) -> list[Polygons]:
-    """The area of each layer above any plane: (4,) unit normal and offset."""
+    """The area of each layer above any plane, given by (4,) unit normal and offset."""
     layers: list[list[Polygons]] = [[] for _ in heights.tip_mm]
     everywhere = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True)
     for x, y, z, offset_mm in planes:
@@ -223,9 +226,9 @@ def _above_planes(planes: Sequence[Floats], heights: Heights, far_mm: float) -> 
 
 
 def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, Polygons]]:
-    """Heights above a limb's base plane, each with the area in which nothing may stand higher while the limb is printed.
+    """Heights above a limb's base plane, each with the area in which nothing may be higher while the limb is printed.
 
-    The tip is assumed to reach down to the base plane everywhere in the limb's room. Nothing below -gap_mm is forbidden.
+    The tip is assumed to come down to the base plane everywhere in the limb's room. Nothing below -gap_mm is excluded.
     """
     room, clearance_mm, profile = room_of(limb), machine.clearance_mm, machine.head.silhouette_mm
     rings = [(-gap_mm, profile[0][0])]
@@ -239,7 +242,7 @@ def head_room(limb: Part, machine: Machine, gap_mm: float) -> list[tuple[float, 
 
 
 def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], machine: Machine) -> list[Polygons]:
-    """For each height of the tip the area of a limb's room, in its frame, where the head would meet what stands."""
+    """For each height of the tip, the area of a limb's room, in its frame, in which the head would meet standing parts."""
     x0, y0, x1, y1 = room_of(limb).bounds()
     cell_mm = CELL_MM
     stands = standing_beside(limb, earlier, machine, cell_mm)
@@ -250,7 +253,7 @@ def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], 
     columns, rows = (corner + cell_mm * (np.arange(size) + 0.5) for corner, size in zip((x0, y0), sizes, strict=True))
     places = np.stack(np.meshgrid(columns, rows), axis=-1)
     least_mm = stands.least_tip_mm(places.reshape(-1, 2), min(tips_mm, default=0.0)).reshape(places.shape[:2])
-    covered: dict[int, Polygons] = {}  # by the count of cells: those of a higher tip are among those of a lower one
+    covered: dict[int, Polygons] = {}  # by number of cells, since those of a higher tip are a subset of those of a lower one
     reaches = []
     for tip_mm in tips_mm:
         met = least_mm > tip_mm
@@ -262,8 +265,8 @@ def out_of_reach(limb: Part, earlier: Sequence[Part], tips_mm: Sequence[float], 
     return reaches
 
 
-def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_mm: float) -> Standing:
-    """The parts of earlier models above a limb's base plane; cell_mm: the grid on which it will be asked."""
+def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_mm: float) -> StandingColumns:
+    """The columns of earlier parts above a limb's base plane. cell_mm: the grid on which they will be queried."""
     points = [np.zeros((0, 3))]
     for part in earlier:
         mesh = in_frame_of(limb, part)
@@ -272,8 +275,8 @@ def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_
         points.append(corners.reshape(-1, 3))
     tops = np.concatenate(points)
     tops = highest_in_cells(tops[tops[:, 2] > LOW_MM], cell_mm)
-    # Half the diagonal of either cell, and the distance from the middle of such a triangle to its corners.
-    return Standing.of(tops, 2.6 * cell_mm, machine)
+    # Half the diagonal of either cell, and the distance from the centre of such a triangle to its corners.
+    return StandingColumns.of(tops, 2.6 * cell_mm, machine)
 
 
 def _rectangles(met: Mask, x0: float, middle_mm: float, cell_mm: float) -> list[Polygons]:

@@ -1,8 +1,8 @@
-"""Sturdy support: thickens pieces of support that are too slender for the support above them, and leaves thick ones hollow.
+"""Sturdy support: thickening of pieces that are too slender for the support above them, and hollow printing of thick ones.
 
-A piece is a connected area of one layer. The height of support above it gives the diameter it should have (least_diameter_mm):
-the diameter of a branch, which grows downward by an angle, and at least a fixed share of that height. A thinner piece grows into
-the free room beside the part, on all sides or, close to the part, on the free sides only. Branches are routed before they are
+A piece is a connected area of one layer. The height of support above it gives its required diameter (least_diameter_mm): the
+diameter of a branch, which grows downward by an angle, and at least a fixed share of that height. A thinner piece grows into the
+free area beside the part, on all sides or, close to the part, on the free sides only. Branches are routed before they are
 thickened, so thickness never costs an overhang its support. Branches that have met form one piece.
 """
 
@@ -19,13 +19,13 @@ from slicer.bead import spacing_mm, support_cell_mm
 from slicer.geometry.polygons import Polygons, bounding_box, islands, offset, union
 from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, drop_slivers
 
-SLENDER = 12.0  # largest height above a piece, in diameters of the piece; taller support sways under the nozzle
+SLENDER = 12.0  # greatest height above a piece, in diameters of the piece; taller support sways under the nozzle
 LONG = 3.0  # distances between sparse lines; in a longer piece a zigzag would rest on the walls only at its turns, and sag
-TRIES = 5  # at most, of a distance over which a piece grows into the room beside it
+TRIES = 5  # of a distance over which a piece grows into the free area beside it
 
 
 class Piece(NamedTuple):
-    """A connected area of a layer's support, before (thin) and after (area) it grows; top_mm: z of the top of its support."""
+    """A connected area of a layer's support, before (thin) and after (area) it grows. top_mm: z of the top of its support."""
 
     thin: Polygons
     area: Polygons
@@ -33,7 +33,7 @@ class Piece(NamedTuple):
 
 
 def touching(piece: Polygons, others: Sequence[Polygons], boxes: Floats) -> list[int]:
-    """The numbers of the others that a piece overlaps; boxes: (n, 4) theirs."""
+    """The indices of the areas that a piece overlaps. boxes: (n, 4) their bounding boxes."""
     x0, y0, x1, y1 = piece.bounds()
     near = (boxes[:, 0] < x1) & (boxes[:, 2] > x0) & (boxes[:, 1] < y1) & (boxes[:, 3] > y0)
     return [k for k in np.flatnonzero(near).tolist() if not (others[k] ^ piece).is_empty()]
@@ -47,7 +47,9 @@ def least_diameter_mm(above_mm: float, process: Process) -> float:
 
 
 def thicken(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The support of every layer with thin pieces grown. Added area is within the lean of the layer below or stands."""
+    """The support of every layer with thin pieces grown. Added area is within the lean of the layer below or stands on
+    something.
+    """
     above: list[Piece] = []
     wide: list[Polygons] = list(bodies)
     for m in range(len(bodies) - 1, -1, -1):
@@ -87,13 +89,13 @@ def _grown(thin: Polygons, over: Sequence[Piece], areas: ReachableAreas, m: int)
 
 
 def _with_touching(area: Polygons, about: Polygons, thin: Polygons) -> Polygons:
-    """An area with a thin piece in it united with those islands of another that overlap the piece."""
+    """An area with a thin piece in it, united with those islands of another area that overlap the piece."""
     pieces = [about] if about.num_contour() == 1 else islands(about)
     return union([area, *(piece for piece in pieces if not (piece ^ thin).is_empty())])
 
 
 def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, least_mm: float) -> Polygons:
-    """An area united with the room around a thin piece until it is as large as a circle of diameter least_mm.
+    """An area united with the free area around a thin piece until it is as large as a circle of diameter least_mm.
 
     lacking_mm: the radius that the piece lacks, the first distance to try. Growth ends least_mm from the piece.
     """
@@ -104,7 +106,7 @@ def _filled(area: Polygons, thin: Polygons, room: Polygons, lacking_mm: float, l
         mm2 = filled.area()
         if mm2 >= least_mm2 or distance_mm >= least_mm:
             break
-        # Extrapolate: as many more steps as the missing area needs if each adds as much as the last one did.
+        # Extrapolate: as many more steps as the missing area needs if each adds as much as the last one.
         more_mm = 1.02 * step_mm * (least_mm2 - mm2) / max(mm2 - before_mm2, 0.1 * mm2)
         step_mm, before_mm2 = min(more_mm, least_mm - distance_mm), mm2
         distance_mm += step_mm
@@ -131,9 +133,9 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
     """The pieces of each layer's support that are printed as walls without lines inside.
 
     printed, dense: one area per layer. A piece is filled if it is wider than the distance between sparse lines and lies under
-    filled or dense support of the layer above. A short piece that is narrower is filled only directly under dense support, whose
-    lines may run along it. A long one is filled wherever a wide one is: the zigzag in the layer above it would touch walls at
-    its turns only, and hang over all of the piece's length. Without walls no piece is hollow.
+    filled or dense support of the layer above. A short, narrower piece is filled only directly under dense support, whose lines
+    may run along it. A long one is filled like a wide one: the zigzag in the layer above it would touch walls at its turns only,
+    and hang over all of the piece's length. Without walls no piece is hollow.
     """
     hollow, filled = [Polygons()] * len(printed), Polygons()
     if process.support_walls == 0:
@@ -149,7 +151,7 @@ def hollow_places(printed: Sequence[Polygons], dense: Sequence[Polygons], proces
 
 
 def _has_lines(piece: Polygons, lying: Polygons, dense_above: Polygons, walls_mm: float, cell_mm: float) -> bool:
-    """Whether lines are printed inside a piece; lying: its area under lines of the layer above."""
+    """Whether lines are printed inside a piece. lying: its area under lines of the layer above."""
     x0, y0, x1, y1 = piece.bounds()
     long_mm = max(x1 - x0, y1 - y0) - 2.0 * walls_mm
     if lying.is_empty() or long_mm <= cell_mm:

@@ -1,4 +1,4 @@
-"""Support: grown from hanging places down to the ground, trimmed to what stands, with reasons for places that get none."""
+"""Support: grown from overhangs down to the ground, trimmed to what stands, with reasons for missing support."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,21 +31,21 @@ from slicer.support.reachable import (
 from slicer.support.sturdy import hollow_places, thicken, touching
 from slicer.support.tree import JOIN_MM, Branch, add_contact, carrying_area, lower_branches
 
-SLACK_MM = 0.01  # what rounding may add to the lean
-LEDGE = 2.0  # line widths: a ledge no wider carries itself, the search's definition (mdp.support_need.patches)
+SLACK_MM = 0.01  # allowance for rounding of the lean
+LEDGE = 2.0  # line widths: a narrower ledge is self-supporting by the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
-UNDER = (0.2, 0.5)  # of a disc's radius: how far beside an overhang a disc may stand; the smaller value is tried first
-MOST = 0.5  # share of a place that one reason has to hold for
+UNDER = (0.2, 0.5)  # of a disc's radius: distance beside an overhang at which a disc may stand; the smaller value is tried first
+MOST = 0.5  # share of an area to which a reason must apply
 HEAP = 12  # layers united at a time: a sweep over all of them at once meets many more crossings
 
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """The support of a part's sections, which go up as far as it does; each list has one area per layer.
+    """The support of a part, and its sections, extended to the height of the support; each list has one area per layer.
 
-    areas: printed support; dense: its interface; hollow: printed without lines inside the walls; wanted: hanging places that want
-    support; missed: those of them that nothing holds; unwanted: hanging places that a person wants no support under.
+    areas: printed support; dense: its interface; hollow: pieces without lines inside the walls; wanted: overhangs to support;
+    missed: unsupported ones among them; unwanted: overhangs for which the user wants no support.
     """
 
     sections: Sections
@@ -57,19 +57,19 @@ class Supports:
     unwanted: Sequence[Polygons]
 
     def right_under(self, layer: int) -> Polygons:
-        """The dense support whose top is nearest to a layer, support_gap_mm under it."""
+        """The dense support whose top is nearest below a layer, support_gap_mm under it."""
         heights, gap_mm = self.sections.heights, self.sections.process.support_gap_mm
         highest = int(np.searchsorted(heights.tip_mm, heights.bottom_mm[layer] - gap_mm + SAME_MM, side="right")) - 1
         return self.dense[highest] if highest >= 0 else Polygons()
 
     @property
     def unsupported_mm2(self) -> float:
-        """Hanging area, seen from above, that no support could reach."""
+        """Overhanging area, projected, that support could not reach, mm2."""
         return float(union(self.missed).area())
 
 
 def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
-    """The support that stands on the platform, on the part itself and on what lies below its base plane."""
+    """The support that stands on the build plate, on the part itself and on plastic below its base plane."""
     process, nothing = sections.support_process, [Polygons()] * len(sections.outlines)
     wanted, unwanted = wanted_places(sections, overhangs), nothing
     if process.support != "none":
@@ -85,15 +85,16 @@ def own_supports(sections: Sections, overhangs: Sequence[Overhang]) -> Supports:
         missed = find_missed(wanted, printed, areas)
         if all(area.is_empty() for area in missed):
             break
-    if sections.on_platform and not sections.on_raft:
+    if sections.on_plate and not sections.on_raft:
         printed[0] = widen_foot(printed, areas, sections.plate - blocked[0])
     hollow, rest = hollow_places(printed, dense, process), nothing[len(printed) :]
     return Supports(sections, [*printed, *rest], [*dense, *rest], [*hollow, *rest], wanted, missed, unwanted)
 
 
 def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Polygons]:
-    """The hanging places of every layer that want support: large enough, and without plastic or the platform no farther below
-    than support would be."""
+    """The overhangs of every layer that get support: large enough, and without plastic or the build plate within the distance of
+    support.
+    """
     heights, outlines, process = sections.heights, sections.outlines, sections.process
     if process.support == "none":
         return [Polygons()] * len(outlines)
@@ -114,18 +115,18 @@ def wanted_places(sections: Sections, overhangs: Sequence[Overhang]) -> list[Pol
 
 
 def drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
-    """The hanging places without those that, seen from above, are too small to matter."""
+    """The overhangs without those whose projection is too small."""
     small = union([island for island in islands(seen_from_above(hanging)) if island.area() < least_mm2])
     return list(hanging) if small.is_empty() else [_if_large(area - small) for area in hanging]
 
 
 def _if_large(area: Polygons) -> Polygons:
-    """The area, empty where that is mere rounding."""
+    """The area, empty if it is only rounding."""
     return area if area.area() >= LEAST_MM2 else Polygons()
 
 
 def seen_from_above(hanging: Sequence[Polygons]) -> Polygons:
-    """The places that hanging layers make up together."""
+    """The united projection of overhangs of all layers."""
     areas = [offset(area, RIM_MM) for area in hanging if not area.is_empty()]
     return union([union(areas[k : k + HEAP]) for k in range(0, len(areas), HEAP)])
 
@@ -135,7 +136,7 @@ def grow(
 ) -> tuple[list[Polygons], list[Polygons]]:
     """Grow support from the top down. Returns one area per layer of all support, and one of the support that begins there.
 
-    wanted: the hanging places of each layer; begins: places of a layer at which support has to begin; hard: where support may
+    wanted: the overhangs of each layer; begins: areas of a layer in which support must begin; hard: area in which support may
     merely touch what it holds.
     """
     count, radius = len(areas.reachable), areas.radius_mm
@@ -151,9 +152,9 @@ def grow(
         pending += beginning.get(m, [])
         area = union([branch.area for branch in branches]) if is_tree else area
         body = _body(area, radius)
-        asked = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
-        if asked:
-            contact = _contact(union(asked), body, areas.reachable[m], radius, hard)
+        beginnings = [hanging for hanging, _ in pending] + ([begins[m]] if m in begins else [])
+        if beginnings:
+            contact = _contact(union(beginnings), body, areas.reachable[m], radius, hard)
             if is_tree:
                 branches = add_contact(branches, contact, areas.reachable[m])
             elif not contact.is_empty():
@@ -173,15 +174,15 @@ def grow(
 
 
 def _body(area: Polygons, radius: float) -> Polygons:
-    """Discs around all places of an area."""
+    """The area of discs around all points of an area."""
     return dilate(area, radius).simplify(COARSE_MM)
 
 
 def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: float, hard: Polygons) -> Polygons:
-    """Reached places whose discs cover a hanging place as far as can be, beside the support already present.
+    """Reachable points whose discs cover an overhang as far as possible, beside the support already present.
 
-    A disc beside the place has to come under it by half its radius: a bead that merely touches it holds little,
-    and is taken only where a place is hard to reach.
+    A disc beside the overhang must extend under it by half its radius: a bead that merely touches it holds little, and is used
+    only where the overhang is hard to reach.
     """
     bare = drop_slivers(hanging - body)
     if bare.area() < LEAST_MM2:
@@ -200,16 +201,16 @@ def _contact(hanging: Polygons, body: Polygons, reachable: Polygons, radius: flo
 def stand(
     bodies: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas
 ) -> tuple[list[Polygons], list[Polygons]]:
-    """The grown support that stands, and its dense places, layer by layer. bodies, contacts: as grow gives them."""
+    """The grown support that stands, and its dense areas, layer by layer. bodies, contacts: from grow."""
     printed = _keep_standing(_add_roots(bodies, areas), areas)
     return printed, _dense(printed, contacts, areas)
 
 
 def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The support of every layer with roots under support that ends in the air above.
+    """The support of every layer with roots under support that would end in the air.
 
-    A root is at most as deep as the steepest slope that support may not slide along is high under its disc; a thin one no deeper
-    than a tip may be long.
+    A root is at most as deep as the steepest slope along which support may not slide is high under its disc; a thin one is no
+    deeper than the greatest length of a tip.
     """
     process = areas.process
     across = process.support_distance_mm + 2.0 * areas.radius_mm
@@ -231,7 +232,7 @@ def _add_roots(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygo
 
 
 def _loose_ends(bodies: Sequence[Polygons], areas: ReachableAreas, m: int) -> Polygons:
-    """The support of a layer that nothing in the layer below carries, though something to stand on is near."""
+    """The support of a layer that nothing in the layer below carries, although ground is near."""
     if bodies[m].is_empty() or areas.placeable[m].is_empty():
         return Polygons()
     loose = bodies[m] - bodies[m - 1]
@@ -241,22 +242,24 @@ def _loose_ends(bodies: Sequence[Polygons], areas: ReachableAreas, m: int) -> Po
 
 
 def _blocked_area(root: Polygons, areas: ReachableAreas, m: int) -> Polygons:
-    """Where the gaps to the part forbid support, about a root."""
+    """Area around a root in which the gaps to the part exclude support."""
     distance_mm, outlines = areas.process.support_distance_mm, areas.sections.outlines
     window = bounding_box(root, distance_mm + 1.0)
     beside = offset((outlines[m] ^ window).simplify(COARSE_MM), distance_mm + COARSE_MM)
     near = [*outlines[areas.next_below(m) : m], *outlines[m + 1 : areas.next_above(m)]]
-    return union([beside, *(outline ^ window for outline in near), *areas.shut[m : m + 1]])
+    return union([beside, *(outline ^ window for outline in near), *areas.blocked[m : m + 1]])
 
 
 def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """Support from the lowest layer up: what lies within the lean of the layer below or stands, wide enough for a bead."""
+    """Support from the lowest layer up: the area within the lean of the layer below, or standing, that is wide enough for a
+    bead.
+    """
     printed: list[Polygons] = []
     for m, body in enumerate(bodies):
         rest = body - dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else body
-        if (m or not areas.sections.on_platform) and not drop_slivers(rest).is_empty():
+        if (m or not areas.sections.on_plate) and not drop_slivers(rest).is_empty():
             placeable = areas.placeable[m] ^ bounding_box(rest, areas.radius_mm)
-            # Discs reach beyond placeable places, but nothing stands beside one alone.
+            # Discs extend beyond placeable areas, but none stands beside one alone.
             alone = [piece for piece in islands(rest) if drop_slivers(piece ^ placeable).is_empty()]
             loose = union([rest - dilate(placeable, (1.0 - BEYOND) * areas.radius_mm), *alone])
             body = body if drop_slivers(loose).is_empty() else _clip_loose(body, loose, areas)
@@ -265,7 +268,7 @@ def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas) -> list[Po
 
 
 def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polygons:
-    """A layer's support without its loose area; islands that lose some keep only what is wide enough for a bead."""
+    """A layer's support without its loose area; islands that lose some keep only the parts wide enough for a bead."""
     boxes = np.array([piece.bounds() for piece in islands(loose)])
     least = 0.5 * np.pi * areas.radius_mm**2
     standing = []
@@ -280,7 +283,8 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas) -> Polyg
 
 
 def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygons) -> Polygons:
-    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate.
+    """The first layer on the build plate, widened for adhesion as far as the gaps to the part allow. free: free area of the
+    plate.
 
     Each piece becomes up to twice as wide as the support on it is high, but grows by at most support_foot_mm on each side.
     """
@@ -301,7 +305,7 @@ def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygon
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """Where printed support is next to the part: under the overhangs that it holds and over the surface that it stands on."""
+    """The area of printed support next to the part: under the overhangs that it holds and over the surface on which it stands."""
     process = areas.process
     roofs, floors = process.support_interface_layers, process.support_bottom_interface_layers
     feet = [dilate(foot, (1.0 - BEYOND) * areas.radius_mm) for foot in areas.placeable]
@@ -311,10 +315,10 @@ def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: Rea
 
 
 def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The hanging places that support does not hold, layer by layer.
+    """The overhangs that support does not hold, layer by layer.
 
-    A place is held over printed support and half a bead beyond its edge, where it spans from there to the part, where no layer of
-    support fits between it and the part, the platform or the plastic below the base plane, and on a mere ledge.
+    A point is held over printed support and half a bead beyond its edge, where lines span from there to the part, where no layer
+    of support fits between it and the part, the build plate or the plastic below the base plane, and on a ledge.
     """
     process, heights, outlines = areas.process, areas.heights, areas.sections.outlines
     distance_mm, missed = process.support_distance_mm, [Polygons()] * len(wanted)
@@ -328,7 +332,7 @@ def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: 
             around = (held + outlines[k - 1]) ^ bounding_box(bare, 2.0 * distance_mm + 1.0)
             bare = bare - closing(around, 0.5 * distance_mm + RIM_MM)
         lowest = float(heights.bottom_mm[k]) - process.support_gap_mm - process.layer_height_mm
-        if k and lowest <= SAME_MM and areas.sections.on_platform:
+        if k and lowest <= SAME_MM and areas.sections.on_plate:
             continue
         near = list(outlines[int(np.searchsorted(heights.tip_mm, lowest - SAME_MM)) : k - 1]) if k else []
         if k and below is not None and first_mm > heights.bottom_mm[k] - process.support_gap_mm + SAME_MM:
@@ -338,7 +342,7 @@ def find_missed(wanted: Sequence[Polygons], printed: Sequence[Polygons], areas: 
 
 
 def _drop_ledges(missed: Sequence[Polygons], printed: Sequence[Polygons], areas: ReachableAreas) -> list[Polygons]:
-    """The missed places without mere ledges, which have no large area beyond a ledge's reach from held places."""
+    """The unsupported overhangs without ledges, which have no large area beyond a ledge's reach from held area."""
     above, outlines, process = seen_from_above(missed), areas.sections.outlines, areas.process
     reach, beyond = LEDGE * process.line_width_mm, []
     for k, bare in enumerate(missed):
@@ -352,14 +356,14 @@ def _drop_ledges(missed: Sequence[Polygons], printed: Sequence[Polygons], areas:
 
 
 def _held(k: int, printed: Sequence[Polygons], areas: ReachableAreas) -> Polygons:
-    """The places of a layer that lie over printed support."""
+    """The area of a layer over printed support."""
     return offset(union([printed[m] for m in areas.carrying_layers(k) if m < len(printed)]), 0.5 * areas.process.line_width_mm)
 
 
 def explain(supports: Supports, tops_mm: Floats) -> tuple[Unsupported, ...]:
-    """Every place that lies bare, the largest first, with the number of its layer among those that print anything.
+    """All unsupported areas, largest first, with the numbers of their layers among those that print anything.
 
-    What the layer below carries is left out, a line on that or beside one: slopes too steep for the process are printed like
+    Area that the layer below carries, a line on it or beside one, is left out: slopes too steep for the process are printed like
     that, layer upon layer. tops_mm: heights of the layers that print anything.
     """
     sections, process, bare = supports.sections, supports.sections.process, list(supports.missed)
@@ -376,7 +380,7 @@ def explain(supports: Supports, tops_mm: Floats) -> tuple[Unsupported, ...]:
 
 
 def _connected_areas(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, Polygons]]:
-    """Connected hanging places seen from above: the area of each, the layer with most of it, and its share there."""
+    """Connected overhangs in projection: the area of each, the layer with most of it, and its share there."""
     for island in islands(seen_from_above(hanging)):
         pieces = {k: piece ^ island for k, piece in enumerate(hanging) if not piece.is_empty()}
         mm2 = {k: piece.area() for k, piece in pieces.items()}
@@ -386,11 +390,11 @@ def _connected_areas(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, 
 
 
 def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
-    """Why none of the ways to hold a place of a layer was open."""
+    """The reason why an overhang of a layer could not be supported."""
     process, heights, least_mm2 = sections.support_process, sections.heights, MOST * hanging.area()
     drop = float(heights.bottom_mm[layer]) - process.support_gap_mm
     top = max(int(np.searchsorted(heights.tip_mm, drop + SAME_MM, side="right")) - 1, 0)
-    if sections.on_platform and (hanging - offset(sections.plate, -process.line_width_mm)).area() >= least_mm2:
+    if sections.on_plate and (hanging - offset(sections.plate, -process.line_width_mm)).area() >= least_mm2:
         return "the plate ends before"
     under, far_mm = heights[top : top + 1], support_reach_mm(sections)
     for upper in sections.later:
@@ -414,14 +418,14 @@ def _reason(layer: int, hanging: Polygons, sections: Sections) -> str:
 
 
 def _part_at_table(hanging: Polygons, z_mm: float, sections: Sections) -> int | None:
-    """The part with which support could be printed under a place if the table were not in the way of the head."""
+    """The part with which support could be printed under an overhang if the table were not in the way of the head."""
     middle = 0.5 * (np.array(hanging.bounds()[:2]) + hanging.bounds()[2:])
     base_mm, machine = sections.part.base.offset_mm, sections.profile.machine
     below, under = (np.append(middle, base_mm + z) @ sections.part.rotation for z in (z_mm, 0.0))
-    if not sections.on_platform and below[2] < least_tip_height_mm(machine, sections.part.pose):
+    if not sections.on_plate and below[2] < least_tip_height_mm(machine, sections.part.pose):
         return sections.part.index
     earlier = [part for part in reversed(sections.earlier) if part.base.limbs_mm is None]
     lower = next((part for part in earlier if part.base.heights_mm(under[None])[0] > 0.0), None)
-    if lower is None or lower.on_platform or under[2] >= least_tip_height_mm(machine, lower.pose):
+    if lower is None or lower.on_plate or under[2] >= least_tip_height_mm(machine, lower.pose):
         return None
     return lower.index

@@ -1,8 +1,9 @@
-r"""Tree: support as branches; what begins near each other grows down as one branch.
+r"""Tree support: support as branches; contacts that begin near each other grow down as one branch.
 
-A branch is kept as the places of its middle; printed are discs about all of them. First, from the ground up, it is found where
-such places may be (`reachable`): beside the part, and within the lean of a reachable place in the layer below, or on something.
-Then, from the top down, each layer's branches are made from those above, never out of what is reachable, so none ends in the air.
+A branch is stored as the area of its centres; discs around all of them are printed. First, from the ground up, the possible
+centres are computed (`reachable`): beside the part, and within the lean of a reachable centre in the layer below, or on ground.
+Then, from the top down, each layer's branches are derived from those above, always within the reachable area, so none ends in the
+air.
 
     _____________________________________
     | hangs               |             |   add_contact: what hangs is cut along squares of CELL_MM, each begins a branch
@@ -16,8 +17,8 @@ Then, from the top down, each layer's branches are made from those above, never 
          /   \        ||   |            |   within the lean, or ends on where the part may be stood on (`placeable`)
     ____/_____\______/__\__|____________|____
 
-The rule for every step: each place of a branch has a place of one below it within the lean, or it stands. Afterwards
-support.stand keeps the support that stands and is as wide as a bead, and find_missed counts the overhangs that are not held.
+Invariant of every step: each centre of a branch has a centre below it within the lean, or stands on ground. Afterwards
+support.stand keeps the support that stands and is wide enough for a bead, and find_missed lists the overhangs that are not held.
 """
 
 from collections.abc import Sequence
@@ -34,20 +35,20 @@ from slicer.geometry.polygons import Polygons, closing, contours, islands, offse
 from slicer.heights import SAME_MM
 from slicer.support.reachable import FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, ReachableAreas, dilate, drop_slivers
 
-CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
-JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
+CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its centre is down after half of that
+JOIN_MM = 0.8  # columns with a smaller gap than twice this are merged: sturdier, and no more plastic than two outlines
 CORNERS = 12  # of a trunk's outline
-MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
-THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
-TIDY_EVERY = 4  # layers between two removals of slits and slivers from branches that are in the way of an obstacle
+MEETING = 0.8  # trunks lean towards each other only if they meet within this share of the remaining height
+THIN_MM = 0.1  # radius of the centres of a branch between obstacles: hardly more than one point
+TIDY_EVERY = 4  # layers between two removals of slits and slivers from branches at an obstacle
 INSET = 0.7  # of the lean: then right corners move by the lean
-STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
-WIDEST = 1.3  # times the distance: how far corners of widened places may reach; sharper ones than 100 degrees are cut off
+STEPS = (0.3, 0.6, 1.0)  # of the lean: distances by which support moves aside, no farther than needed, since it widens by as much
+WIDEST = 1.3  # of the distance: limit for corners of widened areas; corners sharper than 100 degrees are cut off
 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """The places of a branch's middle in one layer, all within `radius` of x, y; full: every place within it."""
+    """The centres of a branch in one layer, all within `radius` of x, y. full: whether every point within it is one."""
 
     area: Polygons
     x: float
@@ -57,18 +58,18 @@ class Branch:
 
     @property
     def reach_mm(self) -> float:
-        """How far from x, y its farthest place is."""
+        """Greatest distance of a centre from x, y, mm."""
         return self.radius / cos(pi / CORNERS) if self.full else self.radius
 
     def shrink(self, radius: float) -> "Branch":
-        """Every place moved towards the middle, by no more than the radius becomes less."""
+        """The branch with every centre moved towards the middle, by at most the reduction of the radius."""
         share = radius / self.radius
         matrix = np.array([[share, 0.0, (1.0 - share) * self.x], [0.0, share, (1.0 - share) * self.y]])
         return Branch(self.area.transform(matrix), self.x, self.y, radius)
 
 
 def branch_of(area: Polygons) -> Branch:
-    """A branch through all places of an area."""
+    """A branch with all points of an area as centres."""
     points = np.concatenate(contours(area))
     x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return Branch(area, float(x), float(y), float(np.hypot(points[:, 0] - x, points[:, 1] - y).max()))
@@ -81,7 +82,7 @@ def trunk(x: float, y: float, radius: float) -> Branch:
 
 
 def add_contact(branches: Sequence[Branch], contact: Polygons, reachable: Polygons) -> list[Branch]:
-    """The branches of a layer with the contacts that begin in it; a contact joins its square's branch if that is no trunk."""
+    """The branches of a layer with the contacts that begin in it; a contact joins its square's branch unless that is a trunk."""
     grown = list(branches)
     young = {_cell(branch.x, branch.y): k for k, branch in enumerate(branches) if not branch.full}
     for cell, piece in _pieces(contact):
@@ -98,7 +99,7 @@ def _cell(x: float, y: float) -> tuple[int, int]:
 
 
 def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
-    """An area cut along a fixed lattice, with the lattice's numbers."""
+    """An area cut along a fixed lattice, with the lattice indices."""
     pieces: dict[tuple[int, int], list[Polygons]] = {}
     square = Polygons.square((CELL_MM, CELL_MM))
     for island in islands(area):
@@ -112,12 +113,12 @@ def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
 
 
 def trunk_radius_mm(process: Process, radius_mm: float) -> float:
-    """Radius of a trunk's places; radius_mm: how far beads reach round a place."""
+    """Radius of a trunk's centres, mm. radius_mm: extent of beads around a centre."""
     return max(0.5 * process.support_branch_mm - radius_mm, 0.1 * radius_mm)
 
 
 def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
-    """The branches of a layer in the layer below: each place is within the lean of one of those there, or where it may stand."""
+    """The branches of a layer lowered to the layer below: each centre is within the lean of a centre there, or on ground."""
     lean, reachable = float(areas.lean_mm[layer]), areas.reachable[layer - 1]
     targets = _target_branches(branches, areas, layer)
     borders = index_edges(reachable)
@@ -135,18 +136,18 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
         if narrow is not None:
             low.append(narrow)
         elif not old.full or 2.0 * (old.area - areas.placeable[layer]).area() >= old.area.area():
-            left.append(old)  # less than half of it has come to ground
+            left.append(old)  # less than half of it has reached ground
     return _drop_enclosed(low + _move_aside(left, areas, layer))
 
 
 def _depths(branches: Sequence[Branch], borders: EdgeIndex) -> Floats:
-    """How deep the middles of branches lie inside an area with those edges."""
+    """Depth of the middles of branches inside an area with the given edges, mm."""
     depths_mm: Floats = depths(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
     return depths_mm
 
 
 def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
-    """Where the branches would go if nothing was in their way: wide ones shrink, trunks go to meet the nearest trunk."""
+    """Unobstructed positions of the branches in the layer below: wide ones shrink, trunks go to meet the nearest trunk."""
     z_mm, lean = float(areas.heights.tip_mm[layer - 1]), float(areas.lean_mm[layer])
     rise, thick = float(areas.heights.tip_mm[layer]) - z_mm, trunk_radius_mm(areas.process, areas.radius_mm)
     trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick + SAME_MM]
@@ -166,7 +167,9 @@ def _target_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: i
 
 
 def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
-    """For each trunk half way to the nearest other one, or its own place; reach_mm: how far it can lean down to the ground."""
+    """For each trunk the point half way to the nearest other one, or its own position. reach_mm: its greatest lean down to the
+    ground.
+    """
     if len(at):
         apart = np.hypot(at[:, None, 0] - at[None, :, 0], at[:, None, 1] - at[None, :, 1])
         np.fill_diagonal(apart, np.inf)
@@ -177,9 +180,9 @@ def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
 
 
 def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: float, lean: float) -> Branch | None:
-    """The branch where it is, as thick as it was or by the lean thinner, if that is free.
+    """The branch in place, unchanged or thinner by the lean, if that is free; None if neither is.
 
-    borders: edges of the reached places; depth_mm: how deep inside them the branch's middle lies.
+    borders: edges of the reachable area; depth_mm: depth of the branch's middle inside it.
     """
     if branch.full and depth_mm >= branch.reach_mm:
         return branch
@@ -197,7 +200,7 @@ def _narrow(branch: Branch, reachable: Polygons, borders: EdgeIndex, depth_mm: f
 
 
 def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
-    """Branches in the way of an obstacle: the area with a place below stays; the rest moves aside or ends on the ground."""
+    """Move branches around an obstacle: centres with a point below stay; the others move aside or end on the ground."""
     reachable, lean = areas.reachable[layer - 1], float(areas.lean_mm[layer])
     area = union([branch.area for branch in branches])
     tidy = layer % TIDY_EVERY == 0
@@ -208,7 +211,7 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
     if tidy:
         thick = drop_slivers(carrying)
         below = islands(thick.simplify(FINE_MM) + _widened(carrying - thick, reachable))
-    for island in () if tidy else islands(carrying):  # what is just a thin limb of one can wait
+    for island in () if tidy else islands(carrying):  # a thin limb of a branch can wait
         x0, y0, x1, y1 = island.bounds()
         is_sliver = island.area() < 2.0 * SLIVER_MM * hypot(x1 - x0, y1 - y0)
         below += islands(_widened(island, reachable)) if is_sliver else [island.simplify(FINE_MM)]
@@ -216,12 +219,12 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
 
 
 def _widened(slivers: Polygons, reachable: Polygons) -> Polygons:
-    """Slivers wide enough to be followed down."""
+    """Slivers widened enough to be followed down."""
     return (widen(slivers, THIN_MM) ^ reachable).simplify(FINE_MM)
 
 
 def _draw_in(area: Polygons, lean: float) -> Polygons:
-    """The area with its edges drawn in; what is too narrow for that stays."""
+    """The area with its edges moved inward; parts too narrow for that stay."""
     drawn_in = []
     for island in islands(area):
         core = offset(island, -INSET * lean)
@@ -231,7 +234,7 @@ def _draw_in(area: Polygons, lean: float) -> Polygons:
 
 
 def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
-    """Without branches that lie wholly inside a trunk."""
+    """The branches without those that lie wholly inside a trunk."""
     if len(branches) < 2:
         return branches
     x, y, radius, full = np.array([[b.x, b.y, b.radius, b.full] for b in branches]).T
@@ -242,9 +245,8 @@ def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
 
 
 def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, lean_mm: float) -> Polygons:
-    """Reachable places of a layer that carry places of the layer above.
-
-    They lie straight below where that can be, aside where it must. What is placeable needs nothing.
+    """Reachable points of a layer that carry the points of the layer above: straight below if possible, otherwise aside.
+    Placeable points need none.
     """
     straight, rest = places ^ reachable, places - reachable
     if rest.area() >= LEAST_MM2:
@@ -261,8 +263,8 @@ def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, le
 
 
 def widen(area: Polygons, distance_mm: float) -> Polygons:
-    """The area grown by at least a distance, with hardly more corners than it has.
+    """The area grown by at least a distance, with hardly any new corners.
 
-    What is grown layer after layer must not get round corners: each of them would be two in the next layer.
+    An area that grows layer after layer must not get round corners, since each of them would become two in the next layer.
     """
     return offset(area, distance_mm, WIDEST)

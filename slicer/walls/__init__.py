@@ -1,1 +1,1 @@
-"""Walls: closed beads along the outline, as wide as the place, and what fills the places that other beads leave."""
+"""Walls: closed beads along the outline, as wide as the section there, and fill for gaps between beads."""

@@ -1,12 +1,12 @@
-"""Skeleton: the medial axis of polygons, with the ribs from it to the boundary, and how many beads lie across every place of it.
+"""Skeleton: the medial axis of polygons with ribs to the boundary, and the bead count along it, with hysteresis.
 
-The triangles of closely sampled contours are the nodes of the axis, their circumcentres, their inner sides its edges (Kuipers et
-al. 2020, section 3.1, take the Voronoi diagram of the segments: samples need no parabolas and no exact arithmetic). A corner of a
-triangle is named by the half-edge that begins there.
+The triangles of closely sampled contours are the nodes of the axis, their circumcentres its points, their inner sides its edges
+(Kuipers et al. 2020, section 3.1, use the Voronoi diagram of the segments: samples need no parabolas and no exact arithmetic). A
+corner of a triangle is named by the half-edge that begins there.
 
-Inward distributed beading (section 4.1 there): the outer beads have their nominal width, the innermost one or two take what is
-left. Bead i, counted from the boundary, is named by its spacing s, what it takes of the thickness; it is s + height (1 - pi/4)
-wide, for the round sides of beads lie over each other. One count changes where the place does and not to and fro.
+Inward distributed beading (section 4.1 there): the outer beads have their nominal width, the innermost one or two take the rest.
+Bead i, counted from the boundary, is described by its spacing s, its share of the thickness; its width is s + height (1 - pi/4),
+since the round sides of beads overlap. The count changes with the thickness, but does not flicker.
 """
 
 from typing import NamedTuple
@@ -21,28 +21,28 @@ from mdp.overhang import Mask
 from slicer.geometry.polyline import Segment, nearest_share, orientation
 from slicer.geometry.triangulation import Triangulation, after
 
-SLOPE = 0.2164  # sine of 12.5 deg: sides that meet at less than 25 deg enclose a place that narrows, others a corner
-OPPOSITE = -0.8  # cosine of the angle between the ways to opposite sides, at most
-ON_SIDE_MM2 = 1e-9  # rounding: a node on a side is in both triangles
-TIE_MM = 1e-9  # rounding: of two feet as near, on the sides of a point of a circle round the node, the first is taken every time
-MOST_STEPS = 1000  # triangles on the way from one to its centre; usually none
-ADD = 0.7  # of a spacing: from this on what two beads leave between them gets a bead of its own
-ROOM = 1.5  # spacings: narrower places between all walls get one bead
-SPLIT = 1.5  # spacings: from this on one bead becomes two
-FEATURE = 0.5  # of the least width: places so narrow get a bead that is wider than they are, narrower ones none
-STUB = 0.8  # nominal spacings: a shorter limb of the axis is a corner of a thicker place
-POINT = 0.3  # of its half thickness: a piece of the axis shorter than that is a point
-FLICKER = 2.0  # nominal spacings: a shorter stretch keeps the count of its neighbours where beads can be as wide
-ROUNDS = 4  # of taking out such stretches
-ALIKE = 1.1  # the thickest point of a place belongs to an axis beside it where it is not thicker by this factor
+SLOPE = 0.2164  # sine of 12.5 deg: sides that meet at less than 25 deg enclose a narrowing region, others a corner
+OPPOSITE = -0.8  # greatest cosine of the angle between the directions to opposite sides
+ON_SIDE_MM2 = 1e-9  # tolerance: a node on a side is in both triangles
+# tolerance: of two equally near feet, on the sides of a corner on a circle around the node, the first is always taken
+TIE_MM = 1e-9
+MOST_STEPS = 1000  # triangles on the way from a triangle to its centre; usually none
+ADD = 0.7  # of a spacing: a remainder between two beads from this size gets a bead of its own
+ROOM = 1.5  # spacings: a narrower region between all walls gets one bead
+SPLIT = 1.5  # spacings: from this width one bead becomes two
+FEATURE = 0.5  # of the least width: narrower regions get a bead wider than they are, still narrower ones none
+STUB = 0.8  # nominal spacings: a shorter branch of the axis is a corner of a thicker region
+POINT = 0.3  # of its half thickness: a shorter piece of the axis is a point
+FLICKER = 2.0  # nominal spacings: a shorter stretch takes the count of its neighbours if the widths of beads allow it
+ROUNDS = 4  # of removing such stretches
+ALIKE = 1.1  # the thickest point of a region belongs to an adjacent axis unless it is thicker by this factor
 SAME_MM = 1e-6  # radii that differ by less are equal
-MOST_HOPS = 8  # from node to node; two that lead to each other would go on for ever
+MOST_HOPS = 8  # between nodes; two that refer to each other would loop forever
 
 
 class Rule(NamedTuple):
-    """walls: loops from a boundary inward at most. outer, inner: nominal spacings; round: width less spacing.
-
-    least, most: widths of beads. All mm.
+    """Rule for bead counts. walls: greatest number of loops from a boundary inward. outer, inner: nominal spacings; round: width
+    less spacing; least, most: widths of beads. All mm.
     """
 
     walls: int
@@ -54,11 +54,11 @@ class Rule(NamedTuple):
 
 
 class Skeleton(NamedTuple):
-    """m nodes. across: (3 m,) of the triangulation; centres: (m, 2); radii: (m,) distance to the boundary.
+    """A skeleton with m nodes. across: (3 m,) of the triangulation; centres: (m, 2); radii: (m,) distance to the boundary.
 
     feet: (3 m, 2) points of the boundary nearest to each; central: (3 m,) inner sides across which the axis runs between two
-    opposite sides of the polygon, not into a corner of it; beads: (m,) across each node; thick: (m,) the half thickness by which
-    these are laid, its own or that of its axis; dots: (m,) middles of round places with room for a single bead.
+    opposite sides of the polygon, not into a corner of it; beads: (m,) across each node; thick: (m,) half thickness used for the
+    beads, the node's own or that of its axis; dots: (m,) centres of round regions with room for a single bead.
     """
 
     across: Ints
@@ -73,7 +73,7 @@ class Skeleton(NamedTuple):
 
 @kernel
 def skeleton_of(triangulation: Triangulation, rule: Rule) -> Skeleton:
-    """The skeleton of a triangulated polygon, with the beads that lie across each of its nodes."""
+    """The skeleton of a triangulated polygon, with the bead count of each node."""
     points, tails, across, _ = triangulation
     following, preceding = ints(len(points), 0), ints(len(points), 0)
     for h in range(len(tails)):
@@ -121,7 +121,7 @@ def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
 
 @no_nrt
 def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) -> None:
-    """Fills in the circumcentre of a triangle."""
+    """Set a node to the circumcentre of its triangle."""
     points, tails, _, _ = triangulation
     a, b, c = tails[3 * t], tails[3 * t + 1], tails[3 * t + 2]
     bx, by = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
@@ -137,7 +137,7 @@ def _put_at_circumcentre(triangulation: Triangulation, t: int, out: Skeleton) ->
 
 @no_nrt
 def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
-    """Puts a node into its triangle, where that has no circumcentre of use."""
+    """Set a node to the centroid of its triangle, if that has no usable circumcentre."""
     points, tails, _, _ = triangulation
     a, b, c = tails[3 * t], tails[3 * t + 1], tails[3 * t + 2]
     for axis in range(2):
@@ -148,8 +148,9 @@ def _put_in_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
 def _put_feet(
     points: Floats, tails: Ints, preceding: Ints, following: Ints, t: int, out: Skeleton
 ) -> tuple[int, int, float, float]:
-    """Fills in the feet of a node, each on the two sides that meet in a corner of its triangle. Returns the corners with the
-    nearest and the farthest foot, and how far these are."""
+    """Fill in the feet of a node, each on the two sides that meet in a corner of its triangle. Returns the corners with the
+    nearest and the farthest foot, and their distances.
+    """
     x, y = out.centres[t, 0], out.centres[t, 1]
     near, far, least, most = 3 * t, 3 * t, np.inf, -1.0
     for h in range(3 * t, 3 * t + 3):
@@ -170,9 +171,9 @@ def _put_feet(
 
 @no_nrt
 def _centre(out: Skeleton, ends: tuple[int, int], short: float, long: float) -> bool:
-    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other.
+    """Move a node between two opposite sides to their middle, since samples do not lie exactly opposite each other.
 
-    ends: the corners with the nearest and the farthest foot; short, long: how far these are. Returns whether it moved.
+    ends: the corners with the nearest and the farthest foot; short, long: their distances. Returns whether the node moved.
     """
     near, far = ends
     t = near // 3
@@ -187,7 +188,7 @@ def _centre(out: Skeleton, ends: tuple[int, int], short: float, long: float) -> 
 
 @no_nrt
 def _slope2(out: Skeleton, h: int) -> float:
-    """Square of how fast the radius changes along the axis across side h: cosine of half the angle between its two ribs."""
+    """Squared slope of the radius along the axis across side h: the cosine of half the angle between its two ribs, squared."""
     t, next_side = h // 3, after(h)
     ax, ay = out.feet[h, 0] - out.centres[t, 0], out.feet[h, 1] - out.centres[t, 1]
     bx, by = out.feet[next_side, 0] - out.centres[t, 0], out.feet[next_side, 1] - out.centres[t, 1]
@@ -197,13 +198,15 @@ def _slope2(out: Skeleton, h: int) -> float:
 
 @no_nrt
 def nominal(rule: Rule, level: int) -> float:
-    """Spacing of bead `level` where there is room."""
+    """Nominal spacing of bead `level`."""
     return rule.outer if level == 0 else rule.inner
 
 
 @no_nrt
 def bead_count(rule: Rule, radius: float) -> int:
-    """How many beads lie across a place with that half thickness; 2 walls + 2: all walls, and more than a bead between them."""
+    """Number of beads across a region with a given half thickness; 2 walls + 2 means all walls, and more than a bead between
+    them.
+    """
     if 2.0 * radius < FEATURE * rule.least:
         return 0
     rest, narrowest, widest = 2.0 * radius - rule.round, rule.least - rule.round, rule.most - rule.round
@@ -219,13 +222,13 @@ def bead_count(rule: Rule, radius: float) -> int:
 
 @no_nrt
 def loops_of(rule: Rule, count: int) -> int:
-    """How many of the beads run along both sides of a place."""
+    """The number of beads that run along both sides of a region."""
     return min(count // 2, rule.walls)
 
 
 @no_nrt
 def spacing_of(rule: Rule, count: int, radius: float, level: int) -> float:
-    """Spacing of loop `level` where `count` beads lie across a place with that half thickness."""
+    """Spacing of loop `level` with `count` beads across a region with a given half thickness."""
     own = nominal(rule, level)
     if level < loops_of(rule, count) - 1 or count == 2 * rule.walls + 2:
         return own
@@ -239,7 +242,7 @@ def spacing_of(rule: Rule, count: int, radius: float, level: int) -> float:
 
 @no_nrt
 def depth_of(rule: Rule, count: int, radius: float, level: int) -> float:
-    """How deep below the boundary the centreline of loop `level` runs."""
+    """Depth of the centreline of loop `level` below the boundary."""
     depth = 0.5 * rule.round
     for k in range(level):
         depth += spacing_of(rule, count, radius, k)
@@ -248,7 +251,7 @@ def depth_of(rule: Rule, count: int, radius: float, level: int) -> float:
 
 @kernel
 def middle_widths(skeleton: Skeleton, rule: Rule) -> Floats:
-    """(m,) widths of beads in the middle of places with an odd count."""
+    """(m,) width of the middle bead at nodes with an odd count."""
     widths = floats(len(skeleton.radii), 0.0)
     for t in range(len(widths)):
         rest = 2.0 * skeleton.radii[t]
@@ -259,7 +262,9 @@ def middle_widths(skeleton: Skeleton, rule: Rule) -> Floats:
 
 
 class _Pieces(NamedTuple):
-    """Connected nodes. of: (m,) piece of each node, -1: none; length: (p,) mm; low, high: (p,) least and largest radius."""
+    """Connected pieces of nodes. of: (m,) piece of each node, -1 for none; length: (p,) mm; low, high: (p,) least and greatest
+    radius.
+    """
 
     of: Indices
     length: Floats
@@ -269,7 +274,7 @@ class _Pieces(NamedTuple):
 
 @helper
 def _count_beads(skeleton: Skeleton, rule: Rule) -> None:
-    """Fills in the beads across each node; clears `central` where a limb of the axis is too short to have a count of its own."""
+    """Fill in the bead count of each node; clears `central` where a branch of the axis is too short for its own count."""
     _drop_stubs(skeleton, _pieces(skeleton, ints(len(skeleton.radii), 1)), STUB * rule.inner)
     for t in range(len(skeleton.radii)):
         skeleton.beads[t] = bead_count(rule, skeleton.radii[t])
@@ -308,7 +313,7 @@ def _pieces(skeleton: Skeleton, value: Ints) -> _Pieces:
 
 @helper
 def _drop_stubs(skeleton: Skeleton, pieces: _Pieces, shortest: float) -> None:
-    """Short pieces from which a thicker place goes on are none, nor is a mere point, the middle of something round."""
+    """Remove short pieces that lead to a thicker region, and mere points, the centres of round regions."""
     rises = flags(len(pieces.length))
     for h in range(len(skeleton.across)):
         piece, beyond = pieces.of[h // 3], skeleton.across[h] // 3
@@ -322,7 +327,7 @@ def _drop_stubs(skeleton: Skeleton, pieces: _Pieces, shortest: float) -> None:
 
 @helper
 def _smooth(skeleton: Skeleton, rule: Rule) -> bool:
-    """Short stretches take the count of the longest neighbour that suits their thickness; whether any did."""
+    """Give short stretches the count of the longest neighbour that suits their thickness; returns whether any changed."""
     beads, pieces = skeleton.beads, _pieces(skeleton, skeleton.beads)
     best, longest = longs(len(pieces.length), -1), floats(len(pieces.length), 0.0)
     for h in range(len(skeleton.across)):
@@ -344,7 +349,7 @@ def _smooth(skeleton: Skeleton, rule: Rule) -> bool:
 
 @no_nrt
 def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
-    """Whether a number of beads fits places between two half thicknesses with printable widths."""
+    """Whether a bead count fits a range of half thicknesses with printable widths."""
     if count == 0:
         return False
     rest_low, rest_high = 2.0 * low - rule.round, 2.0 * high - rule.round
@@ -358,9 +363,9 @@ def _suits(rule: Rule, count: int, low: float, high: float) -> bool:
 
 @helper
 def _spread(skeleton: Skeleton, rule: Rule) -> None:
-    """Corners and what lies between parts of the axis belong to the thickest place that they lead up to.
+    """Assign corners, and nodes between parts of the axis, to the thickest region to which they lead.
 
-    A round place has no axis, only a thickest point, and so no bead in the middle.
+    A round region has no axis, only a thickest point, and so no bead in the middle.
     """
     root, beads = _roots(skeleton), skeleton.beads
     for t in range(len(root)):
@@ -378,7 +383,7 @@ def _on_axis(skeleton: Skeleton, t: int) -> bool:
 
 @helper
 def _roots(skeleton: Skeleton) -> Indices:
-    """(m,) the node on the axis, or the thickest one, to which the way up from each node leads."""
+    """(m,) the node on the axis, or the thickest node, to which the ascent from each node leads."""
     across, radii = skeleton.across, skeleton.radii
     falling, root, hop = floats(len(radii), 0.0), longs(len(radii), -1), longs(len(radii), -1)
     for t in range(len(radii)):
@@ -395,7 +400,7 @@ def _roots(skeleton: Skeleton) -> Indices:
         first = root[t]
         if _on_axis(skeleton, first) or radii[t] < radii[first] - SAME_MM:
             continue
-        for h in range(3 * t, 3 * t + 3):  # of nodes as good as equal one comes first, and need not be the one that leads up
+        for h in range(3 * t, 3 * t + 3):  # among nearly equal nodes one comes first, which need not be the one that leads up
             beyond = across[h] // 3
             if across[h] < 0 or root[beyond] == first or (hop[first] >= 0 and not _on_axis(skeleton, root[beyond])):
                 continue

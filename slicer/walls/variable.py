@@ -1,23 +1,22 @@
-"""Variable walls: the beads of polygons, as many side by side as fit and as wide as the place (Kuipers et al. 2020).
+"""Variable walls: beads whose number and width follow the thickness of polygons (Kuipers et al. 2020).
 
-How thick a place is, is known on its skeleton, the middle line that is as far from the boundary on one side as on the other: half
-the thickness. That says how many beads lie across the place. The outer ones have their nominal width, the innermost one or two
-take what is left, so widths change with the thickness, and where they would get too wide or too narrow, the count does.
+The thickness is known on the skeleton (medial axis), whose points are equally far from the boundary on both sides: half the
+thickness. It determines the number of beads across. The outer ones have their nominal width, the innermost one or two take the
+rest, so widths change with the thickness, and where they would become too wide or too narrow, the count changes.
 
     thickness in spacings:    0       1.5        2.7      3.5        4.7     5.5     (while there are walls left to lay)
     beads across:             |   1   |     2     |    3   |     4     |   5   |
 
-         |( m )|                  1   a line m along the skeleton, as wide as the place
-        |( 0 )( 0 )|              2   both sides of loop 0, each half as wide as the place
+         |( m )|                  1   a line m along the skeleton, as wide as the polygon
+        |( 0 )( 0 )|              2   both sides of loop 0, each half as wide as the polygon
        |( 0 )( m )( 0 )|          3   loop 0 and a line between its sides
       |( 0 )( 1 )( 1 )( 0 )|      4   loops 0 and 1
 
-The boundary is sampled and triangulated, the circumcentres of the triangles are the skeleton, every node of which gets a count
-that does not flicker to and fro. Loops run round the places that have room for their level: the triangles there make areas of the
-triangulation, and walking round an area from corner to corner, a loop lies on the rib of each, at the depth of its level. Where
-the walk turns back at the axis, the loop crosses it: it is closed whatever the shape (this takes the place of the stitching of
-section 3.4). Lines run along the skeleton where the count is odd. Widths are smoothed where counts change, and lines that lie
-alone are kept inside the place.
+The boundary is sampled and triangulated; the circumcentres of the triangles are the skeleton, whose nodes get a count with
+hysteresis. Loops run around the regions with room for their level: the triangles there form areas of the triangulation, and going
+around an area from corner to corner, a loop lies on the rib of each, at the depth of its level. Where this path turns back at the
+axis, the loop crosses it: so it is closed for any shape (this replaces the stitching of section 3.4). Lines run along the
+skeleton where the count is odd. Widths are smoothed where counts change, and single lines are kept inside the polygon.
 """
 
 from collections import defaultdict
@@ -37,28 +36,29 @@ from slicer.geometry.polyline import Segment, along_mm, length_mm, nearest_share
 from slicer.geometry.triangulation import Triangulation, after, before, triangulate
 from slicer.walls.skeleton import FEATURE, Rule, Skeleton, depth_of, loops_of, middle_widths, skeleton_of, spacing_of
 
-MITRE = 100.0  # deg: round a sharper corner of a hole the loop is cut off
-SMOOTH = 0.05  # radians: no mitre for less
-PER_CORNER = 3  # points that a corner of a triangle gives at most: that on its rib, and two of a mitre
-WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
-REACH, DEPTH, SPACING = 4, 5, 6  # columns of a table of ribs, after foot and way
-SHORTEST = 1.0  # nominal spacings: a shorter loop is none
+MITRE = 100.0  # deg: the loop is cut off around a sharper corner of a hole
+SMOOTH = 0.05  # radians: smaller turns get no mitre
+PER_CORNER = 3  # greatest number of points per corner of a triangle: one on its rib, and two of a mitre
+WIDTH_STEP_MM = 0.004  # a point whose width is this close to the interpolated width is dropped
+REACH, DEPTH, SPACING = 4, 5, 6  # columns of a table of ribs, after foot and direction
+SHORTEST = 1.0  # nominal spacings: shorter loops are dropped
 TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
 STEP = 0.42  # nominal spacings: sampling of the boundary
-DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
-DASH = 0.25  # of its width, and as much longer
-SLACK_MM = 0.01  # by which a place may be narrower than the least bead
-SHORT = 0.05  # of its width: a dash is no shorter
-THIN = 4.0  # least widths: what is narrower than one and longer than this is a wall, what is shorter the tip of a corner
-LOOK_MM = 0.4  # so far from a fork the directions of its branches are looked at
-ABUT = 0.45  # of a bead's width: a line ends so far from the middle of a bead that runs across its end
+DOT = 0.3  # of its width: a shorter line is laid as a short thin segment
+DASH = 0.25  # of its width, by which that segment is thinner and longer
+SLACK_MM = 0.01  # by which a region may be narrower than the least bead
+SHORT = 0.05  # of its width: least length of such a segment
+THIN = 4.0  # least widths: a region narrower than one and longer than this is a wall, a shorter one the tip of a corner
+LOOK_MM = 0.4  # distance from a fork at which the directions of its branches are measured
+ABUT = 0.45  # of a bead's width: distance at which a line ends from the centre of a crossing bead
 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """course: (n, 3) x, y and width; level: 0 outermost; closed: it runs round, and its course ends where it begins.
+    """A wall. course: (n, 3) x, y and width; level: 0 is outermost; closed: whether it is a loop, whose course ends where it
+    begins.
 
-    free: sides on which no bead lies beside it; piece: the number of the polygons that it lies in.
+    free: number of sides without an adjacent bead; piece: number of its polygon.
     """
 
     course: Floats
@@ -69,12 +69,12 @@ class Wall:
 
     @property
     def points(self) -> Floats:
-        """(n, 2) mm, of one that runs round without its first repeated."""
+        """(n, 2) mm; of a loop without the repeated first point."""
         return np.ascontiguousarray(self.course[: -1 if self.closed else None, :2])
 
 
 def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
-    """All walls of polygons, each laid out by itself, piece after piece."""
+    """All walls of polygons, each laid out separately, piece by piece."""
     triangulation = triangulate([contours(piece) for piece in pieces], STEP * rule.inner)
     if triangulation is None:
         return []
@@ -88,16 +88,16 @@ def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
         if not kept:
             break
         walls += kept
-    middle = lines_along(skeleton, rule, piece_of) + _dots(skeleton, rule, piece_of)
+    middle = lines_along(skeleton, rule, piece_of) + _point_segments(skeleton, rule, piece_of)
     borders = {piece: index_edges(pieces[piece]) for piece in {wall.piece for wall in middle if wall.level == 0}}
     middle = [wall if wall.level else _clipped(wall, borders[wall.piece], rule) for wall in middle]
     walls += [replace(wall, course=wall.course[corners(wall.course)]) for wall in middle if len(wall.course) > 1]
-    laid = [wall for wall in walls if length_mm(wall.course) > 0.0]  # points may fall on each other when they are smoothed
+    laid = [wall for wall in walls if length_mm(wall.course) > 0.0]  # smoothing can make points coincide
     return sorted(laid, key=lambda wall: wall.piece)
 
 
 def _loop(ribs: Floats, rule: Rule, level: int) -> Floats:
-    """The course (n, 3) of a loop, its widths smoothed where counts change; empty where it is too short."""
+    """The course (n, 3) of a loop, its widths smoothed where counts change; empty if it is too short."""
     feet, ways, (reach, depth, spacing) = ribs[:, :2], ribs[:, 2:4], ribs[:, REACH:].T.copy()
     line, reach_mm = feet + ways * depth[:, None], TRANSITION * rule.inner
     if length_mm(close_loop(line)) < SHORTEST * rule.inner:
@@ -112,8 +112,8 @@ def _loop(ribs: Floats, rule: Rule, level: int) -> Floats:
 def trace_loops(triangulation: Triangulation, skeleton: Skeleton, rule: Rule, level: int) -> tuple[Floats, Indices, Indices]:
     """The loops of a level, 0 outermost, as the ribs that they cross.
 
-    Returns ribs (n, 7): x and y of the foot, what is added to it for every mm of depth, half the thickness, and depth and spacing
-    of the loop there; where each loop begins (k + 1,) and the first triangle of each (k,).
+    Returns ribs (n, 7): x and y of the foot, its direction per mm of depth, half the thickness, and depth and spacing of the loop
+    there; the start of each loop (k + 1,) and its first triangle (k,).
     """
     across, radii = triangulation.across, skeleton.radii
     depth, active, seen = floats(len(radii), 0.0), flags(len(radii)), flags(3 * len(radii))
@@ -159,7 +159,7 @@ def _add(ribs: Floats, n: int, foot: tuple[float, float], way: tuple[float, floa
 
 @no_nrt
 def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, ribs: Floats, n: int) -> int:
-    """Adds the place on the rib of a corner; in the tip of a triangle in a corner of the polygon, that on its bisector."""
+    """Add the rib of a corner; in a triangle at a corner of the polygon, the rib on its bisector."""
     points, tails, across, _ = triangulation
     x, y = skeleton.centres[h // 3, 0], skeleton.centres[h // 3, 1]
     fx, fy, reach = skeleton.feet[h, 0], skeleton.feet[h, 1], skeleton.radii[h // 3]
@@ -172,7 +172,7 @@ def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, ribs: Floats,
 
 @no_nrt
 def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], ribs: Floats, n: int) -> int:
-    """Adds the mitre between two ribs from one point, where the polygon's outline turns into it."""
+    """Add the mitre between two ribs from one point, where the polygon's outline turns into it."""
     points, tails, _, _ = triangulation
     a, b = corners
     p = tails[b]
@@ -194,13 +194,13 @@ def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, 
 
 @no_nrt
 def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, ribs: Floats, n: int) -> int:
-    """Adds the place where the loop crosses the axis on the way to a node beyond it."""
+    """Add the point at which the loop crosses the axis towards a node beyond it."""
     t, beyond = nodes
     here, there = skeleton.radii[t], skeleton.radii[beyond]
     x, y = skeleton.centres[beyond, 0], skeleton.centres[beyond, 1]
     back_x, back_y = skeleton.centres[t, 0] - x, skeleton.centres[t, 1] - y
     share = 0.0 if there >= depth else (depth - there) / (here - there)
-    if not room_there:  # halfway, but no farther than the loop is deep: a node may lie on the other side of a hall
+    if not room_there:  # halfway, but no farther than the loop is deep, since a node may lie on the other side of a wide region
         away = np.hypot(back_x, back_y)
         share = max(share, 0.5 if away <= 2.0 * depth else depth / away)
     return _add(ribs, n, (x + share * back_x, y + share * back_y), (0.0, 0.0), there + share * (here - there))
@@ -208,8 +208,9 @@ def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there:
 
 @kernel
 def _trace_chains(across: Ints, joined: Mask, degree: Indices) -> tuple[Indices, Indices]:
-    """The nodes of all chains between forks and ends, then of the rings, and where each chain begins (k + 1,). joined: (3 m,)
-    inner sides that a line runs across; degree: (m,) how many of them a node has."""
+    """The nodes of all chains between forks and ends, then of the rings, and the start of each chain (k + 1,). joined: (3 m,)
+    inner sides that a line crosses; degree: (m,) number of such sides of a node.
+    """
     done, nodes, starts = flags(len(across)), longs(2 * len(across) + 2, 0), longs(len(across) + 1, 0)
     n = count = 0
     for rings in range(2):
@@ -235,7 +236,9 @@ def _trace_chains(across: Ints, joined: Mask, degree: Indices) -> tuple[Indices,
 
 @kernel
 def _taken(skeleton: Skeleton, rule: Rule, nodes: Indices) -> Floats:
-    """(k,) mm that the loop takes of a line across whose end, a node, it runs, where more beads lie side by side beyond."""
+    """(k,) length, mm, by which a line is shortened at its end node because a loop crosses it there, where more beads lie side by
+    side beyond.
+    """
     taken: Floats = floats(len(nodes), 0.0)
     for k in range(len(nodes)):
         t = nodes[k]
@@ -251,8 +254,9 @@ def _taken(skeleton: Skeleton, rule: Rule, nodes: Indices) -> Floats:
 
 
 def lines_along(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]:
-    """The beads along the skeleton where the count is odd: at every fork the two lines joined that go on most straightly, the
-    ends cut back where a bead runs across them."""
+    """The beads along the skeleton where the count is odd: at every fork the two straightest lines are joined, and ends are cut
+    back where a bead crosses them.
+    """
     count, beyond = np.repeat(skeleton.beads, 3), skeleton.across // 3
     joined = (beyond >= 0) & skeleton.central & (count % 2 == 1) & (skeleton.beads[beyond] == count)
     degree = np.bincount(np.flatnonzero(joined) // 3, minlength=len(skeleton.beads))
@@ -281,8 +285,7 @@ def lines_along(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]
 
 
 def _join(courses: dict[int, Floats], ends: Indices, taken: Floats, node: int, members: list[int]) -> tuple[int, int]:
-    """Join the two lines at a fork that go on most straightly, the second to the first, and tell which; the others end beside
-    them."""
+    """Join the two straightest lines at a fork, the second to the first, and return them; the others end beside them."""
     for k in members:
         if ends[k, 0] != node:
             courses[k], ends[k], taken[k] = courses[k][::-1], ends[k, ::-1].copy(), taken[k, ::-1].copy()
@@ -296,7 +299,7 @@ def _join(courses: dict[int, Floats], ends: Indices, taken: Floats, node: int, m
 
 
 def _heading(course: Floats) -> Floats:
-    """Unit vector from the first point of a line to where it is a little later."""
+    """Unit vector from the first point of a line to a point a little further along."""
     steps = course[:, :2] - course[0, :2]
     away = np.hypot(*steps.T)
     far = int(np.argmax(away > LOOK_MM)) if (away > LOOK_MM).any() else len(away) - 1
@@ -305,7 +308,7 @@ def _heading(course: Floats) -> Floats:
 
 
 def _cut_back(course: Floats, taken_mm: float) -> Floats:
-    """A line without what is taken of its beginning."""
+    """A line shortened at its start."""
     if taken_mm <= 0.0 or not len(course):
         return course
     done = along_mm(course)
@@ -319,7 +322,7 @@ def _cut_back(course: Floats, taken_mm: float) -> Floats:
 
 
 def _along(line: Floats, level: int, closed: bool, rule: Rule, piece: int) -> Wall:
-    """The bead along a line (n, 3), its way and widths smoothed."""
+    """The bead along a line (n, 3), its path and widths smoothed."""
     course, reach_mm = np.empty_like(line), TRANSITION * rule.inner
     for column, reach in enumerate((0.5 * reach_mm, 0.5 * reach_mm, reach_mm)):
         course[:, column] = smoothed(line, np.ascontiguousarray(line[:, column]), reach, closed)
@@ -328,24 +331,24 @@ def _along(line: Floats, level: int, closed: bool, rule: Rule, piece: int) -> Wa
     else:
         course[[0, -1], :2] = line[[0, -1], :2]
         if level == 0 and length_mm(course) < DOT * course[:, 2].max():
-            return _dash(course[0, :2], course[-1, :2], float(course[:, 2].mean()), rule, piece)
+            return _short_segment(course[0, :2], course[-1, :2], float(course[:, 2].mean()), rule, piece)
     return Wall(course, level, closed, 2 * int(level == 0), piece)
 
 
-def _dots(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]:
-    """The dashes in round places with room for a single bead."""
+def _point_segments(skeleton: Skeleton, rule: Rule, piece_of: Indices) -> list[Wall]:
+    """Short segments for round regions with room for a single bead."""
     dashes, last = list[Wall](), np.full(2, np.inf)
     nodes = np.flatnonzero(skeleton.dots)
     for t in nodes[np.argsort(piece_of[nodes], kind="stable")].tolist():
         centre, radius = skeleton.centres[t], float(skeleton.radii[t])
         if float(np.hypot(*(centre - last))) > radius:
-            dashes.append(_dash(centre, centre, 2.0 * radius, rule, int(piece_of[t])))
+            dashes.append(_short_segment(centre, centre, 2.0 * radius, rule, int(piece_of[t])))
         last = centre
     return dashes
 
 
-def _dash(begin: Floats, end: Floats, width: float, rule: Rule, piece: int) -> Wall:
-    """A dash in place of a dot, which no printer draws: as much thinner as it is longer."""
+def _short_segment(begin: Floats, end: Floats, width: float, rule: Rule, piece: int) -> Wall:
+    """Replace a point bead by a short segment of the same volume, as much thinner as it is longer."""
     thinner = max((1.0 - DASH) * width, rule.least)
     step = end - begin
     length = float(np.hypot(*step))
@@ -356,10 +359,10 @@ def _dash(begin: Floats, end: Floats, width: float, rule: Rule, piece: int) -> W
 
 
 def _clipped(line: Wall, borders: EdgeIndex, rule: Rule) -> Wall:
-    """A line that lies alone no wider than its place, but for the least bead, without ends where not even that fits.
+    """Limit a single line to the width of its region, but not below the least bead, and drop ends where not even that fits.
 
-    Thin walls keep ends of theirs where it nearly fits: a wall that is now thicker and now thinner than the least bead would be
-    all gaps, each above another place than the one in the layer below.
+    Thin walls keep ends where the least bead nearly fits: a wall whose thickness varies around the least bead would otherwise be
+    full of gaps, at different positions in every layer.
     """
     course = line.course.copy()
     room = 2.0 * np.abs(depths(course, borders))
@@ -371,7 +374,7 @@ def _clipped(line: Wall, borders: EdgeIndex, rule: Rule) -> Wall:
 
 
 def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
-    """The first and the last point of a line (n, 2) with that much room that has its bead; last < first: none has."""
+    """The first and the last point of a line (n, 2) whose room fits a bead; last < first if there is none."""
     if room.min() > rule.least - SLACK_MM:
         return 0, len(room) - 1
     along = along_mm(points)
@@ -393,7 +396,7 @@ def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
 
 @kernel
 def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> Floats:
-    """(n,) means of values over all of a polyline (n, 2) within the reach on both sides; closed: it goes on from its end."""
+    """(n,) means of values along a polyline (n, 2) within a reach on both sides. closed: continue at the ends."""
     out, n = values.copy(), len(points)
     low, high = values[0], values[0]
     for k in range(n):
@@ -429,7 +432,7 @@ def smoothed(points: Floats, values: Floats, reach_mm: float, closed: bool) -> F
 
 @kernel
 def corners(course: Floats) -> Mask:
-    """(n,) points of a course (n, 3) that a wall keeps when it is simplified in place and in width (Douglas and Peucker 1973)."""
+    """(n,) points of a course (n, 3) that a wall keeps when it is simplified in position and width (Douglas and Peucker 1973)."""
     keep = flags(len(course))
     keep[0], keep[len(course) - 1] = True, True
     stack = [(0, len(course) - 1)]

@@ -1,8 +1,8 @@
-"""Walls: closed beads that follow the outline of a section, as wide as the place where it is narrow, and what fills gaps.
+"""Walls: closed beads that follow the outline of a section, with varying width where it is narrow, and gap fill.
 
-The outermost bead runs half its width inside the section, the next ones a bead spacing further in. An island that is nowhere
-narrower than its walls want gets walls of one width, which the variable ones would be too. Where less than two beads fit, no wall
-turns round.
+The outermost bead runs half its width inside the section, the next ones a bead spacing further in. An island with room for all
+its walls everywhere gets walls of one width, which variable walls would also have. Where fewer than two beads fit, no wall turns
+back.
 """
 
 from collections.abc import Sequence
@@ -21,31 +21,31 @@ from slicer.paths import Kind
 from slicer.walls.skeleton import ROOM, SPLIT, Rule
 from slicer.walls.variable import Wall, variable_walls
 
-WIDEST = 2.0  # diameters of the nozzle
-NARROW = 0.1  # of the line width: what walls leave that is narrower than that is a corner
-BLUNT = 1.1  # mitre limit that claims nothing beyond a corner
-LEAST_REST = 0.12  # of the line width: narrower places without a core behind them are corners, which walls run into
+WIDEST = 2.0  # nozzle diameters
+NARROW = 0.1  # of the line width: a narrower remainder beside walls is a corner
+BLUNT = 1.1  # mitre limit that adds nothing beyond a corner
+LEAST_REST = 0.12  # of the line width: narrower regions without a core behind them are corners, into which walls run
 LEAST_REST_MM2 = 1e-3  # smaller areas are rounding
-CORE_MM = 0.0125  # by which what the walls so far enclose is simplified
-SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
-RANK = 1  # behind walls, which have 0 and less
-LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
-MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which on two lie beside each other
+CORE_MM = 0.0125  # tolerance for simplifying the area inside the walls so far
+SLACK_MM = 0.01  # avoids slivers where the boundaries of an opening and its original coincide
+RANK = 1  # after walls, which have 0 and less
+LEAST_GAP = 0.12  # of the line width: a narrower gap between beads stays open, as with PrusaSlicer's classic walls
+MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which two lie side by side
 LEAST_TOP = 3.0  # line widths: narrower tops keep their walls, as in OrcaSlicer
-ROUNDS = 50  # beads round a place at most: as many as walls
-SPREAD = 0.25  # share by which the distance of points of fuzzy walls varies
-FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays even, or nothing would be left of it
-SHORTEST = 0.25  # of the line width: what is shorter is no bead
-FEW = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
-MOST_WIDER = 1.3  # times as wide as its place is a bead, at most, to make up for the tips of the place that it does not reach
+ROUNDS = 50  # greatest number of beads around a gap, counted like walls
+SPREAD = 0.25  # share by which the spacing of points of fuzzy walls varies
+FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays smooth
+SHORTEST = 0.25  # of the line width: shorter pieces are not beads
+FEW = 0.6  # of the line width squared: a smaller gap beside the lines stays open, since it is not worth the travel
+MOST_WIDER = 1.3  # greatest factor on a bead's width to compensate for the tips of its gap that it does not reach
 
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """loops[k]: centrelines of wall k from outside; varying: walls as wide as the place.
+    """Walls of a section. loops[k]: centrelines of wall k from outside; varying: walls of varying width.
 
-    inside: what the walls enclose, bounded half a spacing inside the innermost centreline; narrow: what of it walls of one width
-    leave that is narrower than two lines, across which those of a fill would only go to and fro.
+    inside: the area inside the walls, bounded half a spacing inside the innermost centreline; narrow: its parts beside walls of
+    one width that are narrower than two lines, where fill lines would only go back and forth.
     """
 
     loops: tuple[tuple[Floats, ...], ...]
@@ -55,7 +55,7 @@ class Walls:
 
 
 def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:
-    """Up to `count` walls of a section, of varying width where islands are narrow; 0: one where no line of a fill has room."""
+    """Up to `count` walls of a section, with varying width in narrow islands; for 0, one wall where no fill line has room."""
     rule = bead_rule(count, process, height_mm, nozzle_mm)
     thick, narrow = list[Polygons](), list[Polygons]()
     for island in islands(section):
@@ -71,7 +71,9 @@ def layer_walls(section: Polygons, count: int, process: Process, height_mm: floa
 def walls_under_tops(
     section: Polygons, above: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float
 ) -> Walls:
-    """Up to `count` walls of a section, but one round its tops, which are what `above` leaves bare for LEAST_TOP lines."""
+    """Up to `count` walls of a section, but one around its tops, the areas that `above` leaves uncovered over at least LEAST_TOP
+    lines.
+    """
     width = process.line_width_mm
     outer = layer_walls(section, min(count, 1), process, height_mm, nozzle_mm)
     top = opening(outer.inside - above, 0.5 * LEAST_TOP * width)
@@ -90,7 +92,7 @@ def walls_under_tops(
 
 
 def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) -> Rule:
-    """The rule for a number of walls of a process in layers of that height."""
+    """The bead rule for a number of walls of a process, in layers of a given height."""
     outer, inner = outer_wall_width_mm(process), process.line_width_mm
     taken, most = inner - spacing_mm(inner, height_mm), max(WIDEST * nozzle_mm, outer, inner)
     return Rule(count, outer - taken, inner - taken, taken, least_width_mm(nozzle_mm, height_mm), most)
@@ -107,12 +109,12 @@ def _is_thick(island: Polygons, rule: Rule) -> bool:
 
 
 def _wall_mm(rule: Rule) -> float:
-    """How deep all walls reach."""
+    """Depth of all walls together, mm."""
     return 0.5 * rule.round + rule.outer + (rule.walls - 1) * rule.inner if rule.walls else 0.0
 
 
 def walls(section: Polygons, count: int, process: Process, height_mm: float) -> Walls:
-    """Up to `count` walls of a section, of the widths of the process."""
+    """Up to `count` walls of a section, with the widths of the process."""
     outer, width = outer_wall_width_mm(process), process.line_width_mm
     spacing, least_mm = spacing_mm(width, height_mm), LEAST_REST * width
     area, levels = section, []
@@ -130,9 +132,10 @@ def walls(section: Polygons, count: int, process: Process, height_mm: float) -> 
 
 
 def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, behind_mm: float, least_mm: float) -> Polygons:
-    """The part of the centreline of an area's outermost bead that has the core behind it: all, where no rest is at least so wide.
+    """The part of the centreline of an area's outermost bead with the core behind it; all of it if no remainder is at least
+    least_mm wide.
 
-    half: reach of the bead outward from its centreline; behind: distance from the centreline to the core.
+    half_mm: extent of the bead outward from its centreline; behind_mm: distance from the centreline to the core.
     """
     if area.is_empty():
         return line
@@ -143,7 +146,7 @@ def _backed(area: Polygons, line: Polygons, core: Polygons, *, half_mm: float, b
 
 
 def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polygons:
-    """What the walls leave inside, where it has room for more than one bead."""
+    """The area inside the walls, where it has room for more than one bead."""
     inside = offset_round(section, -_wall_mm(rule)).simplify(CORE_MM)
     middle = [wall.course for wall in varying if wall.level == rule.walls]
     if middle:
@@ -153,9 +156,8 @@ def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polyg
 
 
 def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> list[Bead]:
-    """Beads that fill places between other beads, which cover their round sides, with their area times height of plastic.
-
-    They are as wide as the place. What is narrower than LEAST_GAP of a line stays empty.
+    """Gap fill: beads that fill gaps between other beads, whose round sides they cover, with area times height of plastic. They
+    are as wide as the gap. Gaps narrower than LEAST_GAP of a line stay open.
     """
     spacing, widest_mm = spacing_mm(line_width_mm, height_mm), MOST_WIDTH * line_width_mm
     rule = Rule(ROUNDS, MOST_WIDTH / SPLIT * spacing, spacing, 0.0, LEAST_GAP * line_width_mm, spacing_mm(widest_mm, height_mm))
@@ -173,9 +175,8 @@ def gaps(places: Sequence[Polygons], line_width_mm: float, height_mm: float) -> 
 
 
 def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float, few: float = FEW) -> Polygons:
-    """The part of an area that lines of that width leave uncovered, as far as plastic fits into it.
-
-    few: of the width squared; smaller places are left out.
+    """The part of an area that lines of a width leave uncovered, as far as plastic fits into it. few: of the width squared;
+    smaller gaps are left out.
     """
     few_mm2 = few * width_mm**2
     rest = area if area.area() < few_mm2 or not lines else area - strips(lines, 0.5 * width_mm)
@@ -183,11 +184,12 @@ def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float, few
 
 
 def fuzzy_walls(beads: Sequence[Bead], process: Process, joints: Sequence[Polygons], seed: tuple[int, int]) -> list[Bead]:
-    """The beads of a layer, begun at their seams, with fuzzy skin: walls whose points are moved at random hide the layers.
+    """The beads of a layer, started at their seams, with fuzzy skin: the points of walls are moved at random, which hides the
+    layers.
 
-    A wall is sampled anew at random distances, and every point moved across it, as PrusaSlicer does (PerimeterGenerator.cpp,
-    fuzzy_polygon). It begins and ends where it did, so seams stay hidden. joints: the areas of other parts in this layer and its
-    neighbours, beside which walls stay as they are; seed: numbers of part and layer, so that any number of cores gives the same.
+    A wall is resampled at random distances, and every point moved across it, as in PrusaSlicer (PerimeterGenerator.cpp,
+    fuzzy_polygon). Its ends stay, so seams stay hidden. joints: the areas of other parts in this layer and its neighbours, beside
+    which walls stay smooth; seed: numbers of part and layer, so that the result does not depend on the number of cores.
     """
     reach_mm = process.line_width_mm + process.fuzzy_skin_thickness_mm
     even = index_edges(offset(union(joints), reach_mm) if joints else Polygons())
@@ -200,7 +202,7 @@ def fuzzy_walls(beads: Sequence[Bead], process: Process, joints: Sequence[Polygo
 
 
 def _roughened(points: Floats, process: Process, even: EdgeIndex, seed: tuple[int, ...]) -> Floats:
-    """A wall (n, 2) sampled anew outside the area, given by its edges, in which it stays as it is."""
+    """A wall (n, 2) resampled outside the area, given by its edges, in which it stays smooth."""
     random, apart_mm = np.random.default_rng(seed), process.fuzzy_skin_point_distance_mm
     steps, along = np.diff(points, axis=0), along_mm(points)
     most = int(along[-1] / ((1.0 - SPREAD) * apart_mm)) + 1

@@ -41,7 +41,7 @@ def part(index: int, mesh: Mesh, base: Plane, pose: Pose, machine: Machine) -> P
 def squares(piece: Part, profile: Profile, layers: int = 3) -> SlicedPart:
     """Two squares a layer along the part's bounding box: the outer one reached with a retraction, the inner one without."""
     process, material = profile.process, profile.material
-    add_c = material.first_layer_nozzle_c - material.nozzle_c if piece.on_platform else 0.0
+    add_c = material.first_layer_nozzle_c - material.nozzle_c if piece.on_plate else 0.0
     lo, hi = piece.in_part_frame().bounds_mm
     layers_made = []
     for k in range(layers):

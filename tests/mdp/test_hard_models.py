@@ -70,7 +70,7 @@ def test_pieces_that_float_are_reported_and_voids_are_not() -> None:
     block = m3.Manifold.cube((10, 10, 10), True).translate((0, 0, 5))
     high, higher = (block.translate((20, 0, z)) for z in (12.5, 40))
     assert floating_pieces(mesh_of(block + high)) == (
-        "1 piece floats 12.5 mm above the platform, as its file has it, on nothing: only support can hold such, whatever is cut",
+        "1 piece floats 12.5 mm above the build plate in its file: only support can hold it, whatever is cut",
     )
     assert floating_pieces(mesh_of(block + high + higher))[0].startswith("2 pieces float at least 12.5 mm")
     assert floating_pieces(shapes.hollow()) == floating_pieces(mesh_of(block + block.translate((20, 0, 0)))) == ()

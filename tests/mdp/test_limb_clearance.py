@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mdp.clearance import Standing, passes_clear
+from mdp.clearance import StandingColumns, passes_clear
 from mdp.mesh import Floats
 from mdp.pose import level
 from profiles.profile import load
@@ -62,7 +62,7 @@ def test_large_limbs_are_compared_with_large_things_that_stand(gap: float, heigh
 
 @given(st.floats(0.0, 40.0), st.floats(0.0, 40.0), st.floats(0.5, 60.0), st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=2))
 def test_the_tip_asked_for_is_the_height_that_the_underside_leaves(x: float, y: float, top: float, place: list[float]) -> None:
-    standing = Standing.of(np.array([[x, y, top]]), 0.0, MACHINE)
+    standing = StandingColumns.of(np.array([[x, y, top]]), 0.0, MACHINE)
     across, along = x - place[0], y - place[1]
     radius = max(np.hypot(across, along) - 1.0, 0.0)
     radii, heights = np.array(MACHINE.head.silhouette_mm).T

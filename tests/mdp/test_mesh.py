@@ -18,5 +18,5 @@ def test_a_mesh_goes_to_trimesh_and_back_as_it_is() -> None:
 
 @pytest.mark.parametrize("faces", [tee().faces[1:], tee().faces[:, ::-1]])
 def test_what_is_open_or_inside_out_does_not_come_back(faces: np.ndarray) -> None:
-    with pytest.raises(MeshError, match="is no solid"):
+    with pytest.raises(MeshError, match="is not a solid"):
         Mesh.from_trimesh(trimesh.Trimesh(tee().vertices, faces, process=False))

@@ -123,13 +123,13 @@ def test_a_mesh_of_far_more_faces_than_a_print_shows_is_told_what_to_reduce() ->
         (
             "a.glb",
             1.5,
-            "its longest side is 1.5 mm: if its coordinates are metres with y up, as glTF has them, "
+            "its longest side is 1.5 mm: if its coordinates are metres with y up, as glTF specifies, "
             "give --set process.scale=1000 and --set process.rotate_deg=[90,0,0]",
         ),
         (
             "a.glb",
             6.0,
-            "its longest side is 6 mm: metres with y up, as glTF has them, would be more than 2000 mm; "
+            "its longest side is 6 mm: metres with y up, as glTF specifies, would be more than 2000 mm; "
             "for a tenth of that give --set process.scale=100 and --set process.rotate_deg=[90,0,0]",
         ),
     ],

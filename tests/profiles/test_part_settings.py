@@ -34,7 +34,7 @@ def test_what_is_given_later_stands_over_a_plan_s_settings() -> None:
         ("2:wals=4", "part 2: process.wals is not a key of a profile: did you mean process.walls?"),
         ("2:scale=2", "part 2: process.scale holds for the whole print: --set process.scale=... sets it"),
         ("2:brim_mm=2", "part 2: process.brim_mm holds for the whole print"),
-        ("1:interface_flow=1.1", "part 1: process.interface_flow holds for parts that stand on plastic"),
+        ("1:interface_flow=1.1", "part 1: process.interface_flow holds for parts that rest on plastic"),
         ("2:layer_height_mm=0.5", "part 2: process.layer_height_mm is 0.5: a 0.4 mm nozzle prints layers of at most 0.4 mm"),
         ("2:line_width_mm=0.23", "part 2: process.line_width_mm is 0.23: a 0.4 mm nozzle prints lines of 0.24 to 1 mm"),
     ],

@@ -60,7 +60,7 @@ def test_no_layer_is_stretched_beyond_the_nozzle() -> None:
 
 @given(st.floats(0.15, 30.0), st.floats(0.05, 0.3), st.floats(0.05, 0.3), st.floats(0.02, 0.15), st.floats(0, 0.9), st.booleans())
 def test_the_top_is_met_and_no_layer_is_too_high_or_too_thin(
-    top: float, layer: float, first: float, least: float, overlap: float, on_platform: bool
+    top: float, layer: float, first: float, least: float, overlap: float, on_plate: bool
 ) -> None:
     process = Process(
         name="test",
@@ -69,7 +69,7 @@ def test_the_top_is_met_and_no_layer_is_too_high_or_too_thin(
         least_layer_height_mm=least,
         interface_overlap=overlap,
     )
-    at = equal_heights(top, process, 0.3, first if on_platform else interface_height_mm(process))
+    at = equal_heights(top, process, 0.3, first if on_plate else interface_height_mm(process))
     assert at.tip_mm[-1] == pytest.approx(top)
     assert at.height_mm.min() >= min(least, layer, first) - 1e-9
     assert at.height_mm.max() <= 0.3 + 1e-9
@@ -95,14 +95,14 @@ def test_neither_a_pedestal_nor_what_stands_on_it_has_a_layer_too_thin(pedestal:
     st.booleans(),
 )
 def test_a_layer_ends_in_every_plane_from_which_a_limb_is_printed(
-    planes_mm: list[float], layer_mm: float, cusp_mm: float, on_platform: bool
+    planes_mm: list[float], layer_mm: float, cusp_mm: float, on_plate: bool
 ) -> None:
     settings = [f"process.layer_height_mm={layer_mm}", "process.first_layer_height_mm=0.3", f"process.adaptive_cusp_mm={cusp_mm}"]
     profile = load(settings=settings)
     least, apart = profile.process.least_layer_height_mm, list[float]()
     for z in sorted(planes_mm):
         apart += [z] if not apart or z - apart[-1] >= least else []
-    heights = layer_heights(box(9, 9, 30), profile, on_platform, limb_planes_mm=apart)
+    heights = layer_heights(box(9, 9, 30), profile, on_plate, limb_planes_mm=apart)
     for z in [*apart, 30.0]:
         assert np.abs(heights.tip_mm - z).min() < 1e-9
     assert heights.bottom_mm[1:] == pytest.approx(heights.tip_mm[:-1])

@@ -26,7 +26,7 @@ from machine.planning.plan import plan
 from mdp.mesh import Mesh
 from mdp.model_file import locate
 from mdp.overhang import risky_upright, threshold
-from mdp.ranking.candidates import bounds_of, directions, platform_disc
+from mdp.ranking.candidates import bounds_of, directions, plate_disc
 from mdp.search.search import SearchRequest, decompose
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
@@ -75,7 +75,7 @@ def print_in_stages(model: str, profile: Profile) -> list[str]:
 
 def evaluate(mesh: Mesh, profile: Profile) -> None:
     """Evaluate every plane of every direction once, as a search begins."""
-    limits = bounds_of(directions(profile.search), mesh, profile, platform_disc(mesh, profile.search))
+    limits = bounds_of(directions(profile.search), mesh, profile, plate_disc(mesh, profile.search))
     angle_deg, step_mm = profile.process.self_supporting_angle_deg, profile.search.offset_step_mm
     remainder = Remainder(mesh, risky_upright(mesh, angle_deg, profile.search.count_platform_faces))
     gains(remainder, limits.directions, step_mm, threshold(angle_deg))

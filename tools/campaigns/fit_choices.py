@@ -26,7 +26,7 @@ import numpy as np
 from machine.pipeline.choice import pricing
 from mdp.cost.cost import weight_of_stairs
 from mdp.cost.footing import BuildPlate
-from mdp.directions.orientation import diameter_mm, standing_still
+from mdp.directions.orientation import diameter_mm, set_on_plate
 from mdp.directions.revolution import find_revolution
 from mdp.joint import is_sound
 from mdp.mesh import Floats
@@ -116,11 +116,11 @@ def read_verdicts(file: Path) -> dict[str, dict[str, Any]]:
 
 def measure(entry: dict[str, Any], file: Path, profile: Profile) -> None:
     """Put into an entry what each of its alternatives costs."""
-    mesh = standing_still(scaled(read_mesh(file, 1.0, (0.0, 0.0, 0.0))[0], entry["size_mm"]), np.eye(3))
+    mesh = set_on_plate(scaled(read_mesh(file, 1.0, (0.0, 0.0, 0.0))[0], entry["size_mm"]), np.eye(3))
     if mesh_sha256(mesh) != entry["sha256"]:
         raise SystemExit(f"{entry['sheet']}: {file} is not the model that was offered")
     entry["surface_mm2"], entry["diameter_mm"] = round(float(mesh.areas_mm2.sum()), 3), round(diameter_mm(mesh), 3)
-    problem_of = cache(lambda turn: Problem(standing_still(mesh, np.array(turn)), profile))
+    problem_of = cache(lambda turn: Problem(set_on_plate(mesh, np.array(turn)), profile))
     for alternative in entry["alternatives"].values():
         alternative["figures"] = figures(alternative, profile, problem_of)
         alternative["orientation"] = np.round(alternative["orientation"], DIGITS).tolist()

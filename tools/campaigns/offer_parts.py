@@ -28,7 +28,7 @@ from machine.pipeline.raster import Image, camera, draw
 from machine.view.parts import part_colours, residual_faces
 from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.directions.orientation import resting_orientations, standing_still
+from mdp.directions.orientation import resting_orientations, set_on_plate
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.read import read_mesh
@@ -104,7 +104,7 @@ def sheet_name(row: dict[str, str]) -> str:
 def sheet(row: dict[str, str], folder: Path, profile: Profile) -> dict[str, Any]:
     """Draw a model's sheet; its alternatives as plans, by the letters on the sheet."""
     mesh = scaled(read_mesh(Path(row["file"]), 1.0, (0.0, 0.0, 0.0))[0], float(row["size_mm"]))
-    mesh = standing_still(mesh, np.eye(3))
+    mesh = set_on_plate(mesh, np.eye(3))
     offers, sha = offers_of(mesh, profile), mesh_sha256(mesh)
     random.Random(sha).shuffle(offers)
     cut = [decomposed(mesh, offer, profile) for offer in offers]
@@ -146,7 +146,7 @@ def distinct(known: Sequence[Offer], offers: Sequence[Offer], size_mm: float, mo
 
 def cut_rows(mesh: Mesh, rotation: Floats, profile: Profile, settings: Sequence[dict[str, float]]) -> list[Offer]:
     """Rows of the fronts of a model turned so, one front for each of the settings, those of two parts first."""
-    turned, rows = standing_still(mesh, rotation), list[FrontRow]()
+    turned, rows = set_on_plate(mesh, rotation), list[FrontRow]()
     narrow = {"beam_width": 1, "directions": profile.search.directions // 2}
     for seams in settings:
         own = profile.model_copy(update={"search": profile.search.model_copy(update=narrow | seams)})
@@ -157,7 +157,7 @@ def cut_rows(mesh: Mesh, rotation: Floats, profile: Profile, settings: Sequence[
 def decomposed(mesh: Mesh, offer: Offer, profile: Profile) -> Decomposition:
     """A model laid down and cut as it is offered."""
     plan = PlanFile("", parts=tuple(map(PlannedPart.of, reversed(offer.planes))))
-    return cut_by_plan(standing_still(mesh, offer.rotation), "", profile, SearchRequest(plan=plan))
+    return cut_by_plan(set_on_plate(mesh, offer.rotation), "", profile, SearchRequest(plan=plan))
 
 
 def as_plan(offer: Offer) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from mdp.search.search import SearchRequest, decompose
 from profiles.profile import Profile, load
 from slicer.overhangs import find_overhangs
 from slicer.sectioning import section_part
-from slicer.support.handed_down import plan_supports
+from slicer.support.from_earlier_part import plan_supports
 from slicer.support.support import Supports, explain, own_supports
 from tools.checks.harness import files, mesh_of, options_of, table
 

@@ -16,7 +16,7 @@ from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
 from mdp.overhang import UP
 from mdp.pose import about
-from mdp.search.front import Weights, choose, pays
+from mdp.search.front import Weights, choose, pareto_optimal
 from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
 from profiles.effect import effect_of_change
@@ -271,7 +271,7 @@ def with_rows(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
 
 def rows_to_price(bench: Bench) -> list[int]:
     """Places of the rows of the front whose time and plastic are shown."""
-    return [row for row, good in enumerate(pays(bench.rows)) if good]
+    return [row for row, good in enumerate(pareto_optimal(bench.rows)) if good]
 
 
 def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:

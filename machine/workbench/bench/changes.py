@@ -17,7 +17,7 @@ from machine.planning.stops import parse_stops
 from machine.workbench.bench.bench import Bench, laid_down, with_cuts, with_rotation
 from machine.workbench.bench.part_settings import with_part_setting, without_part_settings
 from machine.workbench.bench.values import Direction, Mm, Point, Rotation, check_number
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import set_on_plate
 from mdp.mesh import Floats, Mesh
 from mdp.pose import about
 from mdp.search.plan_file import PlannedPart, planned_parts
@@ -254,7 +254,7 @@ def _with(zones: Zones, kind: str, several: tuple[AnyZone, ...]) -> Zones:
 def workpiece_mesh(bench: Bench) -> Mesh:
     """The model as it stands on the platform or a pedestal, in the workpiece frame."""
     assert bench.model is not None
-    standing = standing_still(bench.model.mesh(), bench.turned)
+    standing = set_on_plate(bench.model.mesh(), bench.turned)
     lift_mm = bench.profile.search.pedestal_mm
     return standing.transform(np.eye(3), (0.0, 0.0, lift_mm)) if lift_mm > 0.0 else standing
 

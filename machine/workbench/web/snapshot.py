@@ -17,7 +17,7 @@ from machine.workbench.session.commands import Need, lacking
 from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session
 from mdp.joint import Joint
-from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
+from mdp.overhang import PLATE_TOLERANCE_MM, threshold
 from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import MeshVolume, Modifier, Zone
@@ -158,7 +158,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "pedestal_mm": bench.profile.search.pedestal_mm,
         "pedestal": pedestal_key(bench, standing),
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
-        "platform_mm": PLATFORM_TOLERANCE_MM,
+        "platform_mm": PLATE_TOLERANCE_MM,
         "resting": [asdict(rest) for rest in session.resting.result or ()],
         "search": None if search is None else {"text": search.text, "planes": planes},
         **slices_state(session),

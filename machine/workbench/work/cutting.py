@@ -28,7 +28,7 @@ from machine.workbench.bench.changes import Cuts
 from machine.workbench.work.folders import work_of
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, FrontRow, Part
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import set_on_plate
 from mdp.joint import is_sound, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
@@ -195,7 +195,7 @@ def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
     """The mesh as it is cut, turned as the plan says or else as the bench does."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
-    return standing_still(bench.model.mesh(), turned)
+    return set_on_plate(bench.model.mesh(), turned)
 
 
 def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:

@@ -70,7 +70,7 @@ def test_the_dry_run_finds_nothing_and_the_plastic_is_the_lifted_model_s() -> No
     program, profile = printed(RAFT), coarse(RAFT)
     assert program.decomposition is not None
     assert program.decomposition.mesh.bounds_mm[0, 2] == pytest.approx(LIFT_MM)
-    assert [part.on_platform for part in program.decomposition.parts] == [True, False]
+    assert [part.on_plate for part in program.decomposition.parts] == [True, False]
     agreed, run = agreement(program.run, program.decomposition.mesh, profile)
     assert agreed.outside < 0.01
     assert agreed.shift_mm < 0.05
@@ -152,7 +152,7 @@ def test_what_is_lifted_and_lowered_is_what_it_was() -> None:
     profile = coarse()
     model = cut_by_plan(tee(), "T", profile, SearchRequest(plan=ARM))
     back = standing_at(standing_at(model, (0.0, 0.0), 0.75), (0.0, 0.0), -0.75)
-    assert [part.on_platform for part in back.parts] == [True, False]
+    assert [part.on_plate for part in back.parts] == [True, False]
     assert back.mesh.vertices == pytest.approx(model.mesh.vertices)
     assert back.parts[1].base.offset_mm == pytest.approx(model.parts[1].base.offset_mm)
 

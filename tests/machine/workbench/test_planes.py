@@ -21,7 +21,7 @@ from machine.workbench.bench.bench import (
 )
 from machine.workbench.bench.changes import workpiece_mesh
 from machine.workbench.work.models import named_faces
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import set_on_plate
 from mdp.pose import about, turned_by, unit
 from mdp.search.plan_file import PlannedPart
 from mdp.search.plan_reading import read_plan
@@ -155,7 +155,7 @@ def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> N
 
 def test_marks_go_along_with_a_model_that_is_read_turned_otherwise_and_larger() -> None:
     turn = turned_by((0.0, 90.0, 0.0))
-    again = model(mesh=standing_still(tee(), turn).transform(2.0 * np.eye(3)))
+    again = model(mesh=set_on_plate(tee(), turn).transform(2.0 * np.eye(3)))
     cut = with_profile(replace(MARKED, cuts=(PlannedPart((0.6, 0.0, 0.8), 20.0),)), MARKED.given, LIFTED)
     turned = with_model_turned_as_read(with_rotation(cut, about(unit([1.0, 2.0, 0.5]), 0.7).tolist()), again, turn, 2.0)
     stood = with_model_turned_as_read(cut, again, turn, 2.0)

@@ -228,7 +228,7 @@ def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refus
     with bench.line() as page:
         bench.send(folder / "tee.stl")
         assert bench.send(folder / "plan.toml")[0] == 422
-        assert "plan plan.toml was made of another model" in page.until(lambda state: state["problem"])["problem"]
+        assert "plan plan.toml was made for another model" in page.until(lambda state: state["problem"])["problem"]
         bench.send(folder / "other.stl")
         assert bench.send(folder / "plan.toml")[0] == 200
         assert page.until(lambda state: state["parts"])["undo"] == "open plan.toml"

@@ -45,7 +45,7 @@ def test_where_there_is_no_table_there_are_no_rows(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("name,size\na,1\n", "its columns are not name, count, mm"),
-        ("name,count,mm\na,many,1.0\nb,1,1.0\n", "line 2 is not of this table"),
+        ("name,count,mm\na,many,1.0\nb,1,1.0\n", "line 2 does not fit the columns of this table"),
     ],
 )
 def test_a_damaged_table_is_refused(tmp_path: Path, text: str, message: str) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mdp.cost.footing import BLUNT, BuildPlate, Footing
 from mdp.cut import mesh_of
 from mdp.mesh import Floats
-from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.overhang import PLATE_TOLERANCE_MM
 from profiles.profile import load
 
 UPRIGHT = np.eye(3)
@@ -134,7 +134,7 @@ def test_bases_are_the_sections_that_manifold3d_cuts(seed: int) -> None:
     turn *= np.sign(np.linalg.det(turn))
     mesh, turned = mesh_of(ring), ring.transform(np.column_stack([turn, np.zeros(3)]))
     low, shadow_mm2 = turned.bounding_box()[2], 0.5 * np.abs(mesh.normals @ turn[2]) @ mesh.areas_mm2
-    heights_mm = (0.5 * PLATFORM_TOLERANCE_MM, BLUNT * BuildPlate.under(mesh, load()).diameter_mm)
+    heights_mm = (0.5 * PLATE_TOLERANCE_MM, BLUNT * BuildPlate.under(mesh, load()).diameter_mm)
     touching_mm2, base_mm2 = (turned.slice(low + above_mm).area() for above_mm in heights_mm)
     footing = footing_of(ring, turn)
     assert footing.touching_share * shadow_mm2 == pytest.approx(touching_mm2, abs=1e-6)

@@ -127,8 +127,8 @@ def test_a_damaged_step_file_ends_in_a_sentence_and_nothing_is_said_beside_it(
 ) -> None:
     pytest.importorskip("cascadio")
     half = step_box((20, 30, 40)).encode()[:3000]
-    assert refusal(save(tmp_path / "half.stp", half)) == "is no STEP file, or damaged"
-    assert refusal(save(tmp_path / "box.iges", b"x")) == "is no IGES file, or damaged"
+    assert refusal(save(tmp_path / "half.stp", half)) == "is not a valid STEP file"
+    assert refusal(save(tmp_path / "box.iges", b"x")) == "is not a valid IGES file"
     assert capfd.readouterr() == ("", "")
 
 

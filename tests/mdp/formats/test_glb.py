@@ -74,7 +74,7 @@ def test_without_a_scene_the_nodes_that_no_other_holds_are_placed(tmp_path: Path
         ({"scene": 5}, "is damaged: it names 5 of its scenes, there are 1 (counted from 0)"),
         ({"nodes": [{"mesh": -1}]}, "is damaged: it names -1 of its meshes, there are 1 (counted from 0)"),
         ({"nodes": [{"mesh": 0, "matrix": [1, 2]}]}, "is damaged: matrix of a node is [1, 2], it must be 16 finite numbers"),
-        ({"meshes": 5}, "is damaged: meshes of its glTF document is no list"),
+        ({"meshes": 5}, "is damaged: meshes of its glTF document is not a list"),
         ({"meshes": [{"primitives": [{"attributes": {}}]}]}, "is damaged: a mesh has no vertices (POSITION)"),
         (
             {"accessors": [{"componentType": 7, "bufferView": 0}] * 2},
@@ -96,7 +96,7 @@ def test_a_scene_that_cannot_be_read_is_refused(tmp_path: Path, changes: dict[st
 
 def test_a_document_that_is_no_json_is_refused_with_the_place(tmp_path: Path) -> None:
     sentence = refusal(save(tmp_path / "a.glb", _edited().replace(b'"asset"', b'{asset"', 1)))
-    assert sentence == "is damaged: its glTF document is no JSON from character 2 on"
+    assert sentence == "is damaged: its glTF document is not valid JSON at character 2"
 
 
 def test_a_file_may_require_extensions_of_looks_and_whole_numbers_for_positions(tmp_path: Path) -> None:

@@ -192,7 +192,7 @@ def test_shares_are_those_of_the_triangles_that_a_brush_has_made(seed: int) -> N
         ("2C", {5: 1.0}),  # 3 more than the digit before
         ("041", {1: 0.5, 0: 0.5}),  # one side halved: the second half is painted
         ("0842", {1: 0.5, 2: 0.25, 0: 0.25}),  # two sides halved: the last of the three is half of it
-        ("44", "1 of the digits belong to nothing"),
+        ("44", "1 digit left over"),
         ("41", "digits are missing"),
         ("C", "digits are missing"),
         ("4G", "invalid literal"),

@@ -144,7 +144,7 @@ def test_what_programs_write_otherwise_is_read_the_same(tmp_path: Path, changes:
     [
         ({"<model ": f'<model {SLICE} requiredextensions="p s" '}, "needs the 3MF extension slice, which is not read"),
         ({"<model ": '<model requiredextensions="acme" '}, "needs the 3MF extension acme, which is not read"),
-        ({"<model ": "<html ", "</model>": "</html>"}, "its part 3D/a.model is no 3MF model"),
+        ({"<model ": "<html ", "</model>": "</html>"}, "its part 3D/a.model is not a 3MF model"),
         ({"</model>": ""}, "its part 3D/a.model is missing or malformed"),
     ],
 )

@@ -109,7 +109,7 @@ def test_a_list_is_on_the_side_of_its_source(tmp_path: Path) -> None:
         ({"version": np.array(1)}, "is of version 1, only 2 is understood"),
         ({"columns": np.array(["M1", "M2", "M3", "M4", "M5", "x"])}, "has no feature M6; it has M1, M2, M3, M4, M5, x"),
         ({"features": np.full((4, 6), np.inf)}, "feature M1 of a candidate of model kitten.0.x is inf"),
-        ({"features": np.zeros((3, 6))}, "its features, stages and outcomes are not of the same candidates"),
+        ({"features": np.zeros((3, 6))}, "its features, stages and outcomes differ in length"),
     ],
 )
 def test_a_record_that_cannot_be_learnt_from_is_refused(tmp_path: Path, others: dict[str, object], sentence: str) -> None:

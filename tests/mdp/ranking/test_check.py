@@ -12,7 +12,7 @@ from mdp.directions.unit_vectors import spread
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
-from mdp.ranking.candidates import REASONS, Bounds, Reason, bounds_of, check, count_rejected, platform_disc, score_candidates
+from mdp.ranking.candidates import REASONS, Bounds, Reason, bounds_of, check, count_rejected, plate_disc, score_candidates
 from mdp.sweep.sweep import Remainder
 from profiles.profile import load
 from tests.mdp.solids import random_solid
@@ -24,7 +24,7 @@ TERMS = CostTerms(45.0, False)
 
 
 def limits_for(mesh: Mesh, count: int) -> Bounds:
-    return bounds_of(spread(count, 0.15)[1:], mesh, PROFILE, platform_disc(mesh, SEARCH))
+    return bounds_of(spread(count, 0.15)[1:], mesh, PROFILE, plate_disc(mesh, SEARCH))
 
 
 def reasons(mesh: Mesh, limits: Bounds, row: int, offset_mm: float) -> list[Reason]:

@@ -14,9 +14,9 @@ from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
 from mdp.ranking.candidates import Bounds, Feasibility, Reason, ScoredCandidates
 from mdp.ranking.ranking import (
-    EACH,
-    LISTED,
+    PER_TRADE_OFF,
     RESIDUAL_THRESHOLDS,
+    SHORTLIST_TRADE_OFFS,
     CandidateTable,
     Model,
     RankedCandidate,
@@ -154,7 +154,7 @@ def test_a_shortlist_has_the_first_few_by_each_trade_off_once(seed: int) -> None
     own = [drawn(seed), drawn(seed + 1)]
     expected = []
     for number, one in enumerate(own):
-        rows = [row for weight in LISTED for _, row in by_trade_off([one], weight)[:EACH]]
+        rows = [row for weight in SHORTLIST_TRADE_OFFS for _, row in by_trade_off([one], weight)[:PER_TRADE_OFF]]
         expected += [(number, row) for row in dict.fromkeys(rows)]
     tables = [table_of(one) for one in own]
     assert places(tables, list(shortlist(tables, BOUND_MM2))) == expected

@@ -11,7 +11,7 @@ import pytest
 from mdp.mesh import Floats
 from mdp.ranking.features import CHECKED, COLUMNS, features
 from mdp.ranking.ranker import LearnedRanker, ranker_named, shipped
-from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, shortlist
+from mdp.ranking.ranking import PER_TRADE_OFF, SHORTLIST_TRADE_OFFS, RankedCandidate, rank_classic, shortlist
 from mdp.search.beam import Beam, search_as_published
 from mdp.search.problem import Problem
 from mdp.search.search import SearchRequest, decompose
@@ -61,7 +61,7 @@ def test_a_shortlist_holds_feasible_candidates_once_few_of_a_kind_and_none_that_
     problem = _problem(shape="ball")
     table = problem.table(problem.root, described=True)
     listed = list(shortlist([table], np.inf))
-    assert len({each.row for each in listed}) == len(listed) <= len(LISTED) * EACH
+    assert len({each.row for each in listed}) == len(listed) <= len(SHORTLIST_TRADE_OFFS) * PER_TRADE_OFF
     assert all(table.feasible(each.row) for each in listed)
     residual = sorted(float(table.scored.residual_mm2[each.row]) for each in listed)
     assert len(list(shortlist([table], residual[0]))) == 0
@@ -159,7 +159,12 @@ def test_a_name_that_is_no_ranker_is_told_with_those_that_are() -> None:
 
 @pytest.mark.parametrize(
     ("content", "sentence"),
-    [(None, "there is no such file"), (b"", "is no ONNX file"), (b"solid", "is no ONNX file"), (5000, "is no ONNX file")],
+    [
+        (None, "there is no such file"),
+        (b"", "is not an ONNX file"),
+        (b"solid", "is not an ONNX file"),
+        (5000, "is not an ONNX file"),
+    ],
 )
 def test_a_missing_a_foreign_and_a_truncated_file_are_a_sentence(
     tmp_path: Path, content: bytes | int | None, sentence: str

@@ -131,9 +131,9 @@ def test_a_plane_by_hand_may_gain_nothing_and_make_a_small_part() -> None:
 
 def test_a_plan_of_another_model_is_refused() -> None:
     plan = plan_of(decompose(shapes.tee(), "tee.stl", _profile()))
-    with pytest.raises(PlanError, match=r"was made of another model: tee.stl is not new.stl as it is read now"):
+    with pytest.raises(PlanError, match=r"was made for another model: tee.stl is not new.stl as it is read now"):
         cut_by_plan(shapes.tee(arm=41.0), "new.stl", _profile(), SearchRequest(plan=plan))
-    with pytest.raises(PlanError, match="was made of another model"):
+    with pytest.raises(PlanError, match="was made for another model"):
         decompose(shapes.tee(arm=41.0), "new.stl", _profile(), SearchRequest(plan=plan))
     assert (
         len(cut_by_plan(shapes.tee(arm=40.5), "new.stl", _profile(), SearchRequest(plan=replace(plan, sha256=""))).parts)
@@ -156,7 +156,7 @@ def test_planes_in_an_impossible_order_are_refused() -> None:
 
 def test_a_plane_that_cuts_the_platform_is_refused() -> None:
     sentence = _refusal(shapes.box(), (LEANING, 2.0))
-    assert "part 2 cannot be cut off: the plane would cut the platform (criterion III)" in sentence
+    assert "part 2 cannot be cut off: the plane would cut the build plate (criterion III)" in sentence
     assert "offset_mm must be at least 8.5" in sentence  # 0.6 times 10 sqrt 2
 
 
@@ -164,7 +164,7 @@ def test_a_plane_that_lets_something_float_is_refused() -> None:
     post, beam = m3.Manifold.cube((8, 8, 40)), m3.Manifold.cube((60, 8, 8)).translate((-52, 0, 32))
     gallows = shapes.standing(post + beam + m3.Manifold.cube((8, 8, 32)).translate((-52, 0, 4)))
     sentence = _refusal(gallows, (LEANING, 22.0), profile=_profile(FREE))
-    assert "part 2 cannot be cut off: what remains would not stand on the platform (criterion II)" in sentence
+    assert "part 2 cannot be cut off: the remainder would not stand on the build plate (criterion II)" in sentence
 
 
 def test_a_direction_out_of_reach_is_refused() -> None:
@@ -202,7 +202,7 @@ def test_an_offset_next_to_nothing_is_refused() -> None:
 
 
 def test_a_plan_with_a_plane_left_open_is_sent_to_the_search() -> None:
-    assert "part 2 has no offset_mm: decompose --planes mine.toml has it found" in _refusal(shapes.tee(), (LEANING, None))
+    assert "part 2 has no offset_mm: decompose --planes mine.toml finds it" in _refusal(shapes.tee(), (LEANING, None))
     assert "part 2 has no normal" in _refusal(shapes.tee(), (None, 20.0))
 
 
@@ -242,7 +242,8 @@ def test_planes_by_hand_stay_and_the_others_are_found() -> None:
     assert both.reduction > 0.9
     assert [row.parts for row in both.front] == list(range(2, len(both.front) + 2))
     again = decompose(arms, "shape", profile, SearchRequest(plan=replace(by_hand, front=plan_of(both).front)))
-    kept = "the [[front]] of mine.toml is not kept: planes by hand have the others found anew, for every number of parts"
+    sentence = "with planes by hand, the search finds the other planes again for every number of parts"
+    kept = f"the [[front]] of mine.toml is not kept: {sentence}"
     assert again.notes == (*both.notes, kept)
     with pytest.raises(PlanError, match=r"--parts 1: the planes by hand of mine.toml alone make 2 parts"):
         decompose(arms, "shape", profile, SearchRequest(plan=by_hand, parts=1))
@@ -326,7 +327,7 @@ def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
 def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:
     zones = Zones(no_seam=(Zone((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),))
     found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), SearchRequest(plan=_by_hand(zones=zones)))
-    sentence = "[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)"
+    sentence = "[[no_seam]] has no effect on cuts, since seams cost nothing (search.objective, search.seam_mm)"
     assert sentence in map(terminal_words, found.notes)
 
 

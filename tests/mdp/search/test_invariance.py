@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdp.decomposition import Decomposition
-from mdp.directions.orientation import standing_still
+from mdp.directions.orientation import set_on_plate
 from mdp.mesh import Mesh
 from mdp.overhang import UP
 from mdp.pose import about
@@ -27,7 +27,7 @@ def cut(mesh: Mesh, parts: int, *keys: str) -> Decomposition:
 
 @pytest.mark.parametrize(("mesh", "parts"), MODELS)
 def test_a_model_costs_the_same_within_2_percent_however_it_is_turned_about_z(mesh: Mesh, parts: int) -> None:
-    costs = [cut(standing_still(mesh, about(UP, np.radians(deg))), parts).cost_mm2 for deg in (0.0, 37.0, 211.0)]
+    costs = [cut(set_on_plate(mesh, about(UP, np.radians(deg))), parts).cost_mm2 for deg in (0.0, 37.0, 211.0)]
     assert costs[1:] == pytest.approx([costs[0]] * 2, rel=ELSEWHERE)
 
 

@@ -11,7 +11,7 @@ import pytest
 from mdp.cost.footing import Footing
 from mdp.cut import mesh_of
 from mdp.decomposition import Decomposition, FrontRow, Part
-from mdp.directions.orientation import facet_orientations, side_in_words, standing_still
+from mdp.directions.orientation import facet_orientations, set_on_plate, side_in_words
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.pose import about
@@ -81,7 +81,7 @@ def test_a_model_stays_where_turning_it_saves_less_than_it_counts(monkeypatch: p
 def leaning_plate() -> Mesh:
     """A plate of 40 x 30 x 4 mm that leans on one edge by 30 degrees, the edge cut level to stand on."""
     turn = about(np.array([0.0, 1.0, 0.0]), np.radians(30.0))
-    return standing_still(box(40, 30, 4), turn)
+    return set_on_plate(box(40, 30, 4), turn)
 
 
 def test_of_two_ways_to_lie_that_need_no_support_the_one_without_stairs_is_taken() -> None:
@@ -121,7 +121,7 @@ def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
 
 def test_a_way_that_ends_dearer_than_good_cuts_would_leave_it_is_compared_with_how_it_stands() -> None:
     upright = forecast_orientations(tee(), PROFILE, by_height)[0]
-    hoped_mm2 = (upright.forecast_mm2 + upright.hopeful_mm2) / 2.0  # less than the forecast, and no certainty
+    hoped_mm2 = (upright.forecast_mm2 + upright.optimistic_mm2) / 2.0  # less than the forecast, and no certainty
     more_s = (hoped_mm2 - found(tee()).total_mm2) / PROFILE.search.second_mm2
 
     def slow_when_low(profile: Profile) -> Pricing:
@@ -259,7 +259,7 @@ def test_a_forecast_contains_the_footing() -> None:
     surface_mm2 = 2 * 1600.0 + 4 * 960.0
     assert flat.footing_mm2 == pytest.approx(0.055 * surface_mm2 + stance_mm2(40.0, 40.0, 24.0, surface_mm2), rel=0.01)
     assert flat.bare_mm2 == pytest.approx(0.1 * 240.0 + 100.0 + flat.footing_mm2)  # 240 s, a metre
-    assert flat.hopeful_mm2 == flat.forecast_mm2 == flat.whole_mm2 == flat.bare_mm2
+    assert flat.optimistic_mm2 == flat.forecast_mm2 == flat.whole_mm2 == flat.bare_mm2
 
 
 def test_a_model_that_leans_on_a_blunt_end_is_offered_straight_on_it() -> None:

@@ -83,7 +83,7 @@ REFUSED = [
     ("", "version is missing: this program reads version 1"),
     ("version = 2", "version is 2: this program reads version 1"),
     ("version = true", "version is True: this program reads version 1"),
-    ("version = 1\ncolour = 'red'", "'colour' is no key of a plan: version, model, sha256, orientation, part,"),
+    ("version = 1\ncolour = 'red'", "'colour' is not a key of a plan: version, model, sha256, orientation, part,"),
     ("version = 1\nmodel = 5", "model is 5: a text is expected"),
     ("version = 1\nsha256 = []", "sha256 is []: a text is expected"),
     ("version = 1\npart = 3", "part is 3: [[part]] tables are expected"),
@@ -99,8 +99,8 @@ REFUSED = [
         "keep 1: room min_mm is [0.0, 0.0, 0.0] and max_mm [0.0, 1.0, 1.0]: each number of min_mm must be less",
     ),
     (f"{FIRST}process = 4", "part 1: process is 4: keys and values are expected, as {walls = 4}"),
-    ("version = 1\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 5", "part 1 stands on the platform and has no plane"),
-    (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is no key of a plan: normal, offset_mm, limbs_mm, process are allowed"),
+    ("version = 1\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 5", "part 1 stands on the build plate and has no plane"),
+    (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is not a key of a plan: normal, offset_mm, limbs_mm, process are allowed"),
     (f"{FIRST}[[part]]\nnormal = [0, 1]", "part 2: normal is [0, 1]: 3 numbers in brackets are expected"),
     (f"{FIRST}[[part]]\nnormal = 'up'", "part 2: normal is 'up': 3 numbers in brackets are expected"),
     (f"{FIRST}[[part]]\nnormal = [0, 0, nan]", "part 2: normal is [0, 0, nan]: 3 numbers in brackets are expected"),
@@ -112,7 +112,7 @@ REFUSED = [
     (f"{FIRST}[[part]]\noffset_mm = '5'", "part 2: offset_mm is '5': a number is expected"),
     (f"{FIRST}[[part]]\noffset_mm = 200000", "part 2: offset_mm is 200000: -100000 to 100000 is allowed"),
     (f"{FIRST}[[part]]\noffset_mm = 0x{'f' * 5000}", "offset_mm is a number of thousands of digits: a number is expected"),
-    (f"{FIRST}[[part]]\noffset_mm = {'9' * 5000}", "is no TOML"),
+    (f"{FIRST}[[part]]\noffset_mm = {'9' * 5000}", "is not TOML"),
     (FIRST * 1 + "[[part]]\n" * 1001, "there are 1002 [[part]] tables: up to 1000 are allowed"),
     ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]", "keep 1: max_mm is missing: 3 numbers in brackets are expected"),
     ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 0, 1]", "each number of min_mm must be less"),
@@ -145,17 +145,17 @@ REFUSED = [
     ("version = 1\n[[modifier]]\nmesh = ''\nprocess = {walls = 4}", "mesh is '': the name of a model's file is expected"),
     (
         "version = 1\n[[modifier]]\ncolour = '#ff0000'",
-        "modifier 1: 'colour' is no key of a plan: min_mm, max_mm, axes, room, z_mm,",
+        "modifier 1: 'colour' is not a key of a plan: min_mm, max_mm, axes, room, z_mm,",
     ),
-    ("version = 1\n[[keep]]\nmesh = 'a.stl'", "keep 1: 'mesh' is no key of a plan: min_mm, max_mm, axes, room, colour,"),
+    ("version = 1\n[[keep]]\nmesh = 'a.stl'", "keep 1: 'mesh' is not a key of a plan: min_mm, max_mm, axes, room, colour,"),
     ("version = 1\n[[support]]\nmesh = 'a.stl'\ncolour = '#ff0000'", "support 1: has a mesh and colour: one of them is allowed"),
     ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
     ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),
     ("version = 1\n[[front]]\nplanes = []\ncost_mm2 = 'dear'", "front 1: cost_mm2 is 'dear': a number is expected"),
     ("version = 1\n[[front]]\nplanes = []\n[[front]]\nplanes = []", "two rows of [[front]] have the same number of planes"),
-    ("version = [", "is no TOML"),
-    ("version = 1\n" + "x = " + "[" * 20000, "is no TOML"),
-    ("version = 1\nversion = 1", "is no TOML"),
+    ("version = [", "is not TOML"),
+    ("version = 1\n" + "x = " + "[" * 20000, "is not TOML"),
+    ("version = 1\nversion = 1", "is not TOML"),
 ]
 
 
@@ -210,7 +210,12 @@ def test_an_open_mesh_of_a_modifier_is_refused_by_its_name(tmp_path: Path) -> No
 def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(bytes(range(128, 256)))
     (tmp_path / "large.toml").write_bytes(b"#" * 10_000_001)
-    for name, why in (("none", "no such file"), (".", "is a directory"), ("binary", "is not text"), ("large", "it is no plan")):
+    for name, why in (
+        ("none", "no such file"),
+        (".", "is a directory"),
+        ("binary", "is not text"),
+        ("large", "it is not a plan"),
+    ):
         with pytest.raises(PlanError, match=why):
             read_plan(tmp_path / (f"{name}.toml" if name != "." else name))
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.ranking.candidates import Reason, bounds_of, platform_disc, score_candidates
+from mdp.ranking.candidates import Reason, bounds_of, plate_disc, score_candidates
 from mdp.ranking.ranking import CandidateTable, Model
 from mdp.sweep.slivers import SLIVER_COSINE, least_distance_mm
 from mdp.sweep.sweep import Remainder, sweep
@@ -113,7 +113,7 @@ def _table(mesh: Mesh, fragile_mm: float = 1.0) -> CandidateTable:
     """All candidates of a solid along the upright direction."""
     words = ("clearance=false", "least_interface_mm2=0", "least_volume_share=0", f"fragile_mm={fragile_mm}")
     profile = load(settings=[f"search.{word}" for word in words])
-    limits = bounds_of(UP[None], mesh, profile, platform_disc(mesh, profile.search))
+    limits = bounds_of(UP[None], mesh, profile, plate_disc(mesh, profile.search))
     terms = CostTerms(45.0, False)
     scored = score_candidates(_remainder(mesh), limits, terms, -np.inf)
     uncut: Any = SimpleNamespace(saved_mm2=0.0, residual_mm2=0.0, lost_mm2=0.0)

@@ -8,7 +8,7 @@ from mdp.cut import cut, mesh_of, solid_of
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import facing_down, risky_upright, threshold
 from mdp.plane import Plane
-from mdp.ranking.candidates import Reason, bounds_of, check, platform_disc
+from mdp.ranking.candidates import Reason, bounds_of, check, plate_disc
 from mdp.sweep.sweep import Gains, Remainder, Sweep, gains, sweep
 from profiles.profile import load
 from tests import shapes
@@ -180,6 +180,6 @@ def test_a_part_with_a_piece_on_a_thread_is_refused() -> None:
     profile = load(settings=["search.clearance=false", "search.least_volume_share=0"])
     for side, reason in ((1.5, Reason.INTERFACE), (2.5, Reason.FEASIBLE)):
         mesh = _two_towers(side, 15)
-        limits = bounds_of(UP, mesh, profile, platform_disc(mesh, profile.search))
+        limits = bounds_of(UP, mesh, profile, plate_disc(mesh, profile.search))
         checked = check(_remainder(mesh), limits, profile.search.offset_step_mm, np.zeros(1, np.int32), np.array([14.0]))
         assert (checked.reason[0], checked.contact_area_mm2[0]) == (reason, pytest.approx(side**2))

@@ -7,7 +7,7 @@ import pytest
 from profiles.errors import ProfileError
 from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
-from profiles.foreign.imported import KINDS, Row, imported, stay, unused
+from profiles.foreign.imported import KINDS, Row, imported, unchanged_keys, unused
 from profiles.foreign.rules import PROCESS_RULES
 from profiles.profile import load_one
 
@@ -89,11 +89,11 @@ def test_a_filament_setting_becomes_ours(values: dict[str, str], key: str, value
     [
         ({"perimeter_speed": "0"}, "as fast as the plastic melts"),
         ({"default_acceleration": "0"}, "the firmware's own"),
-        ({"fill_pattern": "hilbertcurve"}, "there is no such one"),
+        ({"fill_pattern": "hilbertcurve"}, "has no equivalent here"),
         ({"external_perimeter_speed": "50%"}, "perimeter_speed, which the file does not tell"),
         ({"layer_height": "9"}, "a number from"),
-        ({"layer_height": "thin"}, "is no number"),
-        ({"perimeters": "1e999"}, "is no number"),
+        ({"layer_height": "thin"}, "is not a number"),
+        ({"perimeters": "1e999"}, "is not a number"),
         (
             {"support_material_spacing": "-0.4", "support_material_extrusion_width": "0.4", "layer_height": "1e-9"},
             "needs a width",
@@ -156,8 +156,8 @@ def test_nothing_of_theirs_and_nothing_of_ours_is_passed_over_in_silence() -> No
     theirs = config(layer_height="0.2", wipe_tower="1")
     profile = imported(theirs, "process")
     assert unused(theirs) == ["wipe_tower"]
-    assert "process.layer_height_mm" not in stay(profile)
-    assert "process.walls" in stay(profile)
+    assert "process.layer_height_mm" not in unchanged_keys(profile)
+    assert "process.walls" in unchanged_keys(profile)
 
 
 def test_a_width_that_does_not_go_with_its_layers_is_left_with_the_reason() -> None:

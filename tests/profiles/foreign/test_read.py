@@ -213,7 +213,7 @@ def test_the_layers_of_cura_s_raft_are_added_up(tmp_path: Path, values: str, lay
     ("name", "content", "sentence"),
     [
         ("notes.txt", b"hello", "holds no settings"),
-        ("preset.json", b"{broken", "is no JSON"),
+        ("preset.json", b"{broken", "is not JSON"),
         ("list.json", b"[1]", "holds no settings"),
         ("empty.ini", b"", "holds no settings"),
         ("noise.gcode", bytes(range(256)) * 40, "holds no settings"),
@@ -229,7 +229,7 @@ def test_a_zip_of_something_else_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.curaprofile"
     with ZipFile(file, "w") as archive:
         archive.writestr("x", "no ini at all")
-    with pytest.raises(ProfileError, match="is no profile of Cura"):
+    with pytest.raises(ProfileError, match="is not a Cura profile"):
         read_config(file)
 
 
@@ -278,7 +278,7 @@ def test_settings_in_a_damaged_zip_are_refused_in_one_sentence(
     tmp_path: Path, damaged: Callable[[Path, str, str], Path], name: str, member: str
 ) -> None:
     file = damaged(tmp_path / name, member, "[general]\nversion = 4\n[values]\nwall_line_count = 3\n" * 9)
-    with pytest.raises(ProfileError, match=r"x\.\w+: (is no profile of Cura|the settings inside it are damaged) \(.+\)$"):
+    with pytest.raises(ProfileError, match=r"x\.\w+: (is not a Cura profile|the settings inside it are damaged) \(.+\)$"):
         read_config(file)
 
 

@@ -19,7 +19,7 @@ from slicer.interface.interface import (
     plane_in_frame_of,
     plastic_below,
     sections_of,
-    skin_beside,
+    visible_wall_beside,
 )
 from slicer.paths import Kind, Layer
 from slicer.sectioning import section_part
@@ -181,7 +181,7 @@ def test_the_skin_beside_an_edge_is_the_outer_wall_as_near_to_it_in_space(seed: 
     random, process = np.random.default_rng(seed), profile().process
     square, z_mm = Polygons.square((20.0, 20.0)), 3.0
     edge = np.array([[0.0, *random.uniform((0, 0), (20, 6)), 0.0, *random.uniform((0, 0), (20, 6))]])
-    skin = as_shapely(skin_beside(edge, square, z_mm, process))
+    skin = as_shapely(visible_wall_beside(edge, square, z_mm, process))
     a, b = edge[0, :3], edge[0, 3:]
     for y in np.linspace(0.5, 19.5, 39):
         place = np.array([0.1, y, z_mm])

@@ -6,7 +6,7 @@ import pytest
 from profiles.frozen import Vector
 from slicer.geometry.polygons import Polygons
 from slicer.interface.interface import BasePlane
-from slicer.support.handed_down import DEEP_MM, Patch, keep_off, upper_side
+from slicer.support.from_earlier_part import DEEP_MM, Patch, keep_off, upper_side
 from tests.slicer.hand import as_shapely
 from tests.slicer.interface.test_base_plane import HEIGHTS, LEVEL, UP, part, plane_of
 

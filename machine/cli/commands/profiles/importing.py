@@ -11,7 +11,7 @@ from machine.pipeline.output import check_folder, plain_name, refuse_to_overwrit
 from machine.pipeline.profile_file import profile_text
 from profiles.errors import ProfileError
 from profiles.foreign.config import Config
-from profiles.foreign.imported import KINDS, Imported, Row, imported, stay, unused
+from profiles.foreign.imported import KINDS, Imported, Row, imported, unchanged_keys, unused
 from profiles.foreign.read import read_config
 from profiles.places import own_folder
 
@@ -69,7 +69,7 @@ def _lines(config: Config, found: Sequence[Imported]) -> Iterator[str]:
         for title, rows in _groups(profile.rows).items():
             yield f"  {title}: {len(rows)}"
             yield from (f"    {_row(row)}" for row in rows)
-        ours = [key.split(".", 1)[1] for key in stay(profile)]
+        ours = [key.split(".", 1)[1] for key in unchanged_keys(profile)]
         yield from _listed(f"  stay as {profile.base} has them: {len(ours)}", ours)
         yield ""
     others = unused(config)
@@ -117,7 +117,7 @@ def _as_json(config: Config, found: Sequence[Imported], files: dict[str, Path]) 
                     {"theirs": row.name, "text": row.text, "key": row.key, "value": row.value, "note": row.how}
                     for row in profile.rows
                 ],
-                "stay": stay(profile),
+                "stay": unchanged_keys(profile),
             }
             for profile in found
         ],

@@ -135,8 +135,8 @@ OTHER = f"sha256 = 'abc'\nmodel = 'other.stl'\n{HIGH}"
 REFUSED = [
     ("--plan", HIGH, "plan mine.toml: part 2 cannot be cut off: its plane misses the model"),
     ("--planes", HIGH, "plan mine.toml: part 2 cannot be cut off: its plane misses the model"),
-    ("--plan", OTHER, "plan mine.toml was made of another model: other.stl is not tee.stl as it is read now"),
-    ("--planes", OTHER, "plan mine.toml was made of another model: other.stl is not tee.stl as it is read now"),
+    ("--plan", OTHER, "plan mine.toml was made for another model: other.stl is not tee.stl as it is read now"),
+    ("--planes", OTHER, "plan mine.toml was made for another model: other.stl is not tee.stl as it is read now"),
     ("--planes", "version = 1\n[[part]]\n[[part]]\n", "part 2 has neither normal nor offset_mm"),
 ]
 

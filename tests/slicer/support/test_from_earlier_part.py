@@ -19,7 +19,7 @@ from slicer.overhangs import find_overhangs
 from slicer.paths import Kind
 from slicer.sectioning import section_part
 from slicer.slice import slice_parts
-from slicer.support.handed_down import plan_supports, up_to
+from slicer.support.from_earlier_part import plan_supports, up_to
 from slicer.support.support import Supports, own_supports
 from tests.shapes import box, from_manifold, standing, tee
 from tests.slicer.hand import as_shapely, cut, of_kind, profile, sections_at

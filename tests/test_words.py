@@ -1,0 +1,95 @@
+"""Docstrings and comments use the words of CONTRIBUTING.md's glossary: those in WORDS stand for others, or are not understood."""
+
+import ast
+import io
+import re
+import tokenize
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("mdp", "slicer", "profiles")  # to be extended by machine and tools
+# Words and constructions that are not used -> what to write instead. Matched in each paragraph, in either case without (?-i:).
+WORDS = {
+    r"\btold\b|\btells?\b(?!: )": "given, reported, distinguishes",
+    r"\basked for\b": "requested, required",
+    r"\blook(s|ed) at\b": "examined, considered",
+    r"\bso many\b": "a number, a count",
+    r"(?-i:^(Of|What|Whose)\b)": "a noun phrase: the part of, the faces above",
+    r"^The same\b": "the subject itself: a docstring is read alone",
+    r"\bfrom (here|there|now|then|that|this|it|where it \w+) on\b": "from here, after that, at or above",
+    r"\bthat \w+ \w+ leaves to\b": "the rest, the remainder",
+    r"\bas costs? least\b": "the cheapest",
+    r"\bh(e|is|im)\b": "the user, they",
+    r"\bpersons?\b": "user",
+    r"\b(some|no)body\b|\bwhoever\b": "the user, another process, no one",
+    r"(?-i:\b[Pp]latforms?\b)": "build plate",
+    r"\bstairs\b": "stair-stepping",
+    r"\bscar(s|red)?\b": "blemish",
+    r"\bcrumbs?\b": "fragment",
+    r"\bhairs?\b": "sliver",
+    r"\bshut\b(?! down)": "blocked, closed",
+    r"\blets? go\b": "release, discard",
+    r"\bhand(s|ed)? down\b": "from an earlier part, pass on",
+    r"\blaid down\b|\blying so\b": "oriented, placed on the plate",
+    r"\bto and fro\b": "back and forth",
+    r"\banew\b": "again",
+    r"\bairy\b": "over air, unoccluded",
+    r"\bmends?\b": "repair, fix, replace",
+    r"(?<!there )\b(is|are) no (?!\w+er\b|more\b|less\b|such\b|room\b)": "is not a, are not",
+    r"\bby way of\b": "through, via",
+}
+
+
+def words_of(source: str) -> Iterator[tuple[int, str]]:
+    """The paragraphs of a file's docstrings and comments, each as one line, with the number of its first line."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and (
+            text := ast.get_docstring(node)
+        ):
+            for paragraph in text.split("\n\n"):
+                yield node.body[0].lineno, " ".join(paragraph.split())
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            yield token.start[0], token.string.lstrip("# ")
+
+
+def findings(source: str) -> list[str]:
+    """A line for every word of a file that is not used, with what to write instead."""
+    return [
+        f"{number}: {match[0]!r}: write {instead}"
+        for number, text in words_of(source)
+        for pattern, instead in WORDS.items()
+        for match in re.finditer(pattern, text, re.IGNORECASE)
+    ]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_docstrings_and_comments_use_the_words_of_the_glossary(package: str) -> None:
+    files = sorted((ROOT / package).rglob("*.py"))
+    assert files
+    found = [f"{file.relative_to(ROOT)}:{line}" for file in files for line in findings(file.read_text(encoding="utf-8"))]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("source", "count"),
+    [
+        ('"""Of a model, its faces."""', 1),
+        ('"""A model.\n\nThe same as\nso many faces."""', 2),
+        ("def f(): ...  # what he was\n\nx = 'told'", 1),
+        ('"""Whether the plane cuts the part; there is no part if not."""\nx = "platform"', 0),
+        ('class A:\n    """A part that is no solid."""', 1),
+    ],
+)
+def test_the_check_finds_words_in_docstrings_and_comments_only(source: str, count: int) -> None:
+    assert len(findings(source)) == count
+
+
+def test_the_glossary_has_one_line_for_each_of_its_terms_in_alphabetical_order() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    terms = re.findall(r"^- \*\*(.+?)\*\*: ", text.partition("## Glossary")[2].partition("\n## ")[0], re.MULTILINE)
+    assert len(terms) >= 60
+    assert terms == sorted(set(terms), key=str.lower)
