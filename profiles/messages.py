@@ -1,4 +1,4 @@
-"""Messages: sentences for a person in which keys and options are marked, so that each front end names them in its own way.
+"""Messages: sentences for the user in which keys and options are marked, so that each front end names them in its own way.
 
 A message is a str. A mark in it holds a name, a value, and the words of the terminal: `terminal_words` puts these in its place,
 and the workbench shows the label of the key, or the field that does what the option does. The delimiters of a mark are
@@ -26,7 +26,7 @@ def option(name: str, value: object = None) -> str:
 
 
 def advice(name: str, value: object, verb: str = "") -> str:
-    """An option that the person may give: "--parts 4", on the page "take 4 under In how many parts". verb: before it."""
+    """An option that the user may give: "--parts 4", on the page "take 4 under In how many parts". verb: before it."""
     return _mark(f"advice --{name}", f"{value}", f"{verb} {_written(name, value)}" if verb else _written(name, value))
 
 

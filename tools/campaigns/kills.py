@@ -146,7 +146,7 @@ def moment(build: BuildOptions, text: GcodeFile, folder: Path, end_s: float, who
         if is_in_doubt(way, point, PROFILE):
             doubts.append(len(heights_mm(point)))
             seen_point = replace(point, stood_mm=min(heights_mm(point), key=lambda z: abs(z - stood_mm)))
-        return plan_resume(seen_point, status, PROFILE).start
+        return plan_resume(seen_point, status, PROFILE)
 
     try:
         with Journal(folder / "rest", heading) as written:
