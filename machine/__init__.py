@@ -1,1 +1,1 @@
-"""From sliced parts to machine moves, G-code, the dry run and the printer."""
+"""tiltprint: from sliced parts to machine moves, G-code, the dry run and the printer."""

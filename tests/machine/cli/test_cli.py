@@ -475,3 +475,12 @@ def test_the_console_of_a_closed_input_ends_at_once() -> None:
     command = ["sh", "-c", f"{start} console --port sim <&-"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=Path(__file__).parents[3])
     assert (done.returncode, "a bug in tiltprint" in done.stderr) == (0, False)
+
+
+def test_a_package_that_another_program_has_overwritten_is_named_at_the_start(tmp_path: Path) -> None:
+    (tmp_path / "slicer").mkdir()
+    (tmp_path / "slicer" / "__init__.py").write_text("from .slicer import Slicer\n")
+    start = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from machine.cli.start import main; raise SystemExit(main())"
+    done = subprocess.run([sys.executable, "-c", start, "--version"], capture_output=True, text=True, check=False)
+    sentence = f"tiltprint: {tmp_path / 'slicer'} belongs to another program: install tiltprint into an environment of its own\n"
+    assert (done.returncode, done.stderr) == (1, sentence)
