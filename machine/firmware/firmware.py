@@ -1,4 +1,4 @@
-"""Firmware: everything the program knows about one, so that a new one is a new file.
+"""Firmware: everything the program knows about one, so that a new one is a value of its own.
 
 Besides its dialects: its baud rates, the overhead of a byte and of a numbered line, the rules of its end of the serial line, its
 command that probes along Z, and the rules by which the simulated printer takes lines and answers them.

@@ -109,6 +109,7 @@ class _Inquiry:
 
         with suppress(CancelledError):
             while not (until() or self._fault) and (now_s := SERIAL.now_s()) < end_s:
+                self._check_stop()
                 self._orders.give((question,), is_whole, min(now_s + ASK_S, end_s))
 
     def _check_stop(self) -> None:

@@ -1,7 +1,8 @@
 """Print state: where a print stands, from the questions before it to its end, and which state may follow which.
 
 A print at a port, one on a print server and a printer in hand have the same states. `PrintStatus` is a moment of any of them: the
-stream and the servers make it, a terminal's screen and the pages show it.
+stream and the servers make it, a terminal's screen and the pages show it. `ProgramPosition` follows part and layer by the lines
+of the program.
 """
 
 from collections.abc import Mapping

@@ -25,7 +25,7 @@ LINES = ("socket", "rfc2217")
 ADDRESSES = ", ".join(f"{line}://HOST:PORT" for line in LINES)
 ADDRESS = re.compile(r"(?:([^:/?#]*)://)?(\[[^\]/?#]*\]|[^:/?#]*)(:[^/?#]*)?(/[^?#]*)?(.*)", re.DOTALL)
 # Paths may have colons, as those of /dev/serial/by-path; a word with one that is no line known here is a mistake.
-DEVICE = re.compile(rf"(?:(?:{'|'.join(LINES)})://|[^:]*[/\\]).*|[^:]+")
+DEVICE = re.compile(rf"(?:(?i:{'|'.join(LINES)})://|[^:]*[/\\]).*|[^:]+")
 NUMBER = re.compile(r":0*[1-9]\d{0,4}", re.ASCII)
 LABEL = re.compile(r"[\w-]{1,63}")  # of a host's name, in any script
 
@@ -127,9 +127,9 @@ def parse_server_address(text: str) -> Server:
     scheme, host, port, path, rest = parts.groups("")
     if scheme.lower() not in ("", "http", "https"):
         raise ServerError(f"server address {_plain(text)!r} begins with {_plain(scheme)}://: http:// or https:// is expected")
-    if not _is_host(host):
+    if not _is_host(host) or path.startswith("//"):  # http://http://h
         raise ServerError(f"server address {_plain(text)!r} names no host: {EXPECTED}")
-    if port and not (NUMBER.fullmatch(port) and int(port[1:]) < 65536):
+    if port not in ("", ":") and not (NUMBER.fullmatch(port) and int(port[1:]) < 65536):
         raise ServerError(f"server address {_plain(text)!r}: port {_plain(port[1:])} is none: {EXPECTED}")
     if rest or not path.isprintable():
         raise ServerError(f"server address {_plain(text)!r}: nothing may follow the path: {EXPECTED}")

@@ -8,7 +8,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from threading import Event as Flag
 from typing import Protocol
 
 from machine.link.journal import Journal
@@ -89,11 +88,10 @@ class Scene:
 class Person(Protocol):
     """A person who attends a job; what is said meanwhile comes as `machine.notices`.
 
-    commands: what the person asks of it; stop: set when it is to end, heaters off.
+    commands: what the person asks of it; its stop flag is set when the job is to end, heaters off.
     """
 
     commands: Control
-    stop: Flag
 
     def passed(self, sentence: str) -> None:
         """Take note of what a check has found to be as it must be."""

@@ -107,8 +107,8 @@ def _delete_oldest(folder: Path) -> None:
     left that names it, a new one only with its journal."""
     journals = _journals(folder)
     before = b"".join(map(_first_line, journals))
-    kept = keep_newest(journals, KEPT - 1, _name, is_being_printed)
-    after = b"".join(map(_first_line, kept))
+    keep_newest(journals, KEPT - 1, _name, is_being_printed)
+    after = b"".join(map(_first_line, _journals(folder)))  # listed again: another process may have begun one
     for program in folder.glob(f"*{PROGRAM}"):
         name = program.name.encode()
         if name not in after and (name in before or not _is_new(program)):

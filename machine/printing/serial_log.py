@@ -48,10 +48,10 @@ class SerialLog:
         data = self._torn.get(direction, b"") + data
         end = data.rfind(b"\n") + 1
         self._torn[direction] = data[end:]
-        flush = now_s > self._flushed_s + UNWRITTEN_S
-        if flush:
-            self._flushed_s = now_s
         if end:
+            flush = now_s > self._flushed_s + UNWRITTEN_S
+            if flush:
+                self._flushed_s = now_s
             self._write(_stamped(data[: end - 1], f"{self._stamp(now_s)} {direction} "), flush)
 
     def say_trouble(self, what: str = "the traffic") -> None:

@@ -150,7 +150,7 @@ class SimulatedFirmware:
         """The firmware stops for ever with its own words, heaters off."""
         own = self._rules.heater_fault
         self.board.note(error, trouble=True)
-        self._shut_down(() if own else (f"Error:{error!s}",), own)
+        self._shut_down(() if own else (f"Error:{error}",), own)
 
     def _stop_at_once(self) -> None:
         """M112."""

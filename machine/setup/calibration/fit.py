@@ -84,11 +84,13 @@ class Calibration:
         return int(np.argmax(self.residuals_mm)) + 1
 
 
-def least_squares(residuals: Callable[[Floats], Floats], numbers: Floats, pull: float = 0.0) -> tuple[Floats, Floats]:
+def least_squares(
+    residuals: Callable[[Floats], Floats], numbers: Floats, pull: float = 0.0, little: float = LITTLE
+) -> tuple[Floats, Floats]:
     """(k,) numbers near to given ones at which the sum of squares of (n,) residuals is least, and the residuals there.
 
     By Levenberg's damped least squares. pull: how strongly the numbers are drawn to where they begin, as a share of a residual's
-    own weight: what the residuals do not determine stays there.
+    own weight: what the residuals do not determine stays there. little: the share of the sum that the next step must save.
     """
     usual, damping, count = numbers, 1e-3, len(numbers)
     here = np.append(residuals(numbers), np.zeros(count))
@@ -98,7 +100,7 @@ def least_squares(residuals: Callable[[Floats], Floats], numbers: Floats, pull: 
         step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-9), -slope.T @ here, rcond=None)[0]
         tried = np.append(residuals(numbers + step), pull * (numbers + step - usual))
         if tried @ tried < here @ here:
-            settled = tried @ tried > (1.0 - LITTLE) * (here @ here)
+            settled = tried @ tried > (1.0 - little) * (here @ here)
             numbers, here, damping = numbers + step, tried, damping * 0.2
             if settled:
                 break

@@ -200,7 +200,7 @@ def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> C
         explained = _explained(machine, pieces, USUAL * state[: len(UNKNOWN)])[read]
         return (explained + places @ state[len(UNKNOWN) :] - target) * weights
 
-    state, off = least_squares(left, np.zeros(len(UNKNOWN) + places.shape[1]), pull=1.0)
+    state, off = least_squares(left, np.zeros(len(UNKNOWN) + places.shape[1]), pull=1.0, little=0.0)
     slope = slope_of(left, state)
     left_mm = np.full(readings_mm.size, np.nan)
     left_mm[read] = -off / weights

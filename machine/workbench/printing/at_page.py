@@ -1,4 +1,4 @@
-"""At page: the person who attends a print at a page of the workbench: told by its state, heard through the pages' server."""
+"""At page: a job as pages of the workbench see it, the loading of a bench's slices, and the user who attends it there."""
 
 from collections import deque
 from collections.abc import Callable, Iterator

@@ -5,7 +5,7 @@ from threading import Event as Flag
 
 import pytest
 
-from machine.link.identification import Kind, ask
+from machine.link.identification import Kind, ask, ask_at_any_rate
 from machine.link.medium import Medium
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
@@ -230,6 +230,25 @@ class Always(Wire):
 
 def test_what_refuses_every_line_for_its_checksum_is_a_printer() -> None:
     assert ask(Always(b"Error: Missing checksum\n"), 0.1).kind is Kind.PRINTER  # type: ignore[arg-type]
+
+
+def test_a_port_is_asked_nothing_once_the_asking_is_stopped() -> None:
+    class Silent:
+        name, written = "/dev/silent", b""
+
+        def set_baud(self, baud: int) -> None:
+            pass
+
+        def write(self, data: bytes) -> None:
+            self.written += data
+
+        def read(self) -> bytes:
+            return b""
+
+    stop, port = Flag(), Silent()
+    stop.set()
+    ask_at_any_rate(port, 115200, 0.1, stop)  # type: ignore[arg-type]
+    assert port.written == b""
 
 
 def test_an_error_whose_second_line_never_comes_is_heard_all_the_same() -> None:

@@ -116,3 +116,24 @@ def test_a_program_whose_journal_another_process_has_yet_to_begin_is_not_thinned
         pass
     assert begun.exists()
     assert not orphan.exists()
+
+
+def test_a_program_that_a_journal_begun_meanwhile_names_is_not_thinned_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = state_folder() / "journals"
+    for number in range(25):
+        with new_journal(LINES, load(), f"{number}"):
+            pass
+    oldest = min(folder.glob("*.journal"))
+    program = next(path for path in folder.glob("*.gcode") if path.name.startswith(oldest.stem))
+
+    def begin_another(path: Path) -> bool:  # as another process does, that resumes the oldest journal
+        if not (folder / "further.journal").exists():
+            (folder / "further.journal").write_bytes(oldest.read_bytes())
+        return False
+
+    monkeypatch.setattr("machine.printing.journal_folder.is_being_printed", begin_another)
+    os.utime(program, (0.0, 0.0))
+    with new_journal(LINES, load(), "next"):
+        pass
+    assert not oldest.exists()
+    assert program.exists()
