@@ -32,9 +32,14 @@ def plain_line(text: str) -> str:
 
 
 def marked_line(text: str) -> str:
-    """A line that keeps the marks of keys and options, and is else as plain_line() makes it."""
+    """The same line with its marks of keys and options, unless it is too long and shortened."""
+    shown = terminal_words(text)
+    if len(shown) > MOST_LENGTH or WORD.search(shown):  # a mark must not be cut through
+        text = shown
     words = WORD.sub(lambda word: _shortened(word[0], WORD_BEGINNING, WORD_END), text)
-    return _escaped(words if len(words) <= MOST_LENGTH else _shortened(words, MOST_LENGTH - END_LENGTH, END_LENGTH))
+    return _escaped(
+        words if len(terminal_words(words)) <= MOST_LENGTH else _shortened(words, MOST_LENGTH - END_LENGTH, END_LENGTH)
+    )
 
 
 def plain_lines(text: str) -> str:

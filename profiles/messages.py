@@ -57,6 +57,6 @@ def _written(name: str, value: object) -> str:
 
 
 def _mark(name: str, value: str, terminal: str) -> str:
-    """A mark; a mark inside of it, as of a message that is a value, is put into the words of the terminal."""
-    fields = (terminal_words(field) for field in (name, value, terminal))
+    """A mark; a mark inside it, as of a message that is a value, becomes the words of the terminal."""
+    fields = (_LEFT_OVER.sub("", terminal_words(field)) for field in (name, value, terminal))
     return f"{_BEGIN}{_BETWEEN.join(fields)}{_END}"

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
+from enum import Enum
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -122,6 +123,8 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
         return _allowed(inner[0], [*annotation.__metadata__])
     if annotation is bool:
         return "true or false"
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        return f"one of {', '.join(_shown(member.value) for member in annotation)}"
     if annotation is str:
         pattern = next((text for rule in metadata for text in [_bound(rule, "pattern")] if text), None)
         longest = next((most for rule in metadata for most in [_bound(rule, "max_length")] if most), None)

@@ -24,11 +24,12 @@ from mdp.cut import mesh_of, solid_of
 from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices, Mesh
-from mdp.sweep.rays import faces_met, nearest_faces, triangle_tree
+from mdp.sweep.rays import nearest_faces, windings
 from mdp.topology.cross_section import cross_sections, loop_edges
 from mdp.zone import Modifier
 from profiles.part_settings import process_of_part
 from profiles.profile import Profile
+from slicer.geometry.polygons import contours, of_contours
 from slicer.paths import Kind
 from slicer.sectioning import reach_mm
 
@@ -140,10 +141,8 @@ def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
 
 
 def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
-    """(n,) whether (n, 3) points lie in a closed mesh's solid: the first face straight above them is seen from inside."""
-    rays = np.stack([points + ASIDE_MM, np.broadcast_to([0.0, 0.0, 1.0], points.shape)], axis=1)
-    met = faces_met(triangle_tree(mesh), rays, np.inf)
-    within: NDArray[np.bool_] = (met >= 0) & (mesh.normals[met, 2] > 0.0)
+    """(n,) whether (n, 3) points lie in a closed mesh's solid, also where it intersects itself."""
+    within: NDArray[np.bool_] = windings(mesh, points + ASIDE_MM) > 0
     return within
 
 
@@ -207,7 +206,7 @@ def filled_share(run: DryRun, mesh: Mesh, points: int = POINTS) -> float:
     fill(filled, low + 0.5 * step_mm, step_mm, run.deposited.segments(which), run.deposited.directions(which), sizes_mm)
     columns, within = Lattice(low[:2], step_mm, np.array(filled.shape[:2])), np.zeros_like(filled)
     for k, loops in enumerate(cross_sections(mesh, low[2] + step_mm * (np.arange(filled.shape[2]) + 0.5))):
-        within[:, :, k] = inside_loops(loop_edges(loops), columns)
+        within[:, :, k] = inside_loops(loop_edges(contours(of_contours(loops))), columns)
     return float(filled[within].mean()) if within.any() else 1.0
 
 

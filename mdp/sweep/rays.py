@@ -190,6 +190,39 @@ def _find_blocked(begin: int, end: int, tree: TriangleTree, bundles: tuple[Float
         out[f] = blocked / len(rays)
 
 
+def windings(surface: Mesh, places: Floats) -> Ints:
+    """(n,) winding number of a closed mesh, whose faces are in spatial order, about each point (n, 3): how many solids of it the
+    point lies in. Counted along upright rays, which must not meet an edge.
+    """
+    counts = np.zeros(len(places), np.int32)
+    in_threads(_find_windings, len(places), triangle_tree(surface), places, counts)
+    return counts
+
+
+@kernel
+def _find_windings(begin: int, end: int, tree: TriangleTree, places: Floats, counts: Ints) -> None:
+    """Add the faces above each point that are seen from inside, and subtract those seen from outside."""
+    vertices, faces, leaves = tree.vertices, tree.faces, len(tree.low) // 2
+    stack, up, inverse = ints(DEPTH, 1), floats(3, 0.0), floats(3, 1e300)
+    up[2], inverse[2] = 1.0, 1.0
+    for k in range(begin, end):
+        stack[0], top = 1, 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            if not _enters(tree, node, places[k], inverse, np.inf):
+                continue
+            if node < leaves:
+                stack[top] = 2 * node
+                stack[top + 1] = 2 * node + 1
+                top += 2
+                continue
+            first = (node - leaves) * LEAF_FACES
+            for f in range(first, min(first + LEAF_FACES, len(faces))):
+                if _distance(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], places[k], up) < np.inf:
+                    counts[k] += 1 if tree.normals[f, 2] > 0.0 else -1
+
+
 def nearest_faces(surface: Mesh, places: Floats, reach_mm: float) -> tuple[Floats, Ints]:
     """(n,) distances of points (n, 3) from a mesh whose faces are in spatial order, mm, and (n,) the nearest faces; reach_mm and
     face 0 for points farther away."""

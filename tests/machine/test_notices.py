@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from machine.cli.cli import main
-from machine.notices import plain_line, plain_lines
+from machine.notices import marked_line, plain_line, plain_lines
+from profiles.messages import key_name, option, terminal_words
 
 
 @pytest.mark.parametrize(
@@ -32,6 +33,18 @@ def test_the_middle_of_a_long_word_and_of_a_long_message_is_left_out_and_its_len
     assert plain_line(f"a {'x' * 3_000_000}y z") == f"a {'x' * 120} [2999821 characters left out] {'x' * 59}y z"
     assert len(plain_line("word " * 100_000)) < 1600
     assert plain_line(f"there is no file {'d/' * 100}a.stl") == f"there is no file {'d/' * 100}a.stl"
+
+
+def test_a_line_with_marks_is_as_long_as_a_terminal_shows_it_and_no_mark_is_cut_through() -> None:
+    many = "; ".join(f"{key_name('process.layer_height_mm')} is {k}" for k in range(40))
+    assert terminal_words(marked_line(many)) == plain_line(many)
+    assert "left out" not in plain_line("; ".join([key_name("process.layer_height_mm")] * 40))
+    long = f"{option('plan', 'x' * 400)} is no plan"
+    assert terminal_words(marked_line(long)) == plain_line(long)
+
+
+def test_a_value_that_holds_a_part_of_a_mark_is_shown_once() -> None:
+    assert terminal_words(option("plan", "a\ufdd1b")) == "--plan ab"
 
 
 def test_a_name_with_an_escape_code_and_a_newline_is_one_plain_line_of_a_message(

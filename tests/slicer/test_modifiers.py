@@ -237,7 +237,7 @@ def test_a_part_that_leans_has_the_settings_where_the_box_lies_in_the_workpiece(
 
 @pytest.mark.parametrize("given_", ["process.spiral_vase=true", "process.walls=0"])
 def test_settings_that_do_not_go_with_those_of_the_print_are_refused_in_a_sentence(given_: str) -> None:
-    with pytest.raises(SliceError, match=r"process\.(spiral_vase|walls) is .*: a \[\[modifier\]\] of the plan .*"):
+    with pytest.raises(SliceError, match=r"process\.(spiral_vase|walls) (is|prints) .*: a \[\[modifier\]\] of the plan .*"):
         sliced(modified(BLOCK, (RIGHT, {"walls": 4})), given_)
 
 

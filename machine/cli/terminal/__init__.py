@@ -1,4 +1,1 @@
-"""The terminal: options, progress, reports, keys, the live screen.
-
-`progress.say` and `plain.show` are how anything is said, on stderr and as a result.
-"""
+"""The terminal: options, requests, reports, keys, the live screen."""

@@ -10,7 +10,7 @@ from machine.pipeline.project import STANDING
 from machine.pipeline.requests import Given
 from machine.planning.stops import Stop
 from machine.workbench.bench.model import Model, Placing, moved_part, moved_zones
-from machine.workbench.bench.part_settings import gone_in_words, number_after, option, renumbered, renumbered_stops
+from machine.workbench.bench.part_settings import gone_in_words, number_after, renumbered, renumbered_stops, values_in_words
 from machine.workbench.bench.values import vector_of
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats
@@ -21,7 +21,7 @@ from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
 from profiles.effect import effect_of_change
 from profiles.frozen import Effect, Vector
-from profiles.messages import option as marked_option
+from profiles.messages import option
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile
 
@@ -110,8 +110,8 @@ class History:
         before = self.now.bench if _have_one_model(self.now.bench, bench) else bench
         stops, gone = renumbered_stops(bench.stops, before.cuts or (), bench.cuts or ())
         after = bench if stops == bench.stops else replace(bench, stops=stops)
-        lost = [(stop.part, marked_option(stop.option, stop.at)) for stop in gone] + [
-            (own.part, f"its own {option(own).partition(':')[2]}") for own in _gone(self.now.bench, bench)
+        lost = [(stop.part, option(stop.option, stop.at)) for stop in gone] + [
+            (own.part, f"its own {values_in_words(own)}") for own in _gone(self.now.bench, bench)
         ]
         return History(Step(word, after, gone_in_words(word, lost)), _nearest_steps((*self.before, self.now)[-MOST_STEPS:]))
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from machine.planning.stops import Stop
 from mdp.search.plan_file import PlannedPart
+from profiles.messages import key_name
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, with_part_settings
 from profiles.toml_text import read_value
@@ -70,6 +71,11 @@ def own_values(profile: Profile, part: int) -> dict[str, object]:
 def option(own: PartSettings) -> str:
     """What `--part` is given for them: `2:walls=5,seam=rear`."""
     return f"{own.part}:{','.join(f'{key}={_typed(value)}' for key, value in own.process.items())}"
+
+
+def values_in_words(own: PartSettings) -> str:
+    """The settings of a part alone: `walls=5, seam=rear`, with marked keys."""
+    return ", ".join(f"{key_name(f'process.{key}', key)}={_typed(value)}" for key, value in own.process.items())
 
 
 def _typed(value: object) -> str:

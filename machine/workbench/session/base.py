@@ -15,6 +15,7 @@ from machine.workbench.bench.bench import Bench, History, Step
 from machine.workbench.work.folders import Received
 from machine.workbench.work.worker_pool import CLOSED, TaskQueue, WorkerPools
 from profiles.errors import UserError
+from profiles.messages import terminal_words
 
 WAITING = "waiting until the work of other benches is done"
 LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
@@ -126,8 +127,8 @@ class SessionBase(Observable):
     def refuse(self, error: Exception) -> str:
         """Tell the page that wanted it what could not be done, a bug with the log that it got; the sentence."""
         sentence = f"{error}" if isinstance(error, UserError) else bug_in_words(error, sys.argv)
-        if len(sentence) > LONGEST_SENTENCE:
-            sentence = f"{sentence[:LONGEST_SENTENCE]} ..."
+        if len(shown := terminal_words(sentence)) > LONGEST_SENTENCE:
+            sentence = f"{shown[:LONGEST_SENTENCE]} ..."
         self._tell_problem(sentence)
         self.notify()
         return sentence

@@ -120,4 +120,4 @@ async def _refusals(socket: WebSocket) -> AsyncIterator[None]:
     except UserError as error:
         await send(socket, json.dumps({"problem": page_words(f"{error}"), "forcible": error.forcible}))
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
-        await send(socket, json.dumps({"problem": bug_in_words(error, ())}))
+        await send(socket, json.dumps({"problem": page_words(bug_in_words(error, ()))}))

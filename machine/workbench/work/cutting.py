@@ -25,6 +25,7 @@ from machine.view.parts import page_colours
 from machine.view.scene import solids, surfaces
 from machine.workbench.bench.bench import Bench, locked_plan, plan_of_bench
 from machine.workbench.bench.changes import Cuts
+from machine.workbench.bench.page_words import page_words
 from machine.workbench.work.folders import work_of
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, FrontRow, Part
@@ -209,7 +210,7 @@ def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
     colours = page_colours(len(decomposition.parts))
     records = solids(decomposition, profile, joints_of(decomposition.parts, profile))
     parts = [part | {"colour": colour} for part, colour in zip(records, colours, strict=True)]
-    return pack({"parts": parts, "fit": out_of_reach(decomposition.parts, profile)}, surfaces(decomposition, profile))
+    return pack({"parts": parts, "fit": page_words(out_of_reach(decomposition.parts, profile))}, surfaces(decomposition, profile))
 
 
 def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:

@@ -54,6 +54,16 @@ def test_a_point_right_above_the_edges_of_faces_lies_inside_all_the_same(mesh: M
     assert inside(np.array([(0.0, 0.0, z_mm), (1.0, 1.0, z_mm), (-2.0, 2.0, z_mm)]), mesh).tolist() == [within] * 3
 
 
+def test_a_point_in_two_bodies_that_overlap_lies_inside_below_the_face_of_either() -> None:
+    low, high = box(20.0, 20.0, 20.0), box(20.0, 20.0, 20.0)
+    both = Mesh(
+        np.vstack([low.vertices, high.vertices + np.array([5.0, 0.0, 5.0])]),
+        np.vstack([low.faces, high.faces + len(low.vertices)]),
+    )
+    points = np.array([(2.0, 1.0, 2.0), (2.0, 1.0, 7.0), (2.0, 1.0, 22.0), (-9.0, 1.0, 22.0), (14.0, 1.0, 2.0)])
+    assert inside(points, both).tolist() == [True, True, True, False, False]
+
+
 @settings(max_examples=12)
 @given(seeds)
 def test_points_are_as_far_from_a_solid_as_from_its_nearest_face(seed: int) -> None:

@@ -69,7 +69,7 @@ def test_what_is_no_command_is_told_to_be_none(name: Any) -> None:
 
 
 def test_the_page_knows_the_very_same_names() -> None:
-    page = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith((".js", ".html")))
+    page = "".join(file.read_text("utf-8") for file in PAGE.rglob("*") if file.name.endswith((".js", ".html")))
     said = {
         word
         for pattern in (r'\bdo: "(\w+)"', r'command\("(\w+)"', r'data-(?:do|print)="(\w+)"')
@@ -93,7 +93,7 @@ def said_with(script: str) -> Iterator[tuple[str, set[str]]]:
 
 
 def test_the_page_sends_with_a_command_what_it_has_and_all_that_it_needs() -> None:
-    scripts = "".join(file.read_text("utf-8") for file in PAGE.iterdir() if file.name.endswith(".js"))
+    scripts = "".join(file.read_text("utf-8") for file in PAGE.rglob("*.js"))
     known = {**OF_DEVICES, **OF_PRINTS, **COMMANDS}
     sent = [(known[name].model_fields, keys) for name, keys in said_with(scripts)]
     assert len(sent) > 40

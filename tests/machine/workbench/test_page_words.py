@@ -80,7 +80,7 @@ def test_the_program_s_own_sentences_have_no_option_on_the_page() -> None:
     sentences = [*REASONS.values(), *(text for _, *texts in ports.NO_PRINTERS.values() for text in texts), f"{refused.value}"]
     for sentence in sentences:
         assert re.search(r"(^|\s)--\w|\bsearch\.", page_words(sentence)) is None
-    assert page_words(REASONS[Reason.PLATFORM]) == "the plane would cut the platform"
+    assert page_words(REASONS[Reason.PLATFORM]) == "the plane would cut the build plate"
 
 
 def test_what_is_not_marked_stays_whatever_its_name_is() -> None:

@@ -177,7 +177,7 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
     assert own(after.undo().now.bench) == {1: {"walls": 5}, 3: {"ironing": True}}
     turned = changed(steps, "turn", axis="x", deg=90).now
     assert own(turned.bench) == {1: {"walls": 5}}
-    assert "its own ironing=true" in turned.lost
+    assert "its own ironing=true" in terminal_words(turned.lost)
     assert bench.model is not None
     assert own(with_model_turned_as_read(bench, bench.model, about(UP, 1.0))) == {1: {"walls": 5}}
     assert changed(steps, "reset_part", part=3).now.lost == ""

@@ -23,7 +23,7 @@ def write_program(folder: Path) -> Path:
     )
     profiles = folder / "profiles"
     profiles.mkdir()
-    for name in ("__init__.py", "errors.py", "folders.py"):
+    for name in ("__init__.py", "errors.py", "folders.py", "messages.py"):
         shutil.copy(cache.PACKAGES / "profiles" / name, profiles)
     (package / "__init__.py").touch()
     (package / "near.py").write_text(KERNEL_FILE, encoding="utf-8")

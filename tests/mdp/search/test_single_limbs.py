@@ -102,7 +102,7 @@ def test_a_trial_refuses_a_limb_that_would_leave_something_in_the_air() -> None:
     plane = PlannedPart((0.0, 0.0, 1.0), 30.0, limbs_mm=((0.0, 0.0, 42.0),)).plane
     assert plane is not None
     trial = Trials(hook, _profile(nozzle_load_n=0.0, fragile_mm=0.0)).attempt([plane])
-    assert "would not stand on the platform" in trial.rejected
+    assert "would not stand on the build plate" in trial.rejected
 
 
 def test_a_limb_too_near_to_a_tower_is_refused_and_the_place_of_the_tower_is_shown() -> None:

@@ -9,6 +9,7 @@ from mdp.plane import Plane
 from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.search.trial import Trials
+from profiles.messages import terminal_words
 from profiles.profile import load
 from tests.shapes import box, hollow_tee, standing, tee
 
@@ -112,7 +113,7 @@ def test_where_the_head_would_meet_the_table_it_is_shown_at_the_lowest_place_of_
 
 def test_what_would_float_is_marked_at_its_lowest_place() -> None:
     tried = trials(tee()).attempt((Plane(np.array([0.8, 0.0, 0.6]), 12.0),))
-    assert "would not stand on the platform" in tried.rejected
+    assert "would not stand on the build plate" in tried.rejected
     assert tried.obstacle is not None
     ((x, _, z),) = tried.obstacle.places_mm
     assert (x, z) == (-20.0, 30.0)
@@ -120,7 +121,7 @@ def test_what_would_float_is_marked_at_its_lowest_place() -> None:
 
 def test_a_void_is_not_marked_as_floating() -> None:
     tried = trials(hollow_tee()).attempt((Plane(np.array([0.8, 0.0, 0.6]), 13.0),))  # the void at -x reaches up to 12.6 mm
-    assert "would not stand on the platform" in tried.rejected
+    assert "would not stand on the build plate" in tried.rejected
     assert tried.obstacle is not None
     assert [place[2] for place in tried.obstacle.places_mm] == [30.0]
 
@@ -133,7 +134,7 @@ def test_the_neck_is_that_of_what_the_parts_printed_later_leave() -> None:
 
 def test_a_sliver_is_marked_on_the_surface_that_it_would_be_cut_off() -> None:
     tried = trials(tee()).attempt((Plane(np.array([0.0, 0.0, 1.0]), 39.8),))
-    assert "a sliver 0.2 mm thin" in tried.rejected
+    assert "a sliver 0.2 mm thin" in terminal_words(tried.rejected)
     assert tried.obstacle is not None
     assert tried.obstacle.places_mm[0][2] == 40.0
 

@@ -1,6 +1,6 @@
 // Lines: all that the page and its server say to each other: state in, commands out; when one is lost the page says so and tries again.
 // A command is {do: NAME, its fields}; tests/machine/workbench/test_page_commands.py holds every one of the page against the server's:
-// send and ask: the bench's, the classes in machine/workbench/session/commands.py and bench/; the state that answers: web/snapshot.py;
+// send and ask: the bench's, FUNCTIONS in machine/workbench/session/commands.py; the state that answers: web/snapshot.py;
 // printsLine: the prints', COMMANDS in machine/workbench/printing/commands.py; the state: prints.snapshot() there;
 // the line in model/benches.js: the paired devices', DEVICE_COMMANDS in web/line.py. A button with data-do or data-print gives the NAME alone.
 

@@ -45,7 +45,7 @@ export function settingsPanel() {
     disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
     tellTakeBack(changed, part());
     for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
-    const groups = Map.groupBy(rows, ({ group }) => group);
+    const groups = groupedBy(rows, ({ group }) => group);
     putRows([...groups].flatMap(([group, own]) => {
       const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
       const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key)]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
@@ -119,9 +119,16 @@ function farFrom(setting, words) {
   return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));
 }
 
+/** A Map from each name to its rows; Map.groupBy is too new for many browsers. */
+function groupedBy(rows, nameOf) {
+  const groups = new Map();
+  for (const row of rows) groups.set(nameOf(row), [...(groups.get(nameOf(row)) || []), row]);
+  return groups;
+}
+
 /** Whose changes there are, with a button for each profile that has some, and one for all. */
 function tellTakeBack(changed, part) {
-  const counts = Map.groupBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
+  const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
   for (const kind of KINDS) {
     const count = counts.get(kind)?.length || 0;
     tell({ [`reset-${kind}`]: `Those of the ${kind} (${count})` });
