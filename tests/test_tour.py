@@ -75,6 +75,21 @@ def test_what_a_page_names_exists(page: str) -> None:
     assert [name for name in named(page) if not exists(name)] == []
 
 
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_links_of_a_page_lead_to_files_and_headings_that_exist(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for file, anchor in re.findall(r"\]\(([^)#\s:]*)(?:#([^)\s]+))?\)", text):
+        target = (ROOT / page).parent / file if file else ROOT / page
+        assert target.exists(), file
+        assert not anchor or target.suffix != ".md" or anchor in anchors(target), f"{file}#{anchor}"
+
+
 def test_the_check_tells_what_exists_from_what_does_not() -> None:
     assert exists("mdp.mesh.Mesh.volume_mm3")
     assert exists("slicer.paths")

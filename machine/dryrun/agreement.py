@@ -80,7 +80,7 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile, modifiers: Sequence[Mod
     outside = beyond_mm > tolerance_mm
     assert run.contacts is not None
     length, loose, reported = unsupported_mm(run.program, run.deposited, run.contacts)
-    whole, shifted = max(length, 1e-9), shifts(run, mesh, profile)
+    whole, shifted = max(length, 1e-9), shifts(run, mesh)
     result = Agreement(
         filled=filled_share(run, mesh),
         outside=float(length_mm[outside].sum() / max(length_mm.sum(), 1e-9)),
@@ -146,7 +146,7 @@ def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
     return within
 
 
-def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> dict[int, tuple[int, Floats]]:
+def shifts(run: DryRun, mesh: Mesh) -> dict[int, tuple[int, Floats]]:
     """For every part with enough outer walls the row of its first one, and (3,) mm, workpiece frame, by which it lies beside the
     closed model."""
     walls = np.flatnonzero(run.program.rows_of_types(*WALLS)[run.segment_row])

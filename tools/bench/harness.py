@@ -78,7 +78,7 @@ def run(parser: argparse.ArgumentParser, bench: Callable[[argparse.Namespace], N
     if given.beside is None:
         bench(given)
         return
-    words = (word for word in sys.argv[1:] if word not in ("--beside", given.beside))
+    words = (word for word in sys.argv[1:] if word not in ("--beside", given.beside, f"--beside={given.beside}"))
     own_words = [str(Path(word).resolve()) if Path(word).exists() else word for word in words]
     script = Path(sys.argv[0]).resolve().relative_to(ROOT)
     with older_checkout(given.beside) as older:

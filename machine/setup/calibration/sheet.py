@@ -13,6 +13,7 @@ from machine.setup.files import check_row, number, quoted, read_document, rows_o
 from mdp.pose import Pose
 from profiles.errors import ProfileError, reason
 from profiles.machine import Machine
+from profiles.messages import option
 
 COLUMNS = ("tilt_deg", "turn_deg", "x_mm", "y_mm", "z_mm", "on")
 KEYS = ("machine", "mark_height_mm", "mark_angle_deg", "touch")
@@ -55,15 +56,17 @@ def sheet_text(name: str, machine: Machine, touches: TouchPlan) -> str:
 def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
     """The sheet in a .toml or .csv file (columns tilt_deg, turn_deg, x_mm, y_mm, z_mm and, if wanted, on: mark or plate).
 
-    mark_height_mm goes before what the file says. Raises ProfileError naming the file and the touch.
+    mark_height_mm overrides the file. Raises ProfileError naming the file and the touch, or a missing height of the mark.
     """
     document = _csv(path) if path.suffix.lower() == ".csv" else read_document(path, KEYS, "a calibration")
     touches = [_touch(path, f"touch {index}", row) for index, row in enumerate(rows_of(path, document, "touch"), start=1)]
-    height = document.get("mark_height_mm", 0.0) if mark_height_mm is None else mark_height_mm
+    height = document.get("mark_height_mm") if mark_height_mm is None else mark_height_mm
+    if height is None and not all(touch is None or touch.on_plate for touch in touches):
+        raise ProfileError(f"{path}: the height of the mark is missing: {option('mark-height')} gives it in mm above the plate")
     angle, name = document.get("mark_angle_deg"), document.get("machine")
     return Sheet(
         tuple(touch for touch in touches if touch is not None),
-        number(path, "mark_height_mm", height),
+        number(path, "mark_height_mm", height or 0.0),
         None if angle is None else number(path, "mark_angle_deg", angle),
         None if name is None else str(name),
     )

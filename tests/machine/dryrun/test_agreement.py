@@ -63,7 +63,7 @@ def untold(lines: Lines) -> Lines:
 def test_a_shifted_part_is_told_and_the_others_lie_where_they_should(index: int, letter: str, by_mm: float) -> None:
     profile, model, lines = bent("generic_ac")
     moved = on(part(index), word(letter, lambda x: x + by_mm))(untold(list(lines)))
-    sizes = {part: np.linalg.norm(by) for part, (_, by) in shifts(dry_run(moved, profile), model, profile).items()}
+    sizes = {part: np.linalg.norm(by) for part, (_, by) in shifts(dry_run(moved, profile), model).items()}
     assert sizes == pytest.approx({k: abs(by_mm) if k == index else 0.0 for k in (1, 2, 3)}, abs=0.01)
 
 
@@ -80,5 +80,5 @@ def test_the_finding_names_the_part_and_the_direction_on_the_table() -> None:
 @pytest.mark.parametrize("machine", ["generic_ac", "gen5x", "linuxcnc_xyzac"])
 def test_an_untouched_part_lies_where_its_model_does(machine: str) -> None:
     profile, model, lines = bent(machine)
-    found = shifts(dry_run(lines, profile), model, profile)
+    found = shifts(dry_run(lines, profile), model)
     assert np.array([shift_mm for _, shift_mm in found.values()]) == pytest.approx(np.zeros((3, 3)), abs=0.01)

@@ -41,3 +41,13 @@ def test_an_empty_sheet_holds_no_touch(tmp_path: Path) -> None:
     (tmp_path / "sheet.toml").write_text(sheet_text("generic_ac", machine, plan_touches(machine, 20.0)))
     sheet = read_sheet(tmp_path / "sheet.toml")
     assert (sheet.touches, sheet.mark_height_mm, sheet.machine) == ((), 20.0, "generic_ac")
+
+
+def test_touches_of_a_mark_of_unknown_height_are_refused_unless_all_are_of_the_plate(tmp_path: Path) -> None:
+    sheet, head = tmp_path / "sheet.csv", "tilt_deg,turn_deg,x_mm,y_mm,z_mm,on\n"
+    sheet.write_text(f"{head}0,0,1,2,3,mark\n")
+    with pytest.raises(ProfileError, match="the height of the mark is missing: --mark-height gives it"):
+        read_sheet(sheet)
+    assert read_sheet(sheet, 20.0).mark_height_mm == 20.0
+    sheet.write_text(f"{head}0,0,1,2,3,plate\n0,90,,,,mark\n")
+    assert [touch.on_plate for touch in read_sheet(sheet).touches] == [True]
