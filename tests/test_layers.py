@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import draw_rooms
+from tools.docs import draw_rooms
 from tools.docs.draw_rooms import LAYERS, PICTURE, draw, floors, import_graph, imports, room_graph, rooms_of
 
 ROOT = Path(__file__).resolve().parents[1]
