@@ -150,7 +150,7 @@ class Session(SessionBase):
         """Put another plate of the slicer file on the bench there. Raises UserError."""
         model = self.bench.model
         if model is None or plate not in model.plates:
-            numbers = [] if model is None else map(str, model.plates)
+            numbers = [] if model is None else [*map(str, model.plates)]
             allowed = f"one of {', '.join(numbers)} is expected" if numbers else "the model has no plates"
             raise PlanError(f"plate is {plate}: {allowed}")
         await self.open_model(model.path, model.name, anew=False, plate=plate)

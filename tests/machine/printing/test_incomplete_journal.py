@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from time import sleep
 
 import pytest
 
@@ -82,12 +83,18 @@ def fails(number: int, after: int = 0, times: float = 1e9) -> Callable[[Path, py
     return lambda path, monkeypatch: FailingDisk(monkeypatch, path, after, number, times)
 
 
+def deleted(journal: Path) -> None:
+    """The journal is taken away, and its thread, which looks for it every SYNC_S, has time to see that."""
+    journal.rename(journal.with_name("elsewhere"))
+    sleep(20 * journal_module.SYNC_S)
+
+
 DISKS = {
     "no write succeeds any more": fails(errno.EIO),
     "it is read-only from now on": fails(errno.EROFS),
     "one write is cut short": fails(FailingDisk.SHORT, times=1),
     "one sync fails": lambda path, monkeypatch: FailingDisk(monkeypatch, path, 0, errno.EIO, 1, of=("fsync",)),
-    "the journal is deleted": lambda path, monkeypatch: path.rename(path.with_name("elsewhere")),
+    "the journal is deleted": lambda path, monkeypatch: deleted(path),
 }
 
 

@@ -75,3 +75,11 @@ def test_a_way_to_calibrate_must_be_named(capsys: pytest.CaptureFixture[str]) ->
     assert main(["calibrate", "--machine", "open5x_voron0"]) == 1
     assert "one of --port PORT, -o OUT.gcode, --measured FILE and --printed FILE.gcode is expected" in capsys.readouterr().err
     assert not own_folder("machine").exists()
+
+
+def test_touches_that_are_all_at_one_place_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sheet = tmp_path / "sheet.csv"
+    rows = [f"{t.pose.tilt_deg},{t.pose.turn_deg},1,1,1" for t in touched(machine_of("open5x_voron0"))]
+    sheet.write_text("tilt_deg,turn_deg,x_mm,y_mm,z_mm\n" + "\n".join(rows) + "\n")
+    assert main(["calibrate", "--machine", "open5x_voron0", "--measured", str(sheet), "--mark-height", "20"]) == 1
+    assert "the touches do not tell" in capsys.readouterr().err
