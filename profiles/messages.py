@@ -12,7 +12,7 @@ from collections.abc import Callable
 _BEGIN, _BETWEEN, _END = "\ufdd0", "\ufdd1", "\ufdd2"
 _INSIDE = f"([^{_BEGIN}-{_END}]*)"
 _MARK = re.compile(f"{_BEGIN}{_INSIDE}{_BETWEEN}{_INSIDE}{_BETWEEN}{_INSIDE}{_END}")
-_LEFT_OVER = re.compile(f"[{_BEGIN}-{_END}]")  # of a mark that was cut through
+_LEFT_OVER = re.compile(f"[{_BEGIN}-{_END}]")
 
 
 def key_name(key: str, shown: str = "") -> str:
@@ -47,9 +47,12 @@ def rendered(message: str, words: Callable[[str, str, str], str]) -> str:
     >>> rendered(f"{option('parts', 0)}: 1 is the least", lambda name, value, terminal: f"{name}={value}")
     '--parts=0: 1 is the least'
     """
-    if _BEGIN not in message and _END not in message:
-        return message
-    return _LEFT_OVER.sub("", _MARK.sub(lambda mark: words(*mark.groups()), message))
+    return _escaped(_MARK.sub(lambda mark: words(*mark.groups()), message))
+
+
+def _escaped(text: str) -> str:
+    """The text with delimiters that are not of a mark, as in a file's name, as backslash escapes."""
+    return _LEFT_OVER.sub(lambda delimiter: f"\\u{ord(delimiter[0]):04x}", text)
 
 
 def _written(name: str, value: object) -> str:
@@ -58,5 +61,5 @@ def _written(name: str, value: object) -> str:
 
 def _mark(name: str, value: str, terminal: str) -> str:
     """A mark; a mark inside it, as of a message that is a value, becomes the words of the terminal."""
-    fields = (_LEFT_OVER.sub("", terminal_words(field)) for field in (name, value, terminal))
+    fields = map(terminal_words, (name, value, terminal))
     return f"{_BEGIN}{_BETWEEN.join(fields)}{_END}"

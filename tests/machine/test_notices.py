@@ -43,8 +43,8 @@ def test_a_line_with_marks_is_as_long_as_a_terminal_shows_it_and_no_mark_is_cut_
     assert terminal_words(marked_line(long)) == plain_line(long)
 
 
-def test_a_value_that_holds_a_part_of_a_mark_is_shown_once() -> None:
-    assert terminal_words(option("plan", "a\ufdd1b")) == "--plan ab"
+def test_a_value_that_holds_a_delimiter_of_marks_is_shown_once_with_it_escaped() -> None:
+    assert terminal_words(option("plan", "a\ufdd1b")) == r"--plan a\ufdd1b"
 
 
 def test_a_name_with_an_escape_code_and_a_newline_is_one_plain_line_of_a_message(

@@ -210,7 +210,7 @@ def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, dir
     first, second = sorted(range(len(SIGNS)), key=lambda k: best[k][0])[:2]
     cost, numbers = best[first]
     if not np.isfinite(cost):
-        raise ProfileError("the touches do not tell where the axes are: each must be at another place of the machine")
+        raise ProfileError("the touches do not determine the axes: they must not all be at one position")
     if best[second][0] < APART**2 * cost + LEAST_MM**2:
         axis = machine.tilt if SIGNS[first][0] != SIGNS[second][0] else machine.turn
         raise ProfileError(

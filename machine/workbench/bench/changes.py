@@ -61,8 +61,8 @@ def take(bench: Bench, *, parts: int) -> Bench:
     """Take the row of the front that has this number of parts."""
     rows = {row.parts: row for row in bench.rows}
     if parts not in rows:
-        allowed = ", ".join(map(str, rows)) or "nothing, for no parts have been found,"
-        raise PlanError(f"parts is {parts}: {allowed} is allowed")
+        expected = f"one of {', '.join(map(str, rows))} is expected" if rows else "no parts have been found yet"
+        raise PlanError(f"parts is {parts}: {expected}")
     taken = with_cuts(bench, planned_parts(rows[parts]))
     return bench if taken.cuts == bench.cuts else taken
 

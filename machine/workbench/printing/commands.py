@@ -145,7 +145,7 @@ def forget(page: PageOfPrints, *, print: int) -> None:
     """Take a print that is over off the list."""
     running = page.commanded(print)
     if not running.over:
-        raise PrinterError("what the page has sent is no command of a print")
+        raise PrinterError(f"print {print} is not over: only one that is over leaves the list")
     page.prints.prints.remove(running)
 
 

@@ -111,7 +111,7 @@ class RunningPrint:
     def leave(self) -> None:
         """Let a print server go on with it by itself. Raises PrinterError for a print that is on none."""
         if not self.state.server:
-            raise PrinterError("what the page has sent is no command of a print")
+            raise PrinterError("only a print on a print server goes on by itself: this one ends with the workbench")
         self.say((LEAVE,))
 
     def pause(self) -> None:

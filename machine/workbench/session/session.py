@@ -135,9 +135,8 @@ class Session(SessionBase):
         """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
         waits = self.unscaled
         if waits is None or unit not in waits.units:
-            raise PlanError(
-                f"unit is {unit!r}: {', '.join(waits.units) if waits else 'nothing, for no model waits for one,'} is allowed"
-            )
+            expected = f"one of {', '.join(waits.units)} is expected" if waits else "no model waits for its unit"
+            raise PlanError(f"unit is {unit!r}: {expected}")
         unscaled = self._bench_for(waits.name)
         given = with_typed(unscaled.given, "process.scale", f"{waits.units[unit]:g}", unscaled.profile)
         scaled = with_profile(unscaled, given, profile_as_given(given, unscaled.profile))

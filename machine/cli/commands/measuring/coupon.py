@@ -11,7 +11,7 @@ from typing import Any
 from machine.cli.commands.measuring.questionnaire import Question, ask
 from machine.cli.terminal.report import print_table
 from machine.cli.terminal.requests import CouponRequest
-from machine.notices import plain_line, show
+from machine.notices import plain_line, say, show
 from machine.pipeline.output import check_outputs, check_writable, refuse_to_overwrite, write_bytes, write_lines, write_own
 from machine.pipeline.pictures import contact_sheet, write_png
 from machine.pipeline.pipeline import build
@@ -76,15 +76,17 @@ def write_program(request: CouponRequest, out: Path) -> int:
 def evaluate_sheet(request: CouponRequest, measured: Path) -> int:
     """Find strengths and the settings that won from a filled sheet; save them, or only write them as a report."""
     sheet = read_sheet(measured)
-    for kind, told, name in zip(KINDS, (sheet.machine, sheet.material, sheet.process), request.given.names, strict=True):
-        if told != name:
-            raise ProfileError(f"{measured} is a sheet of {told}: --{kind} {told} is expected, not {name}")
+    for kind, made_for, name in zip(KINDS, (sheet.machine, sheet.material, sheet.process), request.given.names, strict=True):
+        if made_for != name:
+            raise ProfileError(f"{measured} is a sheet of {made_for}: --{kind} {made_for} is expected, not {name}")
     outcome = evaluate(sheet)
     if request.report is not None:
         if request.report != STDOUT:
             check_writable(request.report)
             refuse_to_overwrite(request.report, request.replace)
         write_lines(request.report, report_lines(sheet, outcome, version("tiltprint")))
+        if request.report != STDOUT:
+            say(f"wrote {request.report}")
         return 0
     show(outcome_text(outcome))
     _save(request, outcome)

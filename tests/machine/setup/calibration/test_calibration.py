@@ -82,4 +82,4 @@ def test_touches_that_are_all_at_one_place_are_refused(tmp_path: Path, capsys: p
     rows = [f"{t.pose.tilt_deg},{t.pose.turn_deg},1,1,1" for t in touched(machine_of("open5x_voron0"))]
     sheet.write_text("tilt_deg,turn_deg,x_mm,y_mm,z_mm\n" + "\n".join(rows) + "\n")
     assert main(["calibrate", "--machine", "open5x_voron0", "--measured", str(sheet), "--mark-height", "20"]) == 1
-    assert "the touches do not tell" in capsys.readouterr().err
+    assert "the touches do not determine the axes" in capsys.readouterr().err
