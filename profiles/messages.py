@@ -50,6 +50,13 @@ def rendered(message: str, words: Callable[[str, str, str], str]) -> str:
     return _escaped(_MARK.sub(lambda mark: words(*mark.groups()), message))
 
 
+def check_text(text: str) -> None:
+    """Refuse text from outside that could be taken for a mark, or that no UTF-8 file can hold. Raises ValueError."""
+    if _LEFT_OVER.search(text):
+        raise ValueError("the characters U+FDD0 to U+FDD2 are not allowed")
+    text.encode()
+
+
 def _escaped(text: str) -> str:
     """The text with delimiters that are not of a mark, as in a file's name, as backslash escapes."""
     return _LEFT_OVER.sub(lambda delimiter: f"\\u{ord(delimiter[0]):04x}", text)

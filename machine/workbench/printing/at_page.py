@@ -71,7 +71,10 @@ class JobState:
         1970, for the page goes on counting when nothing more comes."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         checks = [{"text": check.text, "forced": check.forced} for check in self.checks]
-        progress = self.progress and self.progress.json() | {"heat_s": self.told_s - self.progress.heat_age_s}
+        moment = self.progress
+        if moment is not None and self.state.is_over:  # an upload that has ended says nothing of a print
+            moment = None if moment.state is PrintState.UPLOADING else replace(moment, state=self.state)
+        progress = moment and moment.json() | {"heat_s": self.told_s - moment.heat_age_s}
         return values | {"checks": checks, "progress": progress, "over": self.state.is_over}
 
 

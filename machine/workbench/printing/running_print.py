@@ -199,7 +199,8 @@ class RunningPrint:
         if self._given_up and not self._emergency:
             self._end(NOT_BEGUN)
         elif isinstance(at, Simulated):
-            self._end(End(PrintState.FAILED, f"{DIED}; the simulated printer has ended with it"))
+            stopped = "emergency stop: the simulated printer has ended"
+            self._end(End(PrintState.FAILED, stopped if self._ended else f"{DIED}; the simulated printer has ended with it"))
         elif moved or self._emergency:
             self._take(replace(self.state, state=PrintState.CANCELLING))
             sentence = await asyncio.to_thread(rescue, at, self._emergency)

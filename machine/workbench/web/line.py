@@ -17,6 +17,7 @@ from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
 from machine.workbench.web.snapshot import snapshot
 from profiles.errors import PlanError, UserError
+from profiles.messages import check_text
 
 MOST_COMMAND = 100_000  # characters
 _states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
@@ -103,6 +104,11 @@ def parsed(text: str, most: int) -> dict[str, Any]:
         asked = None
     if not isinstance(asked, dict):
         raise PlanError("what the page has sent is no command of the workbench")
+    try:
+        check_text(json.dumps(asked, ensure_ascii=False))
+    except ValueError as error:
+        reason = "a part of a surrogate pair is not allowed" if isinstance(error, UnicodeEncodeError) else error
+        raise PlanError(f"what the page has sent is not plain text: {reason}") from None
     return asked
 
 

@@ -21,7 +21,7 @@ from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
 from machine.workbench.work.folders import Received, folders_kept, remove_file
 from profiles.errors import PlanError, ProfileError, reason
-from profiles.messages import option
+from profiles.messages import check_text, option
 from profiles.places import KINDS, kind_in
 
 TEXT_SUFFIX = ".toml"  # of plans and profiles
@@ -47,6 +47,10 @@ class Uploads:
     async def take(self, session: Session, request: Request) -> Response:
         """A file that the person has chosen or dropped; what is refused is not kept."""
         name = Path(request.query_params.get("name", "")).name
+        try:
+            check_text(name)
+        except ValueError as error:
+            raise PlanError(f"file name {name!r}: {error}") from None
 
         async def receive(path: Path) -> None:
             await _receive(request, path, name, self._most_mib)

@@ -9,7 +9,8 @@ import pytest
 from starlette.websockets import WebSocketDisconnect
 
 from machine.workbench.session.base import Observable
-from machine.workbench.web.line import tell, until_either_ends
+from machine.workbench.web.line import parsed, tell, until_either_ends
+from profiles.errors import PlanError
 from tests.machine.prints import prints_line
 from tests.machine.running_workbench import workbench
 
@@ -25,6 +26,13 @@ def test_a_frame_of_bytes_is_told_to_be_no_command_and_ends_no_line() -> None:
         assert printing.refused() == no_command
         printing.do("cancel", print=1)
         assert printing.refused() == "this print is not there any more"
+
+
+@pytest.mark.parametrize("value", ['"a\\ufdd0b"', '["a\ufdd1"]', '{"\\ufdd2": 1}', '"\\ud800"'])
+def test_characters_that_are_no_text_are_refused_wherever_a_command_has_them(value: str) -> None:
+    with pytest.raises(PlanError, match=r"what the page has sent is not plain text: .* not allowed"):
+        parsed(f'{{"do": "demo", "name": {value}}}', 1000)
+    assert parsed('{"do": "demo", "name": "モデル 😀"}', 1000)["name"] == "モデル 😀"
 
 
 class Page:

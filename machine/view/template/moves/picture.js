@@ -138,7 +138,7 @@ function paintModel(stage, print, scene, seenAt, lift) {
   const piece = (solid, k) => [k, k + 1].map((n) => (n * solid.corners) / cut.length);
   if (scene.on.directions) cut.forEach((part, k) => stage.arrows.draw(seen(part), { range: piece(stage.arrows, k) }));
   if (!scene.on.planes) return;
-  const [, ...above] = cut.map((part, k) => [seen(part), k]); // the first part stands on the platform
+  const [, ...above] = cut.map((part, k) => [seen(part), k]); // the first part stands on the build plate
   for (const [at, k] of above) stage.rims.draw(at, { range: piece(stage.rims, k) });
   for (const [at, k] of above) stage.planes.draw(at, { strength: 0.3, range: piece(stage.planes, k) });
 }

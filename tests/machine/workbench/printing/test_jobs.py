@@ -1,6 +1,7 @@
 """What is known of slices is not asked for again: a print of them is refused before a printer is asked, or begins sooner."""
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,10 +11,11 @@ import pytest
 
 from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
+from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.destination import Destination, SerialPort, Simulated, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
 from machine.program import Alternative
-from machine.workbench.printing.at_page import AtPage, Slices
+from machine.workbench.printing.at_page import AtPage, JobState, Slices
 from machine.workbench.printing.commands import job_of
 from machine.workbench.printing.prints import FILE, Prints, keep_printer, last_printer
 from machine.workbench.printing.process import carry_out
@@ -155,3 +157,11 @@ def test_the_printer_of_last_time_is_known_at_the_next_start(at: Destination) ->
 def test_a_file_that_names_no_printer_is_as_none(text: str) -> None:
     (state_folder() / FILE).write_text(text)
     assert last_printer() is None
+
+
+@pytest.mark.parametrize("end", [PrintState.CANCELLED, PrintState.FAILED, PrintState.DONE])
+def test_the_last_moment_of_a_print_that_is_over_has_the_state_in_which_it_ended(end: PrintState) -> None:
+    printing = JobState(PrintState.PRINTING, progress=PrintStatus(PrintState.PRINTING))
+    assert printing.json()["progress"]["state"] == PrintState.PRINTING
+    assert replace(printing, state=end).json()["progress"]["state"] == end
+    assert replace(printing, state=end, progress=PrintStatus(PrintState.UPLOADING)).json()["progress"] is None

@@ -61,7 +61,7 @@ export function showPrint(print, commands) {
     "held-told": print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.",
   });
   hide({
-    "run-ask": state !== "ready" || !commands, "run-live": !progress || (over && progress.state === "uploading"), "run-upload": !uploads || !commands, "leave-printing": !server,
+    "run-ask": state !== "ready" || !commands, "run-live": !progress, "run-upload": !uploads || !commands, "leave-printing": !server,
     "run-commands": !COMMANDED.includes(state) || !commands, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
   });
   if (!COMMANDED.includes(state) || !commands) sure(false);
