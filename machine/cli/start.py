@@ -6,9 +6,9 @@ import signal
 import sys
 from contextlib import suppress
 from importlib.util import find_spec
-from pathlib import Path
 
 PACKAGES = ("profiles", "mdp", "slicer", "machine")  # names so common that other distributions have them too
+SIGN = b'"""tiltprint: '  # how the first file of each package begins
 SELDOM = (100_000, 20, 50)  # what is allocated between two looks for garbage in circles, of which there is little
 
 
@@ -18,10 +18,10 @@ def main() -> int:
     sys.stdout, sys.stderr = (stream or open(os.devnull, "w", encoding="utf-8") for stream in (sys.stdout, sys.stderr))  # noqa: SIM115
     gc.set_threshold(*SELDOM)
     os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # what is hardly written to takes no memory
-    if folder := foreign_package():
-        sys.stderr.write(f"tiltprint: {folder} belongs to another program: install tiltprint into an environment of its own\n")
-        return 1
     try:
+        if trouble := package_trouble():
+            sys.stderr.write(f"tiltprint: {trouble}: install tiltprint into an environment of its own\n")
+            return 1
         from machine.cli.cli import main as run
 
         code = run()
@@ -37,12 +37,16 @@ def main() -> int:
     return code
 
 
-def foreign_package() -> str:
-    """The folder of a package that another distribution has overwritten or hides; "" if all packages are tiltprint's own."""
+def package_trouble() -> str:
+    """Which package is missing, or was overwritten or hidden by another distribution; "" if all are tiltprint's own."""
     for name in PACKAGES:
         spec = find_spec(name)
-        if spec is None or spec.origin is None:
-            return name
-        if not Path(spec.origin).read_bytes().startswith(b'"""tiltprint: '):
-            return str(Path(spec.origin).parent)
+        if spec is None:
+            return f"the package {name} is missing"
+        folder = next(iter(spec.submodule_search_locations or ()), name)
+        own = False
+        with suppress(OSError), open(spec.origin or os.path.join(folder, "__init__.py"), "rb") as file:
+            own = file.read(len(SIGN)) == SIGN
+        if not own:
+            return f"{folder} belongs to another program"
     return ""

@@ -187,12 +187,12 @@ def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
         return f"{name} lets the motors go: the print would lose its place"
     if row.changes:
         return f"{name} changes what the rest of the program means"
-    if row.moves and not (paused and _filament_only(command, axes)):
+    if row.moves and not (paused and _filament_only(command)):
         return f"{name} moves the machine: during a pause filament alone may move, else nothing"
     return None
 
 
-def _filament_only(command: str, axes: Axes) -> bool:
+def _filament_only(command: str) -> bool:
     """Whether a move has no word of an axis."""
     words = set(re.findall(r"[A-Z]", command.upper()[2:]))
     return split_command(command.upper())[0] in ("G0", "G1") and "E" in words and words <= {"E", "F"}

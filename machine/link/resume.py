@@ -143,12 +143,12 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
             point.line, _approach(point, profile, *at), f"the printer has not restarted and knows its place; {span}"
         )
     if not status.greeted:
-        _check_begun(status, begun, profile)
+        _check_begun(status, begun)
     before = _approach(point, profile, *position_at_interruption(point, profile), homes=True)
     return ResumePoint(point.line, before, f"the printer has restarted; {span}", homes=True)
 
 
-def _check_begun(status: PrinterStatus, begun: bool, profile: Profile) -> None:
+def _check_begun(status: PrinterStatus, begun: bool) -> None:
     """Refuse a printer that does not stand as a restart leaves it, for it may have been homed or moved since."""
     if not begun:
         keys = ", ".join(f"{key_name(f'machine.{key}')}" for key in HOME_KEYS)

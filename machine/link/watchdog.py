@@ -74,6 +74,8 @@ class PrinterReports:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
         if event.kind is Kind.OK:
             self.waiting = ""
+            if event.temperature is None and not event.identity:  # most answers: an ok, and nothing else in it
+                return None
         elif event.kind is Kind.BUSY:
             # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
             self.waiting = "the printer waits for a person: look at its display" if "paused for" in event.text else ""

@@ -17,10 +17,9 @@ def pair_half_edges(surface: Surface, edges: Edges) -> Indices:
     """
     order, runs = edges.by_edge
     pairs = [edges.twins]
-    normals = crosses_of(surface.vertices, surface.faces)
     for number in np.flatnonzero(edges.counts > 2):
         around = order[runs[number] : runs[number + 1]]
-        neighbours = _match_around_edge(_angles(surface, edges, around), edges.forward[around], normals[around // 3])
+        neighbours = _match_around_edge(_angles(surface, edges, around), edges.forward[around])
         pairs.append(around[neighbours])
     return np.concatenate(pairs)
 
@@ -38,7 +37,7 @@ def _angles(surface: Surface, edges: Edges, around: Indices) -> Floats:
     return directions
 
 
-def _match_around_edge(angles: Floats, forward: object, normals: Floats) -> Indices:
+def _match_around_edge(angles: Floats, forward: object) -> Indices:
     """(k // 2, 2) pairs of neighbours around an edge."""
     directions = np.asarray(forward)
     ring = [int(k) for k in np.lexsort((directions, angles))]

@@ -69,7 +69,7 @@ def _enters(tree: TriangleTree, node: int, origin: Floats, inverse: Floats, reac
         b = (high[node, axis] - origin[axis]) * inverse[axis]
         near = max(near, min(a, b))
         far = min(far, max(a, b))
-    return near <= far * (1.0 + 1e-9)
+    return near <= far * (1.0 + 1e-9) and near < np.inf  # an empty box lies at infinity
 
 
 @no_nrt

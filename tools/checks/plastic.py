@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.dryrun.interfaces import Interface, Lattice, Mask, interfaces
+from machine.dryrun.interfaces import Interface, Lattice, Mask, balance_of, interfaces
 from machine.pipeline.pictures import write_png
 from mdp.mesh import Floats
 from tools.checks.harness import files, options_of, played, table
@@ -42,8 +42,9 @@ def rows(file: Path, maps: Path | None) -> Iterator[Sequence[object]]:
         told = ratio[np.isfinite(ratio)]
         over, under = (float(bad.sum()) / max(len(told), 1) for bad in (told > MOST, told < LEAST))
         held, inside = wall_edges(face)
-        shares = (face.over_room, over, under)
-        cells = [face.part, f"{face.area_mm2:.1f}", f"{100 * face.contact:.1f}", *(f"{100 * share:.0f}" for share in shares)]
+        sums = balance_of(face)
+        shares = (sums.over_room, over, under)
+        cells = [face.part, f"{sums.area_mm2:.1f}", f"{100 * sums.contact:.1f}", *(f"{100 * share:.0f}" for share in shares)]
         yield [*cells, f"{100 * (1.0 - held.mean()):.1f}", f"{np.median(inside):.2f}", f"{np.quantile(inside, 0.95):.2f}"]
         if maps is not None:
             maps.mkdir(parents=True, exist_ok=True)

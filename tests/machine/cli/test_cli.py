@@ -484,3 +484,16 @@ def test_a_package_that_another_program_has_overwritten_is_named_at_the_start(tm
     done = subprocess.run([sys.executable, "-c", start, "--version"], capture_output=True, text=True, check=False)
     sentence = f"tiltprint: {tmp_path / 'slicer'} belongs to another program: install tiltprint into an environment of its own\n"
     assert (done.returncode, done.stderr) == (1, sentence)
+
+
+def test_a_package_of_another_program_without_a_first_file_and_a_missing_one_are_named_at_the_start(tmp_path: Path) -> None:
+    (tmp_path / "mdp").mkdir()
+    look = (
+        f"import sys; from machine.cli.start import package_trouble; sys.path[:] = [{str(tmp_path)!r}]; print(package_trouble())"
+    )
+    done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
+    assert done.stdout == "the package profiles is missing\n"
+    (tmp_path / "profiles").mkdir()
+    (tmp_path / "profiles" / "__init__.py").write_text('"""tiltprint: ours."""')
+    done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{tmp_path / 'mdp'} belongs to another program\n"

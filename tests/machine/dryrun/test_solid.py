@@ -10,7 +10,7 @@ from machine.dryrun.agreement import ROUND_MM, fill, fit_shift, inside, outside_
 from mdp.mesh import Floats, Mesh
 from mdp.sweep.rays import nearest_faces
 from tests.mdp.solids import random_solid
-from tests.shapes import box, hollow
+from tests.shapes import ball, box, hollow
 
 seeds = st.integers(0, 50)
 MOST_MM = 3.0
@@ -52,6 +52,12 @@ def test_a_point_lies_inside_where_the_surface_winds_about_it(seed: int) -> None
 @pytest.mark.parametrize(("mesh", "z_mm", "within"), [(box(), 10.0, True), (hollow(), 10.0, False), (hollow(), 2.0, True)])
 def test_a_point_right_above_the_edges_of_faces_lies_inside_all_the_same(mesh: Mesh, z_mm: float, within: bool) -> None:
     assert inside(np.array([(0.0, 0.0, z_mm), (1.0, 1.0, z_mm), (-2.0, 2.0, z_mm)]), mesh).tolist() == [within] * 3
+
+
+def test_a_point_right_below_a_corner_of_faces_lies_inside_all_the_same() -> None:
+    sphere = ball(10.0, 24)
+    top = sphere.vertices[sphere.vertices[:, 2].argmax()]
+    assert inside(top + np.array([(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]), sphere).tolist() == [True, False]
 
 
 def test_a_point_in_two_bodies_that_overlap_lies_inside_below_the_face_of_either() -> None:

@@ -236,6 +236,16 @@ def test_a_program_made_before_the_axes_were_measured_anew_is_refused() -> None:
     assert machine_mismatch(now, now, "part.gcode") == ""
 
 
+@pytest.mark.parametrize("setting", [
+    "tilt.letter=B", "tilt.stepper=s", "tilt.axis=[0,1,0]", "tilt.point_mm=[1,2,3]", "tilt.sign=1", "tilt.zero_deg=3",
+    "turn.letter=B", "turn.stepper=s", "turn.axis=[0,0,-1]", "turn.point_mm=[1,2,3]", "turn.sign=1", "turn.zero_deg=3",
+    "tool_mm=[0,0,1]", "dialect=klipper",
+])  # fmt: skip
+def test_an_axis_that_lies_or_turns_otherwise_makes_another_machine(setting: str) -> None:
+    now = load(settings=[f"machine.{setting}"]).machine
+    assert f"machine.{setting.partition('=')[0]} of" in terminal_words(machine_mismatch(MACHINE, now, "a.gcode"))
+
+
 def test_speeds_do_not_make_another_machine() -> None:
     assert machine_mismatch(MACHINE, load(settings=["machine.tilt.speed_deg_s=3"]).machine, "a.gcode") == ""
 
