@@ -1,6 +1,6 @@
-"""Link: the host's side of the line: streaming, pausing, the journal, resuming.
+"""Link: the host's side of a serial line: streaming, pausing, the journal, resuming.
 
-`stream.print_lines` streams a program through a port and tells its `print_state.PrintStatus`, `pending_commands.Control` takes
-what a person asks of it; `journal` keeps how far it got, `resume.plan_resume` finds the way on from there. `port` opens serial
-ports, `medium.Medium` is what a port, a simulated one and a clock have in common.
+`stream.print_lines` streams a program through a port and reports its `print_state.PrintStatus`; `pending_commands.Control` takes
+the user's requests. `journal` records the progress and `resume.plan_resume` continues from it. `port` opens serial ports;
+`medium.Medium` is what real and simulated ports and clocks have in common.
 """

@@ -1,4 +1,4 @@
-"""Exchange: one conversation over an open wire; lines go out as the window allows, every event of the printer is handed on."""
+"""Exchange: the conversation with a printer over an open wire; sends as the window allows and passes on every event."""
 
 from collections.abc import Callable
 from math import inf
@@ -12,11 +12,11 @@ from profiles.errors import PortError
 
 
 class Exchange:
-    """`on_event` gets every event after the connection has seen it, `on_turn` is called once a turn with the time, s.
+    """Runs a connection over a wire. on_event gets each event after the connection; on_turn is called once per turn with the
+    time, s.
 
-    `on_lost` is called when the port is gone after the greeting: it finds the same printer again or raises. It returns the new
-    wire, and whether what was on its way has been done; None: the printer is to be asked. The printer's own faults are raised as
-    the connection reports them.
+    on_lost is called when the port is lost after the greeting. It returns the new wire to the same printer, and whether the lines
+    in flight were executed (None: ask the printer); or it raises. The printer's faults are raised as the connection reports them.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Exchange:
 
     @property
     def waits(self) -> bool:
-        """Whether the printer is at a command that is waited for when the print is ended: homing, above all."""
+        """Whether the printer runs a command that the end of the print must wait for, above all homing."""
         window = self.connection.window
         return any(command_in(window.command(line.number)).must_end for line in window.flight)
 
@@ -47,7 +47,7 @@ class Exchange:
         self.greeted = True
 
     def send(self, command: str) -> int:
-        """Wait for room and send; returns the line's number, counted from the greeting on."""
+        """Wait for space and send; returns the line's number, counted from the greeting."""
         send, now_s = self.connection.send, self.medium.now_s
         while not (number := send(command, now_s())):
             self.pump()
@@ -60,13 +60,13 @@ class Exchange:
             self.pump()
 
     def drain(self) -> None:
-        """The barrier: wait until every move sent so far is over. A question asked after M400 has been answered then."""
+        """Wait until every move sent so far has ended: a query sent after M400 is answered then."""
         self.send("M400")
         self.send("M105")
         self.settle()
 
     def ask_position(self) -> dict[str, float] | None:
-        """The position that the printer reports, letter -> mm or deg, all moves over; None when it does not report it."""
+        """The position that the printer reports after all moves, letter -> mm or deg; None when it reports none."""
         self.send("M400")
         self.settle()
         self._position = None
@@ -76,7 +76,7 @@ class Exchange:
         return self._position
 
     def wait(self, seconds: float = inf, until: Callable[[], bool] = lambda: False) -> None:
-        """Keep the conversation alive, without sending, for some time or until something has come true."""
+        """Keep the conversation alive without sending, for a time or until a condition holds."""
         end_s = self.medium.now_s() + seconds
         while not until() and self.medium.now_s() < end_s:
             self.pump()
@@ -103,9 +103,9 @@ class Exchange:
         self._on_turn(now_s)
 
     def _reconnect(self, error: PortError) -> None:
-        """Go on over a new wire: the printer is asked what has arrived; one that has restarted answers with its first number."""
+        """Continue over a new wire: the printer is asked which lines arrived; a restarted one answers with its first number."""
         if not self.greeted:
             raise error
         self.wire, done = self._on_lost(error)
         self.connection.reconnect(self.medium.now_s(), done)
-        self.wire.write(self.connection.take())  # one that takes nothing over a new wire either has not been found again
+        self.wire.write(self.connection.take())  # a printer that accepts nothing over a new wire counts as lost

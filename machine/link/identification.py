@@ -1,4 +1,4 @@
-"""Identification: what stands at the other end of a port, by its answers to M115 and M114: a printer, its axes, or what else."""
+"""Identification: what answers at a port, by its replies to M115 and M114: a printer and its axes, or another device."""
 
 import re
 from collections.abc import Callable
@@ -16,13 +16,13 @@ from machine.link.protocol.events import NAME, Event
 from machine.link.protocol.events import Kind as EventKind
 from machine.link.shutdown import Orders
 
-TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
+TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and 2 s starting
 QUICK_S = 1.5  # at another rate: it has started by then
-ASK_S = 1.0  # between questions; those asked during the start are lost
-POSITION_S = 1.0  # a printer that names itself but not its place
-KEY = re.compile(r"\s+[A-Z_]+:")  # Marlin writes SOURCE_CODE_URL, RepRapFirmware ELECTRONICS behind the name
+ASK_S = 1.0  # between queries; those sent during the start are lost
+POSITION_S = 1.0  # for a printer that names itself but reports no position
+KEY = re.compile(r"\s+[A-Z_]+:")  # Marlin writes SOURCE_CODE_URL, RepRapFirmware ELECTRONICS after the name
 VERSION = re.compile(r" FIRMWARE_VERSION: ?(\S+)")
-GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of printers have words
+GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of printers contain words
 
 
 class Kind(Enum):
@@ -38,30 +38,30 @@ class Kind(Enum):
 
     @property
     def is_printer(self) -> bool:
-        """Whether it is one, though perhaps none that can print now."""
+        """Whether a printer answered, though perhaps not one that can print now."""
         return self in (Kind.PRINTER, Kind.BUSY, Kind.STARTING, Kind.HALTED)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of whatever stands at a port."""
+    """The answer of a device at a port."""
 
     kind: Kind
-    words: str = ""  # the firmware's own line, its error, what it is busy with, or the last words of a stranger
-    letters: str = ""  # axes that M114 reports, the filament's left out; "" when none
-    limits: dict[str, tuple[float, float]] = field(default_factory=dict)  # least and greatest value, where they are reported
-    revival: str = LineRules.revival  # lets a printer that has halted print again
+    words: str = ""  # the firmware's line, its error, what it is busy with, or the last line of another device
+    letters: str = ""  # axes in M114 without the filament; "" for none
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)  # least and greatest value, if reported
+    revival: str = LineRules.revival  # makes a halted printer print again
 
     @property
     def firmware(self) -> str:
-        """The firmware's name and version without the rest of its line."""
+        """Name and version of the firmware."""
         name = KEY.split(self.words.removeprefix(NAME).strip())[0]
         version = VERSION.search(self.words)
         return f"{name} {version[1]}" if version else name
 
 
 def ask(port: Port, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> Answer:
-    """Ask until a printer has named itself, s at most, or until `stop` is set; raises PortError when the port is lost."""
+    """Query until a printer has named itself, for timeout_s at most, or until `stop` is set. Raises PortError."""
     inquiry = _Inquiry(port, stop or Flag())
     inquiry.listen("M115", timeout_s, lambda: inquiry.named)
     if inquiry.named:
@@ -70,9 +70,9 @@ def ask(port: Port, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> A
 
 
 def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> tuple[Answer, int]:
-    """The answer, and its baud rate: the given one is tried, and where nothing sensible comes the usual others.
+    """The answer and its baud rate: the given rate first, then the other usual ones if nothing readable comes.
 
-    Where none makes a printer answer, the answer is that at the given rate, at which the port is left.
+    If no rate finds a printer, the answer is that at the given rate, and the port keeps that rate.
     """
     first = ask(port, timeout_s, stop)
     if first.kind not in (Kind.RUBBISH, Kind.SILENT) or port.name.startswith("socket://"):
@@ -88,7 +88,7 @@ def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: F
 
 
 class _Inquiry:
-    """An inquiry at a port, and the answers so far."""
+    """A query at a port, and the answers so far."""
 
     def __init__(self, port: Port, stop: Flag) -> None:
         self._stop = stop
@@ -96,10 +96,10 @@ class _Inquiry:
         self._words = self._fault = self._letters = ""
         self._area: tuple[tuple[float, float], ...] = ()
         self._ok = self.named = self.placed = self.starting = False
-        self._busy = ""  # what it says of that
+        self._busy = ""  # its report of what it is doing
 
     def listen(self, question: str, timeout_s: float, until: Callable[[], bool]) -> None:
-        """Ask again and again until the answer is whole, or the time is over."""
+        """Repeat a query until the answer is complete or the time is over."""
         end_s = SERIAL.now_s() + timeout_s
         self._ok = False
 
@@ -117,7 +117,7 @@ class _Inquiry:
             raise CancelledError
 
     def answer(self) -> Answer:
-        """The answer that all of them amount to."""
+        """The answer that the lines received amount to."""
         if self._fault:
             if GRBL_SAYS.fullmatch(self._fault):
                 return Answer(Kind.STRANGER, self._fault)
@@ -150,5 +150,5 @@ class _Inquiry:
             self._ok, self.named = True, bool(self._words)
 
     def _limits(self) -> dict[str, tuple[float, float]]:
-        """The area with the letters of M114: Marlin names the axes from the fourth on I, J, K, whatever their words are."""
+        """Limits by the letters of M114: Marlin's area calls the fourth and later axes I, J, K, whatever their letters are."""
         return {} if len(self._letters) < len(self._area) else dict(zip(self._letters, self._area, strict=False))

@@ -1,4 +1,4 @@
-"""Medium: what a stream runs on, so that a printer, a simulated one in memory, real and virtual time serve alike."""
+"""Medium: the wire and clock of a stream, real or simulated."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ Traffic = Callable[[str, bytes], None]  # "<" received or ">" sent, and the byte
 
 
 class Wire(Protocol):
-    """An open line to a printer; every method raises PortError when the printer cannot be reached any more."""
+    """An open line to a printer; every method raises PortError when the printer is unreachable."""
 
     name: str
 
@@ -23,25 +23,24 @@ class Wire(Protocol):
         """Send all bytes."""
 
     def read(self) -> bytes:
-        """The bytes that have come; waits a little for the first, so that a loop around it does not spin."""
+        """The bytes received; waits briefly for the first, so that a loop does not spin."""
 
     def discard(self) -> None:
-        """Forget bytes that were handed over but not sent yet."""
+        """Discard bytes that are not sent yet."""
 
     def close(self) -> None:
-        """Close; closing twice is allowed."""
+        """Close the line; may be called twice."""
 
 
 @dataclass(frozen=True)
 class Medium:
     """Access to lines and to the clock."""
 
-    open: Callable[[str, int], Wire] = open_port  # a line by its name, at a baud rate; raises PortError
+    open: Callable[[str, int], Wire] = open_port  # opens a line by name and baud rate; raises PortError
     now_s: Callable[[], float] = monotonic
     wait: Callable[[float], None] = sleep
-    devices: Callable[[], tuple[SerialDevice, ...]] = serial_devices  # where a lost port may have come back
-    # The longest wait for a port that was lost in mid-print: a person finds the plug in two minutes, and a hot nozzle should not
-    # stand in the print for longer.
+    devices: Callable[[], tuple[SerialDevice, ...]] = serial_devices  # ports at which a lost printer may have come back
+    # Longest wait for a port lost during a print: long enough to find the plug, short enough for a hot nozzle in the print.
     lost_s: float = 120.0
     timing: Timing = field(default_factory=Timing)
 
@@ -50,9 +49,9 @@ SERIAL = Medium()
 
 
 def reopen(find: Callable[[], str | None], baud: int, medium: Medium, on_turn: Callable[[], None], end_s: float) -> Wire | None:
-    """The wire to the printer once it is there again, None when it is not by end_s.
+    """The wire to the printer once it is back; None when it is not by end_s.
 
-    find: the name of its port, None while it has none. on_turn() may raise to end the wait.
+    find: name of its port, None while it has none. on_turn() may raise to end the wait.
     """
     while medium.now_s() < end_s:
         on_turn()

@@ -1,6 +1,6 @@
-"""Pending commands: requests of a person or of the printer to a running print that are not carried out yet.
+"""Pending commands: requests of the user or the printer to a running print, not carried out yet.
 
-Requests come from any thread through a Control; PendingCommands, in the thread that owns the port, refuses or holds them.
+Any thread makes requests through a Control; PendingCommands, in the port's thread, refuses or holds them.
 """
 
 import re
@@ -17,8 +17,8 @@ from machine.link.print_state import AWAY, PrintState
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from profiles.errors import LocalProtocolError
 
-MOST_AT_ONCE = 16  # requests taken in a turn: what asks without end must not hold up the print
-# Marlin takes 10 to 999 per cent. Beyond 300 the planner starves, beyond 200 the extruder slips.
+MOST_AT_ONCE = 16  # requests taken per turn: a flood of requests must not hold up the print
+# Marlin allows 10 to 999 per cent; beyond 300 the planner starves, beyond 200 the extruder slips.
 FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
 
 
@@ -31,12 +31,12 @@ class Command(Enum):
     EMERGENCY_STOP = auto()
     FEED = auto()  # value: per cent of the programmed feed rates
     FLOW = auto()  # value: per cent of the programmed filament
-    LINE = auto()  # text: a line of the person's own
+    LINE = auto()  # text: a line of G-code from the user
 
 
 @dataclass(frozen=True)
 class PendingCommand:
-    """One of them with its value or text."""
+    """A command with its value or text."""
 
     command: Command
     value: float = 100.0
@@ -44,9 +44,9 @@ class PendingCommand:
 
 
 class Control:
-    """Requests in the order they were made, an emergency stop before them. ask() from any thread, take() from the stream's.
+    """Requests in order, an emergency stop first. Call ask() from any thread, take() from the stream's.
 
-    stop: set, it ends the print as CANCEL does.
+    stop: when set, it ends the print like CANCEL.
     """
 
     def __init__(self, stop: Flag | None = None) -> None:
@@ -59,34 +59,34 @@ class Control:
         add(PendingCommand(command, value, text))
 
     def take(self) -> PendingCommand | None:
-        """The oldest request, None when there is none."""
+        """Remove and return the oldest request; None when there is none."""
         return self._waiting.popleft() if self._waiting else None
 
 
 class CancelledError(Exception):
-    """The stop flag was set, or a person or the printer asked for the end."""
+    """The stop flag was set, or the user or the printer requested the end."""
 
 
 class EmergencyError(Exception):
-    """A person asked for the emergency stop."""
+    """The user requested the emergency stop."""
 
 
 @dataclass
 class PendingCommands:
-    """The requests that were accepted."""
+    """The accepted requests."""
 
     axes: Axes
     limit: int = LINE_LIMIT
     control: Control = field(default_factory=Control)
-    pause_s: float | None = None  # since when a pause is wanted
-    resume: bool = False  # the print is to go on
-    lines: deque[str] = field(default_factory=deque)  # commands to be sent between those of the program
+    pause_s: float | None = None  # when a pause was requested
+    resume: bool = False  # the print is to continue
+    lines: deque[str] = field(default_factory=deque)  # to be sent between those of the program
     feed_percent: float = 100.0
     flow_percent: float = 100.0
-    message: str = ""  # why the newest request cannot be granted
+    message: str = ""  # why the newest request was refused
 
     def poll(self, state: PrintState, now_s: float) -> None:
-        """Take what was asked since. Raises CancelledError, EmergencyError."""
+        """Take the new requests. Raises CancelledError, EmergencyError."""
         if self.control.stop.is_set():
             raise CancelledError
         for _ in range(MOST_AT_ONCE):
@@ -96,7 +96,7 @@ class PendingCommands:
             self.accept(request, state, now_s)
 
     def heed_emergency(self) -> None:
-        """While a print is being ended only the emergency stop still counts. Raises EmergencyError."""
+        """Discard requests, for a print that is ending. Raises EmergencyError for an emergency stop."""
         while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
                 raise EmergencyError
@@ -120,7 +120,7 @@ class PendingCommands:
             self._override(command, request.value)
 
     def next_lines(self, modal: ModalState) -> Iterator[str]:
-        """The person's commands that are to be sent now; what they set holds for the rest of the print."""
+        """The user's commands to send now; settings that they change hold for the rest of the print."""
         while self.lines:
             command = self.lines.popleft()
             yield command
@@ -128,11 +128,11 @@ class PendingCommands:
                 modal.take(command)
 
     def end_pause(self) -> None:
-        """The pause is over."""
+        """Note the end of the pause."""
         self.pause_s, self.resume = None, False
 
     def note_override(self, command: str) -> None:
-        """Take note of an M220 or M221 of the program itself; no firmware goes down to 0."""
+        """Note an M220 or M221 of the program itself; no firmware accepts 0."""
         name, rest = split_command(command.upper())
         value = dict(read_words(rest)).get("S", 0.0) if name in ("M220", "M221") else 0.0
         if value > 0 and name == "M220":
@@ -141,7 +141,7 @@ class PendingCommands:
             self.flow_percent = value
 
     def undo_overrides(self) -> list[str]:
-        """Commands that take the overrides back: the firmware would keep them for the next print."""
+        """Commands that reset the overrides, which the firmware would keep for the next print."""
         pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
         return [f"{name} S100" for name, value in pairs if value != 100.0]
 
@@ -164,15 +164,15 @@ class PendingCommands:
 
 
 def percent_refusal(value: float, bounds: tuple[float, float]) -> str | None:
-    """Why a per cent value cannot be had, None when it can."""
+    """Why a percentage is refused; None when it is allowed."""
     low, high = bounds
     return None if low <= value <= high else f"{value:g} % is not possible: {low:g} to {high:g} % are allowed"
 
 
 def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
-    """Why a person's command may not be sent now, None when it may.
+    """Why the user's command may not be sent now; None when it may.
 
-    During a pause filament may be pushed and pulled, so that it can be changed; nothing else moves under the sender's hands.
+    During a pause filament may be pushed and pulled to change it; every other move is refused.
     """
     try:
         command = command_of(text, "the command", limit)
@@ -193,6 +193,6 @@ def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
 
 
 def _filament_only(command: str) -> bool:
-    """Whether a move has no word of an axis."""
+    """Whether a move has no axis word."""
     words = set(re.findall(r"[A-Z]", command.upper()[2:]))
     return split_command(command.upper())[0] in ("G0", "G1") and "E" in words and words <= {"E", "F"}

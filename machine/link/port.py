@@ -1,4 +1,4 @@
-"""The serial port: the only place that knows pyserial. Every trouble becomes a PortError of one sentence."""
+"""Serial port: the only module that uses pyserial. Every failure becomes a PortError with one sentence."""
 
 import errno
 import os
@@ -18,16 +18,16 @@ from profiles.errors import PortError, causes
 try:
     import serial
     from serial.tools import list_ports
-except ImportError:  # pyserial does not know the serial ports of every system: then socket:// is left
+except ImportError:  # pyserial does not support every system; socket:// remains
     serial = list_ports = None
 
-READ_S = 0.02  # read() gives up after this: an emergency stop is to be on the wire within 50 ms
+READ_S = 0.02  # read() returns after this: an emergency stop must be on the wire within 50 ms
 READ_BYTES = 4096
-WRITE_S = 10.0  # a printer whose buffers stay full for longer has stopped reading
+WRITE_S = 10.0  # a printer whose buffers stay full longer has stopped reading
 CONNECT_S = 5.0
 
-# termios.error is no OSError; pyserial lets it through when a setting is refused. An rfc2217:// port that is closed or
-# refuses a setting may show it as AttributeError or NotImplementedError.
+# termios.error is not an OSError, and pyserial raises it when a setting is refused. An rfc2217:// port that is closed or refuses
+# a setting may raise AttributeError or NotImplementedError.
 _TROUBLE: tuple[type[Exception], ...] = (OSError, ValueError, AttributeError, NotImplementedError)
 _TIMEOUTS: tuple[type[Exception], ...] = (TimeoutError,)
 if serial is not None:
@@ -42,16 +42,16 @@ with suppress(ImportError):
 class SerialDevice:
     """A serial port of this computer."""
 
-    name: str  # the stable one of a USB adapter where there is one, else the path
+    name: str  # the stable name of a USB adapter, else the path
     path: str
     description: str
     serial_number: str
-    model: str = ""  # vendor and product of a USB device, "" where they are not known
-    location: str = ""  # the USB socket it is plugged into
+    model: str = ""  # vendor and product of a USB device, "" if unknown
+    location: str = ""  # the USB socket
 
 
 class RefusedPortError(PortError):
-    """A port that cannot be opened. reason: why, as said behind its name."""
+    """A port that cannot be opened. reason: the sentence without the port's name."""
 
     def __init__(self, name: str, reason: str) -> None:
         super().__init__(f"port {name} {reason}")
@@ -59,10 +59,10 @@ class RefusedPortError(PortError):
 
 
 class Port:
-    """An open port: write all, read what is there.
+    """An open port with writes of all bytes and non-blocking reads.
 
-    On POSIX the bytes of devices and of socket:// go through pyserial's own file descriptor: its read() and write() add five
-    system calls to a turn, as much time as all the rest of a turn takes, and over a socket it reads byte by byte.
+    On POSIX devices and socket:// are read and written through the file descriptor: pyserial's read() and write() add five system
+    calls, which double the time of a turn, and read a socket byte by byte.
     """
 
     def __init__(self, device: Any, name: str) -> None:
@@ -71,26 +71,26 @@ class Port:
         self.name = name
 
     def set_baud(self, baud: int) -> None:
-        """Go on at another rate, bits a second. PortError when the device refuses it."""
+        """Change the rate, bits per second. Raises PortError when the device refuses it."""
         try:
             self._device.baudrate = baud
         except _TROUBLE as error:
             raise RefusedPortError(self.name, refusal(self.name, baud, error)) from None
 
     def write(self, data: bytes) -> None:
-        """Send all bytes. PortError when the printer does not take them or the port is gone."""
+        """Send all bytes. Raises PortError when the printer does not accept them or the port is lost."""
         try:
             if self._descriptor is None:
                 self._device.write(data)
             else:
                 self._write_descriptor(self._descriptor, data)
         except _TROUBLE as error:
-            if any(isinstance(cause, _TIMEOUTS) for cause in causes(error)):  # by pyserial's own clock or by its socket's
+            if any(isinstance(cause, _TIMEOUTS) for cause in causes(error)):  # pyserial's own or its socket's
                 raise PortError(f"the printer at {self.name} has stopped reading: it took no bytes for {WRITE_S:g} s") from None
             raise self._lost(error) from None
 
     def read(self) -> bytes:
-        """The bytes that have come; waits up to READ_S for the first. PortError when the port is gone."""
+        """The bytes received; waits up to READ_S for the first. Raises PortError when the port is lost."""
         try:
             if self._descriptor is not None:
                 return self._read_descriptor(self._descriptor)
@@ -116,20 +116,20 @@ class Port:
             data = os.read(descriptor, READ_BYTES)
         except BlockingIOError:
             return b""
-        if not data:  # a descriptor that is always ready and gives nothing has lost its device
+        if not data:  # a descriptor that is ready but empty has lost its device
             raise OSError(errno.EIO, os.strerror(errno.EIO))
         return data
 
     def discard(self) -> None:
-        """Forget bytes that were handed over but not sent yet."""
+        """Discard bytes that are not sent yet."""
         try:
             self._device.reset_output_buffer()
         except _TROUBLE as error:
             raise self._lost(error) from None
 
     def close(self) -> None:
-        """Close; a port that is gone already counts as closed."""
-        self._descriptor = None  # the system gives its number to the next file that is opened
+        """Close; a lost port counts as closed."""
+        self._descriptor = None  # the system reuses its number for the next open file
         try:
             self._device.close()
         except _TROUBLE:
@@ -147,10 +147,10 @@ class Port:
 
 
 def open_port(name: str, baud: int) -> Port:
-    """Open a device path or a pyserial URL (socket://host:port, rfc2217://...) for this program alone.
+    """Open a device path or a pyserial URL (socket://host:port, rfc2217://...) exclusively. Raises PortError.
 
-    The modem lines are left as the system sets them on opening: a board with native USB sends only while DTR is up, one
-    with a reset circuit restarts, which the greeting copes with. Raises PortError.
+    The modem lines keep the system's state at opening: a board with native USB sends only while DTR is set; a board with a reset
+    circuit restarts, which the greeting handles.
     """
     check_baud(baud)
     if "://" in name:
@@ -170,32 +170,31 @@ def _open_device(name: str, baud: int) -> Any:
         raise RefusedPortError(
             name, "cannot be opened: serial ports of this system are not known to pyserial, socket://HOST:PORT is left"
         )
-    # pyserial's rfc2217:// knows no time limit for writing.
+    # pyserial's rfc2217:// has no write timeout
     write_s = None if name.startswith("rfc2217://") else WRITE_S
     return serial.serial_for_url(name, baudrate=baud, timeout=READ_S, write_timeout=write_s, exclusive=True)
 
 
 class _Socket:
-    """A socket:// address with the calls of pyserial's devices that a port makes, on every system: pyserial's own reads a socket
-    byte by byte where it has no descriptor, and is not there where pyserial knows no serial ports.
-    """
+    """A socket:// address with the methods of pyserial's devices that Port calls, on every system. pyserial's own class reads
+    byte by byte without a descriptor, and is missing where it supports no serial ports."""
 
-    baudrate = 0  # a socket has none, but may be told one
-    in_waiting = 0  # read() gives all there is
+    baudrate = 0  # accepted, without effect on a socket
+    in_waiting = 0  # read() returns all bytes there are
 
     def __init__(self, address: str) -> None:
         parts = urlsplit(address)
         self._socket = socket.create_connection((parts.hostname or "", parts.port or 0), CONNECT_S)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # a small line must not wait for the last answer
-        self._socket.settimeout(0.0 if os.name == "posix" else WRITE_S)  # there a port reads and writes the descriptor itself
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # a short line must not wait for the last answer
+        self._socket.settimeout(0.0 if os.name == "posix" else WRITE_S)  # on POSIX a port reads and writes the descriptor itself
         self.fileno = self._socket.fileno
 
     def write(self, data: bytes) -> None:
-        """Send all bytes. OSError; TimeoutError when they are not taken in WRITE_S."""
+        """Send all bytes. Raises OSError; TimeoutError after WRITE_S."""
         self._socket.sendall(data)
 
     def read(self, size: int) -> bytes:
-        """The bytes that have come, all of them whatever the size; waits up to READ_S. OSError."""
+        """All bytes received, whatever the size; waits up to READ_S. Raises OSError."""
         del size
         if not select.select([self._socket], [], [], READ_S)[0]:
             return b""
@@ -205,26 +204,26 @@ class _Socket:
         return data
 
     def reset_output_buffer(self) -> None:
-        """Nothing: bytes that were handed over are the system's."""
+        """Do nothing: bytes handed over belong to the system."""
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._socket.close()
 
 
 def _descriptor(device: Any) -> int | None:
-    """The file descriptor of a POSIX device or of a socket, None where pyserial gives none."""
+    """The file descriptor of a POSIX device or socket; None when pyserial has none."""
     if os.name != "posix":
         return None
     try:
         descriptor: int = device.fileno()
-    except OSError:  # io.UnsupportedOperation, as rfc2217:// and loop:// have none
+    except OSError:  # io.UnsupportedOperation: rfc2217:// and loop:// have none
         return None
     return descriptor
 
 
 def serial_devices() -> tuple[SerialDevice, ...]:
-    """The serial ports of this computer: those with a stable name first, each once."""
+    """The serial ports of this computer, each once, those with a stable name first."""
     stable = _stable_names()
     devices = [
         SerialDevice(
@@ -241,7 +240,7 @@ def serial_devices() -> tuple[SerialDevice, ...]:
 
 
 def _stable_names() -> dict[str, str]:
-    """Device path -> its name under /dev/serial/by-id, which stays the same wherever it is plugged in."""
+    """Device path -> its name under /dev/serial/by-id, which does not depend on the socket."""
     folder, names = "/dev/serial/by-id", list[str]()
     with suppress(OSError):
         names = sorted(os.listdir(folder), reverse=True)
@@ -249,12 +248,12 @@ def _stable_names() -> dict[str, str]:
 
 
 def stable_name(port: str) -> str:
-    """The name by which a device is found again: an adapter that is plugged in again may become another /dev/tty."""
+    """The name under which a device is found again: after replugging, its /dev/tty may differ."""
     return _stable_names().get(os.path.realpath(port), port)
 
 
 def _description(port: Any) -> str:
-    """Maker and product as the adapter itself reports them over USB."""
+    """Manufacturer and product as the adapter reports them over USB."""
     words = [word for word in (port.manufacturer, port.product or port.description) if word and word != "n/a"]
     ids = _model(port)
     return " ".join([*dict.fromkeys(words), *([f"({ids})"] if ids else [])])
@@ -265,16 +264,16 @@ def _model(port: Any) -> str:
 
 
 def find_device(port: str, devices: Sequence[SerialDevice]) -> SerialDevice | None:
-    """The device that is open under a name; None of an address, a pseudo-terminal, or what the system does not list."""
+    """The device open under a name; None for an address, a pseudo-terminal, or a device that the system does not list."""
     path = os.path.realpath(port)
     return next((device for device in devices if port == device.name or path == os.path.realpath(device.path)), None)
 
 
 def find_again(lost: SerialDevice, devices: Sequence[SerialDevice]) -> SerialDevice | None:
-    """A USB device that was lost, under whatever name it is there now; None while it is not.
+    """A lost USB device under its current name; None while it is missing.
 
-    It is the one of its model with its serial number, or without any in its socket, or without that under its path: never another
-    one, though it has taken its name. Where several have the same number the socket decides, too.
+    It has the same model and serial number; without a number, or when several share it, the same socket; without a socket, the
+    same path. A different device at the old name is never returned.
     """
     same = [device for device in devices if (device.model, device.serial_number) == (lost.model, lost.serial_number)]
     if not lost.serial_number or len(same) > 1:
@@ -283,7 +282,7 @@ def find_again(lost: SerialDevice, devices: Sequence[SerialDevice]) -> SerialDev
 
 
 def refusal(name: str, baud: int, error: Exception) -> str:
-    """Why a port cannot be opened, as said behind its name."""
+    """Why a port cannot be opened, without its name."""
     number = _number(error)
     text = str(error).lower()
     if "exclusively lock" in text or number in (errno.EBUSY, errno.EAGAIN):
@@ -300,7 +299,7 @@ def refusal(name: str, baud: int, error: Exception) -> str:
 
 
 def _absence() -> str:
-    """The refusal of a port that does not exist, with those that do."""
+    """The sentence for a missing port, with the ports that exist."""
     names = [device.name for device in serial_devices()]
     return f"does not exist: {'there are ' + ', '.join(names) if names else 'no serial port was found'}"
 
@@ -313,7 +312,7 @@ def _check_address(name: str) -> None:
     try:
         parts = urlsplit(name)
         whole = bool(parts.hostname and parts.port)
-    except ValueError:  # a port that is no number, or too great
+    except ValueError:  # a port that is not a number, or is too large
         whole = False
     if not whole:
         raise RefusedPortError(name, f"is not complete: {scheme}://HOST:PORT is expected, PORT from 1 to 65535")
@@ -342,13 +341,13 @@ def _owners(name: str) -> str:
 
 
 def _number(error: BaseException) -> int | None:
-    """The system's number. pyserial wraps a failed tcgetattr or connect as text only; the trouble itself lies beneath."""
+    """The system's error number. pyserial wraps a failed tcgetattr or connect as text; the number is in its cause."""
     numbers = (getattr(cause, "errno", None) or next(iter(cause.args), None) for cause in causes(error))
     return next((number for number in numbers if isinstance(number, int)), None)
 
 
 def _reason(error: Exception) -> str:
-    """The system's own words in one line."""
+    """The system's own message on one line."""
     number = _number(error)
     if number is not None and number > 0:
         return os.strerror(number).lower()

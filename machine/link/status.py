@@ -1,9 +1,7 @@
-"""Status: what a printer reports about itself before it is greeted; the greeting sets its line numbers back. And whether the line
-that was on its way when the port was lost has been done, by where the printer stands.
+"""Status query before the greeting, which resets the line numbers; and the fate of the line in flight when a port was lost.
 
-Nothing is changed by it: its one numbered line has a number that no line of a print has, which a firmware that checks numbers
-refuses with the last one it has taken. RepRapFirmware and Klipper cannot be asked by line number, but both report the place they
-were sent to, to a thousandth, and the filament with it.
+The query changes nothing: its numbered line has a number beyond those of a print, which a firmware that checks numbers refuses
+with the last one it accepted. RepRapFirmware and Klipper do not report line numbers, but positions and filament to a thousandth.
 """
 
 import re
@@ -20,31 +18,31 @@ from machine.link.shutdown import Orders
 LAST_LINE = re.compile(r"Last Line: (\d{1,10})")
 QUESTIONS = ("M400", "M114", "M105")
 TRIES, ANSWER_S = 3, 4.0  # a board that restarts when its port is opened spends two seconds in its boot loader
-STILL_S = 300.0  # a printer that still works on its queue answers when that is empty
-SAME = 0.01  # mm or deg: what program and firmware round
-DISTINCT = 0.004  # two places nearer to each other cannot be told apart by thousandths
-SEVERAL = 3  # coordinates that are not 0 and agree: a printer that has restarted stands at 0 0 0
+STILL_S = 300.0  # a printer that is still executing its queue answers when that is empty
+SAME = 0.01  # mm or deg: rounding of program and firmware
+DISTINCT = 0.004  # closer positions cannot be distinguished by thousandths
+SEVERAL = 3  # matching coordinates other than 0: a restarted printer reports 0 0 0
 
 
 @dataclass
 class PrinterStatus:
     """A printer's own report; None: not reported."""
 
-    last_number: int | None = None  # of the last line that it has taken
+    last_number: int | None = None  # of the last accepted line
     position: dict[str, float] | None = None
     temperature: Temperature = field(default_factory=Temperature)
-    greeted: bool = False  # the firmware said its greeting meanwhile: it has just restarted
-    fault: str = ""  # its own words for an error
+    greeted: bool = False  # the firmware sent its start-up message: it has just restarted
+    fault: str = ""  # its message about an error
 
     def _read(self, event: Event) -> None:
-        """Any event; a board that restarts begins its line numbers anew."""
+        """Note an event; a board that restarts begins its line numbers again."""
         if event.kind is Kind.FAULT:
             self.fault = event.text.removeprefix("!!").strip()
         if event.kind in (Kind.START, Kind.BANNER):
             self.greeted, self.last_number = True, None if self.last_number is None else 0
 
     def read_number(self, event: Event) -> bool:
-        """Whether the far number was answered, by a refusal or, where numbers are not checked, by what M105 is answered with."""
+        """Whether the question was answered: by a refusal or, where numbers are not checked, by the answer to M105."""
         self._read(event)
         if last_line := LAST_LINE.search(event.text):
             self.last_number = int(last_line[1])
@@ -53,7 +51,7 @@ class PrinterStatus:
         return self.last_number is not None or (event.kind is Kind.OK and event.temperature is not None)
 
     def read_position(self, event: Event) -> bool:
-        """Take a position; whether the temperature that is asked for after it has come."""
+        """Note a position; whether the temperature requested after it has come."""
         self._read(event)
         self.position = event.position or self.position
         if event.kind is Kind.OK and event.temperature is not None:
@@ -63,9 +61,9 @@ class PrinterStatus:
 
 
 def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> PrinterStatus:
-    """Ask a printer for its status; all of it is unknown where no answer comes.
+    """Query a printer's status; everything is unknown when no answer comes.
 
-    Raises PortError, and what on_turn(), called meanwhile, raises to end the asking.
+    Raises PortError, and whatever on_turn(), called meanwhile, raises to end the query.
     """
     status, orders = PrinterStatus(), Orders(wire, medium, on_turn)
     for _ in range(TRIES):
@@ -75,7 +73,7 @@ def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> Pri
     else:
         return PrinterStatus()
     orders.wait_for(lambda event: False, medium.now_s() + 0.5)  # the rest of the refusal
-    for _ in range(TRIES):  # what was asked is lost when the board restarts meanwhile
+    for _ in range(TRIES):  # a query is lost when the board restarts meanwhile
         before, status.greeted = status.greeted, False
         orders.give(QUESTIONS, lambda event: status.read_position(event) or status.greeted, medium.now_s() + STILL_S)
         again, status.greeted = status.greeted, status.greeted or before
@@ -86,9 +84,9 @@ def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> Pri
 
 
 def line_was_done(command: str, before: Sequence[float | None], after: ModalState, status: PrinterStatus) -> bool | None:
-    """True: done; False: it may be sent once more; None: nobody can say, or the printer has restarted.
+    """Whether a line was executed; False: it may be sent again; None: unknown, or the printer has restarted.
 
-    before: X Y Z tilt turn E before the command; after: what the firmware is to remember after it.
+    before: X Y Z tilt turn E before the command; after: the firmware's state after it.
     """
     if status.position is None or len(before) <= E_AXIS:
         return None
@@ -101,7 +99,7 @@ def line_was_done(command: str, before: Sequence[float | None], after: ModalStat
     start, end = (dict(zip(after.axes.letters, values, strict=True)) for values in (before, after.at))
     if not _still_running(reported, (start, end), letters, status, after):
         return None
-    for chosen in ([letter for letter in letters if letter != "E"], letters):  # some firmwares count filament in their own way
+    for chosen in ([letter for letter in letters if letter != "E"], letters):  # some firmwares count filament differently
         if _greatest_difference(start, end, chosen) >= DISTINCT:
             return _reached_end(reported, start, end, chosen)
     row = command_in(command)
@@ -117,7 +115,7 @@ def _still_running(
     status: PrinterStatus,
     after: ModalState,
 ) -> bool:
-    """Whether the printer has not restarted since: it stands at one of the places, and still heats what is to be hot."""
+    """Whether the printer has not restarted: it is at one of the ends, and still heats as the program requires."""
     heat = status.temperature
     pairs = ((after.nozzle_c, heat.nozzle_target_c), (after.bed_c, heat.bed_target_c))
     if any(wanted > 0 and target is not None and target <= 0 for wanted, target in pairs):
@@ -131,19 +129,19 @@ def _still_running(
 def _reached_end(
     reported: Mapping[str, float], start: Mapping[str, float | None], end: Mapping[str, float | None], letters: Sequence[str]
 ) -> bool | None:
-    """Whether the printer stands where the command leads to; None when at neither place."""
+    """Whether the printer is at the end of the command; None when at neither end."""
     from_start = _greatest_difference(reported, start, letters)
     from_end = _greatest_difference(reported, end, letters)
     return from_end < from_start if min(from_start, from_end) <= SAME else None
 
 
 def _greatest_difference(a: Mapping[str, float | None], b: Mapping[str, float | None], letters: Sequence[str]) -> float:
-    """The greatest difference of two places on some axes."""
+    """Greatest difference of two positions on some axes."""
     return max((abs((a[letter] or 0.0) - (b[letter] or 0.0)) for letter in letters), default=0.0)
 
 
 def position_differences(modal: ModalState, reported: Mapping[str, float], near: float) -> list[str]:
-    """Axes on which the printer's own position differs by more than `near` from what the program has led to, in words."""
+    """Axes, in words, whose reported position differs by more than `near` from the program's."""
     pairs = zip(modal.axes.letters[:E_AXIS], modal.at[:E_AXIS], strict=True)
     return [
         f"{letter} {reported[letter]:g} instead of {value:.3f}"

@@ -1,4 +1,4 @@
-"""Streaming a program to a printer: checked first, fed as fast as the window allows, a barrier at the end, a safe way out."""
+"""Stream: send a program to a printer: checked first, fed as fast as the window allows, to a barrier at the end or a safe stop."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -20,14 +20,14 @@ from machine.link.status import PrinterStatus, line_was_done, query_status
 from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError, add_words
 from profiles.profile import Profile
 
-# After an error the printer may be deaf: the orders are given, the proof is not awaited for long. A halted or restarted
+# After an error the printer may not respond: the orders are given, but the proof is not awaited for long. A halted or restarted
 # firmware has switched its heaters off by itself.
 HEATERS_OFF_S: dict[type[PrinterError], float] = {FirmwareError: 1.0, SilenceError: 5.0, PortError: 2.0}
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a print."""
+    """How a print ended."""
 
     cancelled: bool
     sent: int
@@ -36,9 +36,9 @@ class Outcome:
     elapsed_s: float
     firmware: str
     warnings: tuple[str, ...]
-    # After a cancel: the printer's own report proves it. None: the program ran to its own end, or nothing of it had been sent.
+    # After a cancel: whether the printer's report proves it. None: the program ended by itself, or nothing of it was sent.
     heaters_off: bool | None = None
-    halted: str = ""  # the printer has stopped for good: what lets it print again
+    halted: str = ""  # after a halt: what makes the printer print again
 
 
 def print_lines(
@@ -53,15 +53,14 @@ def print_lines(
     begin: Callable[[PrinterStatus], ResumePoint] | None = None,
     medium: Medium = SERIAL,
 ) -> Outcome:
-    """Print a program: send every line's command, wait until the last one is done.
+    """Print a program: send every line's command and wait until the last one has ended.
 
-    What can be read twice (a sequence, a GcodeFile) is checked wholly before the port is opened, an iterator line by line as it
-    is reached; lines are consumed lazily. A plain string is taken as its lines. control: commands of a person; journal: written
-    for a later resume; profile: tells how long a line the firmware keeps, lets a pause lift, park and cool the nozzle, and the
-    watchdog know what is too hot; begin: decides where a resumed print goes on.
+    A sequence or GcodeFile is checked completely before the port is opened, an iterator line by line as it is consumed; a string
+    is split into lines. control: the user's commands; journal: written for a later resume; profile: gives the firmware's line
+    length, lets a pause lift, park and cool the nozzle, and limits temperatures; begin: decides where a resumed print continues.
 
-    A set stop flag of the control ends the print: feeding stops, moves are stopped, heaters and fan go off, the tip is lifted,
-    nothing homes or turns; the Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises
+    When the control's stop flag is set, the print ends: feeding and moves stop, heaters and fan go off, the tip is lifted,
+    nothing homes or turns, and the Outcome is cancelled. KeyboardInterrupt does the same and is raised again. Raises
     LocalProtocolError for a line that cannot be sent, PortError, FirmwareError, SilenceError or PrinterError; the heaters are
     switched off first and the message says whether the printer confirmed it.
     """
@@ -82,14 +81,15 @@ def print_lines(
 
 
 class _Print:
-    """A print at a port: what finds the port again when it is lost, and the ways to end, each leaving the printer safe."""
+    """A print at a port: finds the port again when it is lost, and ends safely in every way."""
 
     def __init__(self, feed: Feed, port: str, baud: int, medium: Medium, journal: Journal | None) -> None:
         self._name, self._baud = stable_name(port), baud
         self._device = find_device(port, medium.devices())
         self._path = "" if self._device is None else self._device.path
         profile = feed.profile
-        rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
+        # a ring buffer holds one byte less than its size
+        rx_bytes = None if profile is None else profile.machine.receive_bytes - 1
         wire = medium.open(port, baud)
         connection = Connection(medium.timing, medium.now_s(), limit=feed.limit, rx_bytes=rx_bytes, baud=baud)
         self.exchange = Exchange(
@@ -100,7 +100,7 @@ class _Print:
         self._guard = HeaterGuard(self.exchange, lambda: feed.started, feed.pending.heed_emergency)
 
     def _find(self) -> str | None:
-        """The name of the printer's port now. A device that USB tells nothing of is looked for under its own name only."""
+        """Current name of the printer's port. A device without USB identification is only sought under its own name."""
         if self._device is None or not self._device.model:
             return self._name
         device = find_again(self._device, self.medium.devices())
@@ -110,7 +110,7 @@ class _Print:
         return device.name
 
     def _reconnect(self, error: PortError) -> tuple[Wire, bool | None]:
-        """Wait for a lost port. A firmware that cannot be asked by line number is asked for its place instead."""
+        """Wait for a lost port; a firmware without line numbers is asked for its position."""
         feed, before = self.feed, self._path
         wire, done = self._reopen(error)
         if self._path != before:
@@ -125,15 +125,15 @@ class _Print:
             while (wire := reopen(self._find, self._baud, medium, feed.poll, end_s)) is not None:
                 if self.exchange.connection.greeting.firmware.line.resends:
                     return wire, None
-                self.exchange.wire = wire  # whoever cancels meanwhile wants the heaters off
+                self.exchange.wire = wire  # a cancel from now needs it to switch the heaters off
                 try:
                     return wire, self._line_was_done(query_status(wire, medium, feed.poll))
-                except PortError:  # a plug that is still loose, or a printer that has stopped reading
+                except PortError:  # a loose plug, or a printer that has stopped reading
                     wire.close()
         raise PortError(f"{error}; it did not come back within {medium.lost_s:.0f} s")
 
     def _line_was_done(self, status: PrinterStatus) -> bool | None:
-        """Whether the one line of the program on its way has been done, by where the printer stands; None: nobody can say."""
+        """Whether the program's one line in flight was executed, judging by the printer's position; None: unknown."""
         window, history = self.exchange.connection.window, self.feed.history
         step, waiting = history.only_unanswered, [line.number for line in window.flight if not line.asks_temperature]
         if step is None or waiting != [step.number]:
@@ -145,11 +145,11 @@ class _Print:
         try:
             with self._guard:
                 return self._outcome(start_s, self._run(lines, begin))
-        except EmergencyError:  # asked for while the guard was switching the heaters off
+        except EmergencyError:  # requested while the guard was switching the heaters off
             raise FirmwareError(self._stop()) from None
 
     def _run(self, lines: Iterable[str], begin: Callable[[PrinterStatus], ResumePoint] | None) -> Heaters | None:
-        """The print, and what its end has left of the heaters; None when the program has run to its own end, or not begun."""
+        """Print; returns the state of the heaters, None when the program ended by itself or had not begun."""
         try:
             resume_point = None
             if begin is not None:
@@ -179,18 +179,18 @@ class _Print:
         return self._shut_down(SETTLE_S)
 
     def _stop(self) -> str:
-        """The emergency stop, in words."""
+        """Make an emergency stop; returns the result in words."""
         heat = self._last_known()
         words = self._guard.stop()
         self.feed.set_state(PrintState.CANCELLING)
         return f"{words}{heat}"
 
     def _leave(self, error: PrinterError) -> str:
-        """Heaters off before an error goes its way; words on whether the printer proved it, and how hot it was if not."""
+        """Switch the heaters off before an error is raised; returns whether that was proved, else their last temperature."""
         heat = self._last_known()
         timeout_s = HEATERS_OFF_S.get(type(error), SETTLE_S)
         alive = not isinstance(error, FirmwareError | PortError)
-        waits = alive and not isinstance(error, SilenceError)  # whose homing has been waited for already
+        waits = alive and not isinstance(error, SilenceError)  # its homing was awaited already
         heaters = self._shut_down(timeout_s, alive, waits)
         words = f"{heaters.value}: {self._guard.revival}" if heaters is Heaters.HALTED else heaters.value
         return words if heaters is Heaters.OFF else f"{words}{heat}"
@@ -200,7 +200,7 @@ class _Print:
         return last_known(reports.temperature, self.medium.now_s() - reports.temperature_s)
 
     def _shut_down(self, timeout_s: float, alive: bool = True, waits: bool = True) -> Heaters:
-        """Heaters off, the tip lifted where the printer is alive and knows its place; waits: for the end of homing."""
+        """Switch the heaters off and lift the tip if the printer responds and knows its position; waits: for the end of homing."""
         exchange, feed = self.exchange, self.feed
         try:
             heaters = self._guard.switch_off(timeout_s, waits)
@@ -213,7 +213,7 @@ class _Print:
         return heaters
 
     def _hint(self) -> str:
-        """Advice on how a print that was cut off goes on, or that it cannot; proved by closing the journal."""
+        """Advice on how to resume an interrupted print, or why that is impossible; closes the journal to be sure."""
         if self.journal is None:
             return ""
         self.journal.close()

@@ -1,8 +1,8 @@
-"""Watchdog: what a printer reports while it prints, and what of it ends the print: temperatures that stay away from their target
-or are no longer reported, cold extrusion, a request to be disconnected.
+"""Watchdog: a printer's reports that end the print: temperatures that stay away from their targets or are no longer reported,
+cold extrusion, a request to disconnect.
 
-A firmware guards its heaters itself (Marlin: 40 s beyond 4 K, 20 s without a rise of 2 K); the bounds here are wider, so that
-this one speaks only where the firmware's is missing or does not see the fault.
+Firmwares guard their heaters themselves (Marlin: 40 s beyond 4 K, 20 s without a rise of 2 K); the limits here are wider, and
+only matter where the firmware's are missing or fail.
 """
 
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ from machine.link.pending_commands import Command, PendingCommand
 from machine.link.protocol.events import Event, Kind, Temperature
 from profiles.errors import PrinterError
 
-SILENCE_S = 120.0  # a report is asked for every few seconds: that many questions do not stay unanswered by chance
+SILENCE_S = 120.0  # a report is requested every few seconds: as many queries do not stay unanswered by chance
 OVER_LIMIT_C = 15.0
-OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
-WARNINGS = 20  # remembered of the printer's own words that show a program it does not understand
+OVER_REPORTS = 2  # in a row: a lost byte makes 200 of 20.0 once
+WARNINGS = 20  # remembered messages about commands that the printer does not know
 WARNS = ("nknown command", "too long extrusion")
 COLD = ("cold extrusion prevented", "not driven because its heater")  # Marlin, RepRapFirmware; Klipper's is an error
 ASKS = {"pause": Command.PAUSE, "resume": Command.RESUME, "cancel": Command.CANCEL}
@@ -26,19 +26,19 @@ SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prom
 
 @dataclass
 class HeaterWatch:
-    """One heater's way to its target."""
+    """A heater's approach to its target."""
 
     name: str
-    off_c: float  # how far it may stay from it, K,
-    off_s: float  # for how long
-    nearer_c: float = 2.0  # what counts as getting nearer, K
+    off_c: float  # tolerated deviation, K,
+    off_s: float  # and its duration
+    nearer_c: float = 2.0  # smallest approach that counts as progress, K
     target_c: float | None = None
-    nearest_c: float = inf  # least distance from the target since it was set or reached
+    nearest_c: float = inf  # smallest deviation since the target was set or reached
     nearest_s: float = 0.0  # when that was
-    over: int = 0  # reports in a row beyond what the machine allows
+    over: int = 0  # reports in a row beyond the machine's limit
 
     def check(self, now_c: float | None, target_c: float | None, now_s: float) -> None:
-        """Judge one report; raises PrinterError."""
+        """Judge a report. Raises PrinterError."""
         if now_c is None or not target_c:
             self.target_c = None
             return
@@ -55,10 +55,10 @@ class HeaterWatch:
 
 
 class PrinterReports:
-    """The printer's own reports, judged as they come: read() every event, check_silence() now and then.
+    """Judges a printer's reports: read() every event, check_silence() regularly.
 
-    most_c: what nozzle and bed must never exceed by far, deg C. temperature_s: when the newest temperature came; unknown:
-    commands that the firmware does not know; waiting: what a person at the printer is waited for, "" when for nothing.
+    most_c: greatest temperatures of nozzle and bed, deg C. temperature_s: time of the newest temperature; unknown: commands that
+    the firmware does not know; waiting: what the printer waits for the user to do, "" for nothing.
     """
 
     def __init__(self, now_s: float, most_c: tuple[float, float] = (inf, inf)) -> None:
@@ -71,13 +71,13 @@ class PrinterReports:
         self._silent_since_s: float | None = None  # None: nothing was ever reported
 
     def read(self, event: Event, now_s: float) -> PendingCommand | None:
-        """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
+        """Note an event; returns a command when the printer requests one. Raises PrinterError when the print must end."""
         if event.kind is Kind.OK:
             self.waiting = ""
-            if event.temperature is None and not event.identity:  # most answers: an ok, and nothing else in it
+            if event.temperature is None and not event.identity:  # most answers: an ok with nothing else
                 return None
         elif event.kind is Kind.BUSY:
-            # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
+            # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament runout, M0, a question on its display.
             self.waiting = "the printer waits for a person: look at its display" if "paused for" in event.text else ""
         if event.temperature is not None:
             self._check(event.temperature, now_s)
@@ -85,8 +85,8 @@ class PrinterReports:
             self.firmware = event.identity.removeprefix("FIRMWARE_NAME:").strip()
         elif unknown := event.unknown_command:
             self.unknown.add(unknown)
-            # Marlin has M73 and M486 only where it was built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS
-            # (Configuration_adv.h), which it is not unless somebody asks for them.
+            # Marlin has M73 and M486 only when built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS (Configuration_adv.h), which
+            # are off by default.
             if not command_named(unknown).shows:
                 self._warn(f"Unknown command: {unknown}")
         elif event.kind is Kind.ECHO:
@@ -107,9 +107,7 @@ class PrinterReports:
                 heater.check(now_c, target_c, now_s)
 
     def check_silence(self, now_s: float, mute: bool = False) -> None:
-        """Judge silence while a heater is on; raises PrinterError. A printer that never reported anything is not judged, nor one
-        that cannot report now (mute).
-        """
+        """Raise PrinterError for silence while a heater is on, unless the printer never reported or cannot report now (mute)."""
         if mute and self._silent_since_s is not None:
             self._silent_since_s = now_s
         silent_s = 0.0 if self._silent_since_s is None else now_s - self._silent_since_s
@@ -117,7 +115,7 @@ class PrinterReports:
             raise PrinterError(f"the printer has reported no temperature for {silent_s:.0f} s although a heater is on")
 
     def leaves_out(self, command: str) -> bool:
-        """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""
+        """Whether a command that the firmware does not know can be omitted: no heat, move, mode or waiting."""
         if not self.unknown:
             return False
         name = split_command(command.upper())[0]
@@ -125,7 +123,7 @@ class PrinterReports:
 
     @property
     def warnings(self) -> list[str]:
-        """The printer's words about a program that it does not understand; repetitions are counted."""
+        """The printer's messages about commands that it does not know; repetitions are counted."""
         return [text if count == 1 else f"{text} (x {count})" for text, count in self._warned.items()]
 
     def _read_echo(self, text: str) -> None:

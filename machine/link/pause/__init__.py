@@ -1,5 +1,4 @@
 """A pause: where the tip waits, and how it gets there and back.
 
-`pause.Pause` is one from its begin to its end; `park_moves` plans the way aside, and the way back past what is
-printed.
+`pause.Pause` runs it from beginning to end; `park_moves` plans the moves aside and back, clear of the print.
 """

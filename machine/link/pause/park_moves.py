@@ -1,8 +1,6 @@
-"""Park moves: the commands that take the tip away from the print, and back to the very place where it stopped;
-and back from anywhere, past what is printed.
+"""Park moves: commands that take the tip away from the print and back, from the parking place or from anywhere.
 
-Away: filament pulled back, straight up along the nozzle, aside. Back: the same way in reverse, filament pushed. The rotary axes
-never move.
+Away: pull filament, rise along the nozzle, move aside. Back: the same in reverse. The rotary axes never move.
 """
 
 from collections.abc import Sequence
@@ -28,9 +26,9 @@ from profiles.messages import key_name
 from profiles.profile import Profile
 from slicer.estimate.timing import speeds_of
 
-PULL_MM, PULL_MM_S = 1.0, 30.0  # where no material says otherwise
+PULL_MM, PULL_MM_S = 1.0, 30.0  # without a material
 FILL_MM_S = 3.0  # Marlin's ADVANCED_PAUSE_PURGE_FEEDRATE
-SLOWLY = 0.25  # the last stretch down goes at this share of the Z axis' speed
+SLOWLY = 0.25  # share of the Z axis' speed for the last stretch down
 NEAR_MM = 2.0
 STILL_DEG = 0.01
 
@@ -38,9 +36,8 @@ STILL_DEG = 0.01
 def plan_park(
     modal: ModalState, profile: Profile | None, bounds: PrintedBounds | None
 ) -> tuple[list[str], list[str], Park | None]:
-    """The way out of a print that stands at modal's place, all moves over, and the way back: commands away from the print,
-    and back to it. The third value is None where the tip stays because its place is not known or no way is clear.
-    """
+    """Commands from the place of `modal`, all moves ended, to the parking place, and commands back to the print. The third value
+    is None when the tip stays, because its position is unknown or no way is clear."""
     pull, push = filament_commands(modal, profile)
     up, down, park = _moves(modal, profile, bounds)
     away = ["G21", *pull, "G90", *up]
@@ -51,7 +48,7 @@ def plan_park(
 
 
 def lift_move(modal: ModalState, machine: Machine) -> tuple[str, float] | None:
-    """Words and mm/min of a step that takes the tip away from the print; None where its place is not known or at the top."""
+    """Words and mm/min of a move away from the print; None when the position is unknown or the tip is at the top."""
     standing = axis_position(machine, modal.coordinates(), modal.follows)
     if standing is None:
         return None
@@ -61,14 +58,14 @@ def lift_move(modal: ModalState, machine: Machine) -> tuple[str, float] | None:
 
 
 def heat_commands(modal: ModalState, profile: Profile | None) -> list[str]:
-    """Wait for the temperatures the program wants: the bed first, it takes longest and the print stands on it."""
+    """Commands that wait for the program's temperatures: first the bed, which is slowest and holds the print."""
     wait = dialect_of(profile.machine).nozzle_wait if profile is not None else "M109 S{}"
     bed = [f"M190 S{number(modal.bed_c)}"] if modal.bed_c > 0 else []
     return bed + ([wait.format(number(modal.nozzle_c))] if modal.nozzle_c > 0 else [])
 
 
 def filament_commands(modal: ModalState, profile: Profile | None) -> tuple[list[str], list[str]]:
-    """Commands that pull filament back before the tip leaves a place where it stood still, and that push it after."""
+    """Commands that retract before the tip leaves a place where it stood, and that prime at its return."""
     pull, speed, extra = _filament(modal, profile)
     if not modal.nozzle_c or not pull:
         return [], []
@@ -77,9 +74,8 @@ def filament_commands(modal: ModalState, profile: Profile | None) -> tuple[list[
 
 
 def fill_commands(modal: ModalState, profile: Profile) -> list[str]:
-    """Commands that fill a nozzle again that has cooled while the tip waited: what has run out of it is taken for as much as a
-    retraction holds back. Filament stands as far back after them as before.
-    """
+    """Commands that refill a nozzle that cooled while the tip waited, assuming that as much oozed as a retraction holds back. The
+    filament's position is the same after them as before."""
     pull, speed, _ = _filament(modal, profile)
     back = pull + modal.pulled_mm
     push = back + max(profile.material.retract_mm, PULL_MM)
@@ -87,7 +83,7 @@ def fill_commands(modal: ModalState, profile: Profile) -> list[str]:
 
 
 def _filament(modal: ModalState, profile: Profile | None) -> tuple[float, float, float]:
-    """Filament to pull back (less what the program has pulled already), mm, its speed, mm/s, and the extra to push, mm."""
+    """Filament to pull back (less what the program has retracted), mm; its speed, mm/s; and the extra to push, mm."""
     material = profile.material if profile is not None else None
     whole = material.retract_mm if material is not None else PULL_MM
     speed = material.retract_speed_mm_s if material is not None else PULL_MM_S
@@ -125,7 +121,7 @@ def _words(point: tuple[float, float, float]) -> str:
 
 
 def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> list[str]:
-    """G0 words of the way up and aside, as the firmware calls the places now; following: it follows the table (TCP)."""
+    """G0 words of the move up and aside, in the firmware's coordinates; following: it follows the table (TCP)."""
     stops = [park.lift_mm] if park.stand_mm == park.lift_mm else [park.lift_mm, park.stand_mm]
     if following:
         return [f"X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in followed_places(machine, pose, np.array(stops))]
@@ -133,7 +129,7 @@ def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> lis
 
 
 def axis_position(machine: Machine, coordinates: tuple[float | None, ...], following: bool) -> tuple[Floats, Pose] | None:
-    """(3,) axis positions and the pose of a place as the program calls it; None where a coordinate is not known."""
+    """(3,) axis positions and the pose of the program's coordinates; None when one of X Y Z is unknown."""
     x, y, z, tilt, turn = coordinates[:5]
     if x is None or y is None or z is None:
         return None
@@ -143,15 +139,15 @@ def axis_position(machine: Machine, coordinates: tuple[float | None, ...], follo
 
 
 def lift_words(machine: Machine, pose: Pose, far_mm: float, following: bool) -> str:
-    """Words of a step along the nozzle, for G91."""
+    """Words of a relative move (G91) along the nozzle."""
     step = rotation(machine, pose).T @ (far_mm * UP) if following else far_mm * UP
     return " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", step, strict=True) if abs(value) > 5e-4)
 
 
 def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
-    """G0 lines from axis positions at one pose to axis positions at another; G21 and G90 hold. Raises JournalError, MoveError."""
+    """G0 lines from axis positions at one pose to axis positions at another; require G21 and G90. Raises JournalError, MoveError."""
     machine, process, goal = profile.machine, profile.process, way.target_mm
-    assert goal is not None  # it leads back into a print
+    assert goal is not None  # the way leads back into a print
     rise, across = 60.0 * machine.z.speed_mm_s, 60.0 * process.travel_speed_mm_s
     near = min(float(goal[2]) + NEAR_MM, machine.z.limits_mm[1])
     down = [f"G0 Z{near:.3f} F{rise:.0f}", f"G1 Z{goal[2]:.3f} F{SLOWLY * rise:.0f}"]
@@ -172,10 +168,9 @@ def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
 
 
 def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequence[str]) -> list[str]:
-    """return_moves() for a firmware that has forgotten where its axes stand: they are set, `heat` is done, the tip rises, X and Y
-    are homed.
+    """return_moves() for a firmware that lost its position: set the axes, run `heat`, lift the tip, home X and Y.
 
-    machine.gcode.resume takes the place of that where the profile has it. Raises JournalError, MoveError, ProfileError.
+    machine.gcode.resume replaces the homing if the profile has it. Raises JournalError, MoveError, ProfileError.
     """
     machine, dialect = profile.machine, dialect_of(profile.machine)
     height = _clear_z_mm(profile, printed, way.start)
@@ -192,7 +187,7 @@ def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequ
 
 
 def _clear_z_mm(profile: Profile, printed: Printed, pose: Pose) -> float:
-    """Z above which the head may cross anywhere at a pose; raises JournalError where the axis does not reach it."""
+    """Z above which the head may cross anywhere at a pose. Raises JournalError when the axis does not reach it."""
     machine = profile.machine
     height = obstacle_top_mm(machine, printed, pose) + machine.lift_mm
     if height > machine.z.limits_mm[1]:

@@ -1,7 +1,6 @@
-"""Pause: a print that stands still until a person lets it go on: leave it, wait, come back to the same place.
+"""Pause: leave the print, wait until the user resumes, return to the same place.
 
-Meanwhile the firmware is kept from letting its motors go, and a nozzle that nobody comes back to is switched off: it would drip,
-and char what is in it.
+Meanwhile the motors are kept on; the nozzle of an unattended pause is switched off, for it would ooze and char.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,7 +21,7 @@ from profiles.profile import Profile
 
 AWAKE_S = 60.0  # half of the shortest idle time, Marlin's DEFAULT_STEPPER_TIMEOUT_SEC
 COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP and Klipper's min_extrude_temp
-NEAR_C = 10.0  # a print that is to be colder than that shows that its firmware allows it
+NEAR_C = 10.0  # a print at a lower temperature shows that its firmware allows it
 
 
 @dataclass
@@ -32,15 +31,15 @@ class Pause:
     exchange: Exchange
     pending: PendingCommands
     reports: PrinterReports
-    modal: ModalState  # the firmware's where the print stopped, with what a person sets meanwhile
+    modal: ModalState  # the firmware's state where the print stopped, with the user's changes
     profile: Profile | None
     stands: Coordinates | None = None  # X Y Z tilt turn E where the tip waits, None on its way
     aside: bool = False  # the tip has left the print
-    off: bool = False  # its nozzle is switched off
+    off: bool = False  # the nozzle was switched off
     printing_c: float = 0.0  # the nozzle's target where the print stopped
 
     def run(self, bounds: PrintedBounds | None, why: str) -> Iterator[tuple[PrintState, str]]:
-        """The whole pause: each of its states as it begins, with the words to be shown. bounds: what was printed."""
+        """Run the pause; yields each state with the message to show. bounds: the printed region."""
         modal, bed_c, self.printing_c = self.modal, self.modal.bed_c, self.modal.nozzle_c
         away, back, park = plan_park(modal, self.profile, bounds)
         self._send(away)
@@ -50,7 +49,7 @@ class Pause:
         yield PrintState.PAUSED, why
         for words in self._wait(why):
             yield PrintState.PAUSED, words
-        # A heater that the person has switched off is off for the pause only: a print cannot go on cold.
+        # A heater that the user switches off is off for the pause only: the print cannot continue cold.
         modal.nozzle_c, modal.bed_c = modal.nozzle_c or self.printing_c, modal.bed_c or bed_c
         cooled = modal.nozzle_c > 0 and (self.off or self._has_cooled())
         yield PrintState.RESUMING, f"the nozzle is {self._heating()}" if cooled else ""
@@ -63,7 +62,7 @@ class Pause:
         self._send((*back, *modal.lines()))
 
     def _wait(self, why: str) -> Iterator[str]:
-        """Until the print is to go on; the words to be shown when they change."""
+        """Wait until the print resumes; yields each new message."""
         pending, exchange, now_s = self.pending, self.exchange, self.exchange.medium.now_s
         awake = exchange.connection.greeting.keep_awake
         awake_s, since_s = now_s(), now_s()
@@ -82,7 +81,7 @@ class Pause:
             exchange.wait(due_s - now_s(), until=lambda: pending.resume or bool(pending.lines))
 
     def _cools_after_s(self) -> float:
-        """The time after which a nozzle that nobody attends to is switched off, s."""
+        """Time after which an unattended nozzle is switched off, s."""
         minutes = self.profile.machine.pause_cools_after_min if self.profile is not None else 0.0
         return 60.0 * minutes if minutes and self.modal.nozzle_c > 0 and not self.off else inf
 
@@ -92,13 +91,13 @@ class Pause:
             self.off = True
 
     def _send_own(self) -> str:
-        """The person's commands; why one of them was not sent, "" when all were: a firmware ends the print at cold filament."""
+        """Send the user's commands; returns why one was refused, or "": firmwares end a print at cold extrusion."""
         refused = ""
         for command in self.pending.next_lines(self.modal):
             row = command_in(command)
             if row.moves == "path":
                 self.exchange.send("M105")
-                self.exchange.settle()  # whatever heats is waited for
+                self.exchange.settle()  # heating is waited for
                 if self._is_cold():
                     nozzle_c = self.reports.temperature.nozzle_c
                     refused = f"not sent: {command[:40]!r}: the nozzle has only {nozzle_c:.0f} °C: heat it first (M109)"
@@ -108,16 +107,16 @@ class Pause:
         return refused
 
     def _is_cold(self) -> bool:
-        """Whether the printer says that no filament can be pushed."""
+        """Whether the nozzle is too cold to extrude."""
         nozzle_c, hot_c = self.reports.temperature.nozzle_c, self.modal.nozzle_c or self.printing_c
         return nozzle_c is not None and nozzle_c < (min(COLD_C, hot_c - NEAR_C) if hot_c else COLD_C)
 
     def _has_cooled(self) -> bool:
-        """Whether the nozzle was switched off by somebody else: a person, the firmware."""
+        """Whether the user or the firmware switched the nozzle off."""
         return self._is_cold() and (self.profile is None or self.profile.material.standby_c is None)
 
     def _words(self, why: str) -> str:
-        """Why it pauses, and what will happen when it goes on."""
+        """The reason of the pause, and what happens when it ends."""
         if not self.off or self.profile is None:
             return why
         minutes = self.profile.machine.pause_cools_after_min

@@ -1,4 +1,4 @@
-"""Printed bounds: boxes around what was printed at each pose, for ways over a print that is still on the table."""
+"""Printed bounds: boxes around what was printed at each pose, for moves over a print on the table."""
 
 from dataclasses import dataclass, field
 from itertools import product
@@ -13,19 +13,19 @@ from machine.kinematics.table import origin_mm, workpiece_points
 from mdp.pose import Pose
 from profiles.machine import Machine
 
-BEAD_MM = 1.0  # half a bead's width and more
+BEAD_MM = 1.0  # more than half a bead's width
 
 
 @dataclass
 class PrintedBounds:
-    """A box for each pose, X Y Z of the axes: a bound that costs nothing to keep up while a program is sent."""
+    """A box of axis positions X Y Z for each pose, updated at almost no cost while a program is sent."""
 
     machine: Machine
     _boxes: dict[tuple[float, float], list[float]] = field(default_factory=dict)
-    _reached: Coordinates = ()  # the end of the newest stroke, which is in its box already
+    _reached: Coordinates = ()  # end of the newest stroke, already in its box
 
     def track(self, modal: ModalState, command: str) -> tuple[bool, bool]:
-        """Hand a command to `modal` and keep the boxes in step; whether it moves something, and whether it extrudes."""
+        """Pass a command to `modal` and update the boxes; returns whether it moves an axis, and whether it extrudes."""
         before, pulled = modal.coordinates(), modal.pulled_mm
         if not modal.take(command):
             return False, False
@@ -41,7 +41,7 @@ class PrintedBounds:
         return True, extrudes
 
     def extrude_to(self, coordinates: Coordinates) -> None:
-        """Filament was pushed on the way to a place, X Y Z tilt turn."""
+        """Add the end of a stroke, X Y Z tilt turn."""
         x, y, z, tilt, turn = coordinates[:5]
         if x is None or y is None or z is None:
             return
@@ -57,7 +57,7 @@ class PrintedBounds:
             box[3:] = max(x, most_x), max(y, most_y), max(z, most_z)
 
     def corners(self, followed_table: bool = False) -> Printed:
-        """The corners of all boxes in the workpiece frame; followed_table: the places were those of the table already."""
+        """Corners of all boxes in the workpiece frame; followed_table: the positions were already relative to the table."""
         corners = [np.zeros((0, 3))]
         for (tilt, turn), box in self._boxes.items():
             places = np.array(list(product(*zip(box[:3], box[3:], strict=True))))
@@ -69,7 +69,7 @@ class PrintedBounds:
 
 
 def _far_corners(modal: ModalState, command: str, before: Coordinates, after: Coordinates) -> list[Coordinates]:
-    """Corners of the box around an arc that was just taken, at the pose and height of its end; none of another move."""
+    """Corners of the box around an arc just taken, at the pose and height of its end; none for other moves."""
     if command[:3] == "G1 ":  # nearly every stroke
         return []
     name, rest = split_command(command.upper())

@@ -1,4 +1,4 @@
-"""The protocol without I/O: bytes in, events out; commands in, bytes out.
+"""The serial protocol without I/O: bytes in, events out; commands in, bytes out.
 
-`connection.Connection` is the whole of it; `events.read_event` reads one line of the printer, `framing.frame` numbers one for it.
+`connection.Connection` is the interface; `events.read_event` parses a line of the printer, `framing.frame` numbers a command.
 """

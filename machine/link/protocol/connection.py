@@ -1,25 +1,24 @@
 """The sender's side of the serial protocol without I/O: received bytes go in, events and bytes to send come out.
 
-The caller owns port and clock: it writes what take() gives, hands what it reads to receive() and calls tick() now and then.
+The caller owns port and clock: it writes the bytes of take(), passes received bytes to receive() and calls tick() regularly.
 
-Every line has a number and a checksum. The printer takes them in order only: `ok` for each that it took, `Resend: n` where n was
-damaged or is missing, and it takes nothing until n has come. Some lines are on their way at once (the window), so an answer is to
-be told apart from those to lines sent before and after it; only what is known to be missing is sent again, for a line that ran
-twice is a flaw in the print.
+Every line has a number and a checksum. The printer accepts lines in order only: it answers `ok` to each, and `Resend: n` when n
+is damaged or missing, after which it accepts nothing until n has come. Several lines are in flight at once (the window), so each
+answer must be assigned to its line; only lines known to be missing are sent again, for a line run twice spoils the print.
 
     sender                            printer
     N8 G1 X1*105  ----------------->  ok                  OPEN
-    N9 G1 X2*107  -------##--------   Resend: 9           damaged on the way; N10 is on its way, too:
-    N10 G1 X3*82  ----------------->  Resend: 9           not taken, for 9 is missing
+    N9 G1 X2*107  -------##--------   Resend: 9           damaged in transit; N10 is in flight, too:
+    N10 G1 X3*82  ----------------->  Resend: 9           not accepted, for 9 is missing
                                                           QUIET: nothing is sent until no answer comes any more
     N9 G1 X2*107  ----------------->  ok                  REPEAT: from the history, one by one
     N10 G1 X3*82  ----------------->  ok                  then OPEN again, at first with one line at a time
     N11 G1 X4*84  ----------------->  (ok gets lost)      PROBING: silence for too long, so a question with a number
-    N12 M105*20   ----------------->  ok T:205            answered: N11 has come, too; `Resend: 11`: it has not
+    N12 M105*20   ----------------->  ok T:205            answered: N11 has arrived, too; `Resend: 11`: it has not
 
-Bytes become events (decoder), an event or the passing of time amounts to a signal, and the table of states says where that leads:
+Bytes become events, events or the passing of time become signals, and the table gives the next state:
 
-    bytes -> LineDecoder -> Event -> _handle -> Signal -> TABLE[state] -> what entering the state has to say -> take()
+    bytes -> LineDecoder -> Event -> _handle -> Signal -> TABLE[state] -> _enter -> take()
                        tick -> Timeouts -------^
 """
 
@@ -34,16 +33,16 @@ from machine.link.protocol.timeout import Timeouts, Timing
 from machine.link.protocol.window import FIRST_NUMBER_AGAIN, GREETING_LINES, Window
 from profiles.errors import PrinterError, SilenceError
 
-BEFORE_NUMBERS = (State.DRAIN, State.SYNC)  # an error is of what came before: no line of ours has a number yet
+BEFORE_NUMBERS = (State.DRAIN, State.SYNC)  # an error concerns what came before: no line sent here has a number yet
 GREETING_STATES = (*BEFORE_NUMBERS, State.HELLO)
 
 
 class Connection:
-    """One conversation with a printer. `fault` is the error that ended it, None while it lasts: look at it after receive() and
-    tick(). `halted`: the firmware says that it has stopped for good. `greeting` is what the printer answered to M115, `window`
-    counts the lines, `resends` those that were repeated.
+    """A conversation with a printer.
 
-    rx_bytes: what the machine's receive buffer holds, None: as its firmware's; baud: for messages.
+    `fault` is the error that ended it, None while it lasts: check it after receive() and tick(). `halted`: the firmware reports
+    that it has stopped for good. `greeting` holds the answer to M115, `window` counts the lines, `resends` those repeated.
+    rx_bytes: size of the machine's receive buffer, None: its firmware's; baud: for messages.
     """
 
     def __init__(
@@ -74,9 +73,8 @@ class Connection:
         return self.window.has_space(command, greeting.firmware.line, greeting.emergency_parser)
 
     def send(self, command: str, now_s: float) -> int:
-        """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on; 0:
-        the printer has no room for it, nothing is sent.
-        """
+        """Number a command, keep it for repeats and queue its bytes. Returns its line number, counted from the greeting; 0: there
+        is no space and nothing is sent."""
         if not self.can_send(command):
             return 0
         self._send(command, now_s)
@@ -85,13 +83,13 @@ class Connection:
         return self.window.sent
 
     def take(self) -> bytes:
-        """The bytes to write to the port now."""
+        """Remove and return the bytes to write to the port."""
         out = bytes(self._out)
         self._out.clear()
         return out
 
     def receive(self, data: bytes, now_s: float) -> list[Event]:
-        """The events of received bytes, in any portions."""
+        """The events of received bytes, split anywhere."""
         self._timeouts.heard_s = now_s
         received = self._decoder.receive(data, now_s)
         for event in received:
@@ -99,7 +97,7 @@ class Connection:
         return received
 
     def tick(self, now_s: float) -> None:
-        """Let time pass: drains, pauses before a repeat, stalls."""
+        """Note the time, for drains, pauses before a repeat, and stalls."""
         for event in self._decoder.flush(now_s):
             self._handle(event, now_s)
         signal = self._timeouts.signal(self.state, self.window, self.greeting.firmware.line, self._questions.unanswered, now_s)
@@ -109,12 +107,12 @@ class Connection:
             self._follow(signal, now_s)
 
     def reconnect(self, now_s: float, done: bool | None = None) -> None:
-        """The port was lost and is there again: the printer is asked what has arrived; one that restarted betrays itself.
+        """Continue over a new port: the printer is asked which lines arrived; a restarted one reveals itself.
 
-        done: what is known otherwise of the lines on their way: they have been done, or are to be sent once more.
+        done: what is known otherwise: whether the lines in flight were executed, or are to be sent again.
         """
-        # A half line is refused together with the question behind it, and asked for again; an empty line would be answered by
-        # some firmwares. Those that do not ask for lines were asked for their status, which ended it.
+        # An unfinished line is refused together with the question after it, and requested again; some firmwares would answer an
+        # empty line. Firmwares that never request lines were queried for their status, which ended it.
         self._out.clear()
         self._decoder.discard_partial()
         self._questions.unanswered = 0
@@ -150,7 +148,7 @@ class Connection:
                 self.greeting.heard = event.text
                 self._timeouts.hear_busy(now_s)
             case Kind.BANNER if self.state in GREETING_STATES:
-                pass  # it follows a `start` that was heeded
+                pass  # it follows a `start` that was handled
             case Kind.START | Kind.BANNER:
                 self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
             case Kind.FAULT:
@@ -163,7 +161,7 @@ class Connection:
                 self._oks.hear_echo(event.text)
 
     def _handle_ok(self, ok: Event, now_s: float) -> None:
-        """An `ok` answers M110, a Resend or a line in flight, which depends on the state."""
+        """Handle an `ok`, which answers M110, a Resend or a line in flight, depending on the state."""
         unknown = self._oks.take_unknown()
         if ok.line is not None:
             self.window.learn(ok.rx_free)
@@ -180,7 +178,7 @@ class Connection:
                 self._follow(Signal.SYNCED, now_s)
         elif self.state is State.QUIET:
             if self.resends.alone and ok.line is None and ok.temperature is None:
-                self._follow(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way
+                self._follow(Signal.HUSH, now_s)  # the ok that belongs to the Resend, with nothing else in flight
         elif self.state is State.RENUMBER:
             if self._oks.answers_m110(ok, self.window.numbered, unknown, now_s):
                 self.window.restart_numbers()
@@ -190,9 +188,9 @@ class Connection:
             self._acknowledge(self._oks.line(ok, self.window, self.window.numbered, now_s), ok.temperature is not None, now_s)
 
     def _acknowledge(self, number: int | None, to_question: bool, now_s: float) -> None:
-        """This line and all before it have arrived; a line that is not in flight makes the answer a stray.
+        """Note that this line and all before it have arrived; an answer to a line not in flight is ignored.
 
-        to_question: it answers an M105. Nothing but questions follows the first one asked in trouble.
+        to_question: it answers an M105. Only questions follow the first one asked in trouble.
         """
         window = self.window
         if number is None or not window.flight:
@@ -249,14 +247,14 @@ class Connection:
             self._follow(Signal.IMPLAUSIBLE, now_s)
 
     def _refusal(self, number: int, too_much: str) -> PrinterError:
-        """Why lines are not repeated any more: one that the printer does not take as it is, or too many."""
+        """The error when lines are not repeated any more: the printer refuses one as it is, or too many."""
         line, command = self.window.wire_number(number), self.window.command(number)
         if self.resends.same_line and command:
             return verdict.refused_line(line, command, ASKED_LIMIT, self.resends.words)
         return verdict.noise(line, too_much)
 
     def _follow(self, signal: Signal, now_s: float, error: PrinterError | None = None) -> None:
-        """Follow the table, then do what belongs to entering the state."""
+        """Make the table's transition, then act on entering the state."""
         state = TABLE[self.state].get(signal)
         if state is None:
             return
@@ -271,7 +269,7 @@ class Connection:
             self._enter(signal, now_s)
 
     def _enter(self, signal: Signal, now_s: float) -> None:
-        """Say what is due on entering a state, and note what is known from then on."""
+        """Send what is due on entering a state, and note what is known then."""
         match self.state:
             case State.SYNC:
                 self._greet(now_s)
@@ -293,7 +291,7 @@ class Connection:
                     self._follow(Signal.CAUGHT_UP, now_s)
 
     def _greet(self, now_s: float) -> None:
-        """Begin the line numbers with M110, or where a firmware without it wants them; not without end."""
+        """Begin the line numbers with M110, or where a firmware without it expects them; a limited number of times."""
         first = self.greeting.attempt(self._decoder)
         if isinstance(first, SilenceError) and not self.greeting.asked_plainly:
             self.greeting.asked_plainly = True
@@ -308,7 +306,7 @@ class Connection:
                 self._out += GREETING
 
     def _ask(self, now_s: float) -> None:
-        """Ask what has arrived, or give M110, which is not checked for sequence, once more; not without end."""
+        """Ask what has arrived, or repeat M110, which is not checked for sequence; a limited number of times."""
         if self.state is State.PROBING:
             self.window.slow_down()
         if not self._questions.ask():
@@ -316,5 +314,5 @@ class Connection:
         elif self.state is State.PROBING:
             self._send(QUESTION, now_s)
             self._questions.first = self._questions.first or self.window.sent
-        else:  # both N are read by one firmware or another
+        else:  # firmwares read one N or the other
             self._out += frame(FIRST_NUMBER_AGAIN, f"M110 N{FIRST_NUMBER_AGAIN}")

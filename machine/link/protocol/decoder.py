@@ -1,16 +1,16 @@
-"""The line decoder: received bytes, cut anywhere, become events; bounded, with a count of what could not be read."""
+"""Line decoder: turns received bytes, split anywhere, into events; bounded, with a count of unreadable bytes."""
 
 from machine.link.protocol.events import Event, Kind, read_event
 
-LONGEST_LINE = 4096  # a line without end is thrown away beyond this; Marlin's longest answer has 300 characters
+LONGEST_LINE = 4096  # an endless line is discarded beyond this; Marlin's longest answer has 300 characters
 TAIL_S = 0.25  # the second line of an error follows at once; 300 characters take this long at 9600 baud
 READABLE = frozenset(b"\t\n\r") | frozenset(range(32, 127))
-ENOUGH_BYTES = 8  # fewer may be the jerk of a cable being plugged in
-RUBBISH_SHARE = 0.2  # a wrong baud rate makes most bytes unreadable, a noisy line a few in a hundred
+ENOUGH_BYTES = 8  # fewer may be the noise of a cable being plugged in
+RUBBISH_SHARE = 0.2  # a wrong baud rate garbles most bytes, a noisy line a few in a hundred
 
 
 class LineDecoder:
-    """receive() bytes, flush() now and then; `last`: the newest words that are not of a printer."""
+    """Decodes lines: receive() bytes, flush() regularly. `last`: the newest line that is not a printer's."""
 
     def __init__(self) -> None:
         self._half, self._overflow = b"", False
@@ -20,22 +20,22 @@ class LineDecoder:
 
     @property
     def incomplete(self) -> bool:
-        """Whether words are missing: nothing should be sent before they are known."""
+        """Whether a message is incomplete: nothing should be sent before its end is known."""
         return bool(self._held)
 
     @property
     def rubbish(self) -> bool:
-        """Whether what has come so far is what a wrong baud rate makes of words."""
+        """Whether the bytes so far are garbled as by a wrong baud rate."""
         enough = self._bytes >= ENOUGH_BYTES and not self._understood
         return enough and self._unreadable >= RUBBISH_SHARE * self._bytes
 
     @property
     def foreign(self) -> str:
-        """The last words of something that speaks readably, but not like a printer; "" when there are none."""
+        """The last line of something readable that does not speak like a printer; "" for none."""
         return "" if self._understood or self.rubbish else self.last
 
     def receive(self, data: bytes, now_s: float) -> list[Event]:
-        """The events of received bytes; a line may end with a newline, a carriage return or both."""
+        """The events of received bytes; a line ends with a newline, a carriage return or both."""
         *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
         if not self._understood:
             self._bytes += len(data)
@@ -52,7 +52,7 @@ class LineDecoder:
         return events
 
     def discard_partial(self) -> None:
-        """The rest of a half line will not come."""
+        """Discard an unfinished line whose end will not come."""
         self._half, self._overflow = b"", False
 
     def flush(self, now_s: float) -> list[Event]:
@@ -63,7 +63,8 @@ class LineDecoder:
         return [read_event(held)]
 
     def _read(self, line: bytes, now_s: float, events: list[Event]) -> None:
-        """Marlin's older kin say `Error:0` and, in the next line, `: Extruder switched off. MAXTEMP triggered !`."""
+        """Append a line's event; older Marlins send `Error:0` and, on the next line, `: Extruder switched off. MAXTEMP triggered
+        !`."""
         if self._held:
             held, self._held = self._held, b""
             if line.lstrip().startswith(b":"):

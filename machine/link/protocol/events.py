@@ -1,4 +1,4 @@
-"""What a printer says: an event for each of its lines, and the reading of a line into an event."""
+"""Events: the lines of a printer, and the parser of a line."""
 
 import re
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 @dataclass(frozen=True, slots=True)
 class Temperature:
-    """Degrees C now and wanted; None where the line does not report it."""
+    """Temperatures and targets, deg C; None if not reported."""
 
     nozzle_c: float | None = None
     nozzle_target_c: float | None = None
@@ -17,7 +17,7 @@ class Temperature:
 
     @property
     def words(self) -> str:
-        """The temperatures in words; "" where the line does not report it."""
+        """The temperatures in words; "" for none."""
         degrees = (("nozzle", self.nozzle_c), ("bed", self.bed_c))
         return ", ".join(f"{name} {now_c:.0f} °C" for name, now_c in degrees if now_c is not None)
 
@@ -26,29 +26,29 @@ class Kind(Enum):
     """Kinds of a printer's lines."""
 
     OK = auto()  # a line was accepted
-    RESEND = auto()  # the printer wants this line and all after it again; one `ok` that acknowledges nothing follows
-    BUSY = auto()  # the printer lives but has no time for more lines
+    RESEND = auto()  # the printer requests this line and all after it; one `ok` that acknowledges nothing follows
+    BUSY = auto()  # the printer works and has no time for more lines
     LINE_ERROR = auto()  # an error of the transmission only (checksum, line number); a Resend follows
     FAULT = auto()  # any other error: the printer has stopped or must be stopped
-    START = auto()  # the printer has just started: counters, position and temperatures are gone
-    BANNER = auto()  # words that a firmware says only while it starts; they betray a restart whose `start` was lost
-    WAIT = auto()  # the printer has nothing to do (Repetier says so every second)
+    START = auto()  # the printer has just started: counters, position and temperatures are lost
+    BANNER = auto()  # words of a starting firmware; they reveal a restart whose `start` was lost
+    WAIT = auto()  # the printer is idle (Repetier says so every second)
     TEMPERATURE = auto()
     POSITION = auto()  # answer to M114 or an autoreport
     IDENTITY = auto()  # the FIRMWARE_NAME line of the answer to M115
     CAPABILITY = auto()  # `Cap:NAME:1` of the answer to M115, as NAME:1
     AREA = auto()  # the geometry report of M115
-    ACTION = auto()  # `//action:NAME`: the printer asks the sender for something (pause, cancel, disconnect, ...), as NAME
-    ECHO = auto()  # words for people: `echo:`, `//`, `Warning:`
-    UNKNOWN = auto()  # anything else, rubbish included
+    ACTION = auto()  # `//action:NAME`: the printer requests something of the sender (pause, cancel, disconnect, ...), as NAME
+    ECHO = auto()  # messages to the user: `echo:`, `//`, `Warning:`
+    UNKNOWN = auto()  # anything else, including garbled bytes
 
 
 class Event(NamedTuple):
-    """A line of the printer. Temperature, position and identity come in a line of their own or behind an ok."""
+    """A line of the printer. Temperature, position and identity come on a line of their own or after an ok."""
 
     kind: Kind
-    text: str = ""  # those of its words that matter
-    line: int | None = None  # that an ok acknowledges or a Resend asks for
+    text: str = ""  # the relevant words
+    line: int | None = None  # that an ok acknowledges or a Resend requests
     planner_free: int | None = None  # free places of the planner, by Marlin's ADVANCED_OK
     rx_free: int | None = None  # free places of the receive buffer
     temperature: Temperature | None = None
@@ -58,25 +58,24 @@ class Event(NamedTuple):
 
     @property
     def unknown_command(self) -> str:
-        """The name of a command that the firmware says it does not know, "" of other words. Marlin and Klipper quote the whole
-        line, RepRapFirmware names the code.
-        """
+        """Name of a command that the firmware does not know, "" for other lines. Marlin and Klipper quote the whole line,
+        RepRapFirmware names the code."""
         match = UNKNOWN.search(self.text) if self.kind is Kind.ECHO else None
         return "" if match is None else match[1] or match[2]
 
     @property
     def lacks_checksum(self) -> bool:
-        """Whether a line was refused because it had no number or no checksum."""
+        """Whether a line was refused for lack of a number or checksum."""
         return self.kind is Kind.LINE_ERROR and any(words in self.text.lower() for words in MISSING)
 
     @property
     def is_starting(self) -> bool:
-        """Whether a firmware refuses a command because it is still starting: it will take it in a few moments."""
+        """Whether a firmware refuses a command because it is still starting."""
         return self.kind is Kind.FAULT and any(words in self.text.lower() for words in STARTING)
 
     @property
     def is_halt(self) -> bool:
-        """Whether the firmware says that it has stopped for good and switched its heaters off. No other error says so."""
+        """Whether the firmware reports that it has stopped for good with its heaters off, which no other error implies."""
         if self.kind is Kind.OK:
             return HALTED_OK in self.text
         return self.kind is Kind.FAULT and (self.text == HALTED or any(words in self.text.lower() for words in KILLED))
@@ -84,7 +83,7 @@ class Event(NamedTuple):
 
 NAME = "FIRMWARE_NAME:"
 OK = re.compile(rb"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
-# Teacup says why behind it: "rs N120 Expected checksum 67", "rs N120 Expected line number 120".
+# Teacup adds a reason: "rs N120 Expected checksum 67", "rs N120 Expected line number 120".
 RESEND = re.compile(r"(?:resend:|rs)\s*N?:?(\d{1,10})(?:\s+expected (?:checksum|line number) \d+)?", re.IGNORECASE)
 NOZZLE = re.compile(r"(?:^|\s)T0?:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 BED = re.compile(r"(?:^|\s)B:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
@@ -93,31 +92,31 @@ CAPABILITY = re.compile(r"Cap:(\w+:[01])")
 AREA = re.compile(r"area:.*?full:\{min:\{([^}]*)\},?max:\{([^}]*)\}")
 REACH = re.compile(r"([a-z]):(-?\d+\.?\d*)")
 ACTION = re.compile(r"//\s*action:\s*(\w+)\s*(.*)")
-# A boot loader at another rate, and the jerk of a reset line, put rubbish in front of the word.
+# A boot loader at another rate, and noise of the reset, put garbled bytes before the word.
 START = re.compile(r"(?:.*[^ -~])?start")
 GREETS = re.compile(
     r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: (?:Ready|Disconnect)"
 )
-# Words by which transmission errors are known even when a byte of them is damaged.
+# Words that identify a transmission error even with a damaged byte.
 OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
 # Klipper's gcode.py, _handle_shutdown; and the end of the message (klippy.py, message_shutdown) that answers every later command,
-# whose `!!` names nothing but the reason.
+# whose `!!` only gives the reason.
 SHUTDOWN = re.compile(r"// ?(Klipper state: Shutdown|Printer is shutdown)")
 UNKNOWN = re.compile(r'Unknown command: ?"?([A-Z][A-Z0-9_.]*)|\b([GM]\d+): Command is not supported')
-# Klipper's klippy.py, message_startup; older ones begin it with the second sentence.
+# Klipper's klippy.py, message_startup; older versions begin with the second sentence.
 STARTING = ("printer is not ready", "host software is attempting to connect")
 MISSING = ("missing checksum", "no checksum", "no line number")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
-# Said by a firmware that has stopped for good, its heaters off: Marlin's kill(), Klipper's shutdown, RepRapFirmware's M112.
+# Messages of a firmware that has stopped for good, heaters off: Marlin's kill(), Klipper's shutdown, RepRapFirmware's M112.
 KILLED = ("printer halted", "kill() called", "shutdown", "emergency stop")
-# Smoothieware's, GcodeDispatch::on_console_line_received: the answer to M112, and to every line once it has halted.
+# Smoothieware's GcodeDispatch::on_console_line_received: the answer to M112, and to every line after a halt.
 HALTED_OK, HALTED = "Emergency Stop Requested", "!!"
-# Said by firmwares that stop, whatever became of the `Error:` before them.
+# Words of firmwares that stop, even if the `Error:` before them is damaged.
 DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed", "system stopped", "mintemp", "maxtemp")
 
 
 def read_event(raw: bytes) -> Event:
-    """The event of one received line (without its newline). Never raises: rubbish is UNKNOWN."""
+    """The event of a received line without its newline. Never raises: garbled lines are UNKNOWN."""
     if ok := OK.fullmatch(raw):  # nearly every line
         return _plain_ok(ok)
     text = raw.decode("ascii", "replace").strip()
@@ -140,7 +139,7 @@ def _error_kind(folded: str) -> Kind:
 
 
 def _read_report(text: str) -> Event:
-    """The event of a line that answers none of ours."""
+    """The event of a line that is not an answer."""
     if text.startswith("X:"):
         return Event(Kind.POSITION, position=_position(text))
     if text == "wait":
@@ -167,13 +166,13 @@ def _read_report(text: str) -> Event:
 
 
 def _plain_ok(ok: re.Match[bytes]) -> Event:
-    """An ok with its numbers, or alone."""
+    """An ok with or without its numbers."""
     line, planner, rx = ok.groups()
     return Event(Kind.OK, ok[0].decode("ascii"), _whole(line), _whole(planner), _whole(rx))
 
 
 def _ok(text: str) -> Event:
-    """An ok with something else behind it."""
+    """An ok followed by other text."""
     if ok := OK.fullmatch(text.encode("ascii", "replace")):
         return _plain_ok(ok)
     if not text.isascii() or not text.startswith("ok "):
@@ -189,7 +188,7 @@ def _whole(digits: bytes | None) -> int | None:
 
 
 def _position(text: str) -> dict[str, float]:
-    """The axes' places; what follows Count (steps) and Machine (RepRapFirmware, before the table's map) is left out."""
+    """The axis positions, without those after Count (steps) and Machine (RepRapFirmware, before the bed compensation)."""
     text = text[text.index("X:") :].partition(" Count")[0].partition(" Machine")[0]
     return {letter: float(value) for letter, value in AXIS.findall(text)}
 

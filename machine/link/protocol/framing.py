@@ -1,4 +1,4 @@
-"""Framing: a command becomes `N<number> <command>*<checksum>`; what may not be sent is refused."""
+"""Framing: makes `N<number> <command>*<checksum>` of a command, and refuses what may not be sent."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from machine.gcode.words import PAUSE_REMARK, split_command
 from profiles.errors import GcodeError, LocalProtocolError
 
 LINE_LIMIT = DIALECT.longest_line
-FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers refuses it with the one it wants
+FAR_NUMBER = 999_999  # beyond any print's lines: a firmware that checks numbers refuses it and names the one it expects
 PAUSES = frozenset(word for dialect in dialects().values() for word in (dialect.pause, dialect.filament_change))
 
 
@@ -30,7 +30,7 @@ def checksum(body: bytes) -> int:
 
 
 def frame(number: int, command: str, limit: int = LINE_LIMIT) -> bytes:
-    """The bytes of one numbered line, newline included. LocalProtocolError when it is longer than the firmware keeps."""
+    """Bytes of a numbered line, newline included. Raises LocalProtocolError when it is longer than the firmware's buffer."""
     body = b"N%d %s" % (number, command.encode("ascii"))
     if len(body) > limit:
         raise too_long(command, limit)
@@ -48,12 +48,12 @@ def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
 
 
 def command_of(line: str, source: int | str, limit: int = LINE_LIMIT) -> str:
-    """The command in a line of a program as it is sent, which is the one that the dry run has read; "" when there is none.
+    """The command in a line of a program, as the dry run reads it and as it is sent; "" for none.
 
-    A pause with a PAUSE_REMARK is the sender's own affair and counts as none. source: the line's number in the program, or what
-    it is called, for messages. Raises LocalProtocolError for a line that firmwares read differently, for a character outside
-    printable ASCII except in a text that is shown, for a `*` or a backslash, for a command that is too long, and for commands
-    that only the sender itself may give.
+    A pause with a PAUSE_REMARK is done by the sender and counts as none. source: the line's number in the program, or its name,
+    for messages. Raises LocalProtocolError for a line that firmwares read differently, for a character outside printable ASCII
+    except in displayed text, for a `*` or a backslash, for a command that is too long, and for commands that only the sender
+    itself may give.
     """
     if is_plain_move(line) and len(line) <= limit - FRAME_CHARACTERS:  # nearly every line
         return line
@@ -93,5 +93,5 @@ def _called(source: int | str) -> str:
 
 
 def number_lines(first: int, commands: Sequence[str]) -> bytes:
-    """Commands with numbers from `first` on, and checksums."""
+    """Commands with checksums, numbered from `first`."""
     return b"".join(frame(number, command) for number, command in enumerate(commands, first))

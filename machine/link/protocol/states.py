@@ -1,8 +1,7 @@
-"""The states of a conversation with a printer, and every transition between them in one table.
+"""States of a conversation with a printer, and all transitions in one table.
 
-All transitions live here; connection.py decides which signal an event amounts to, and what is done on entering a state.
-A signal that a state's row does not name leaves the state as it is. `python tools/docs/make_tables.py` draws the table into
-docs/serial.md.
+connection.py translates events to signals and acts on entering a state. A signal missing in a state's row leaves the state
+unchanged. `python tools/docs/make_tables.py` writes the table into docs/serial.md.
 """
 
 from enum import Enum
@@ -24,7 +23,7 @@ class State(Enum):
 
 
 class Signal(Enum):
-    """Signals, to which events and the passing of time amount."""
+    """Signals to which events and the passing of time are translated."""
 
     HUSH = "nothing heard for a while"
     SYNCED = "M110 was answered"
@@ -43,10 +42,10 @@ class Signal(Enum):
     LAST_NUMBER = "the last line number was used, and no line is in flight"
 
 
-# What ends a print whatever it is at, and what a lost port leads to.
+# What ends a print in any state, and where a lost port leads.
 _ENDS = {Signal.START: State.LOST, Signal.UNCHECKED: State.LOST, Signal.FAULT: State.HALTED}
 _DOUBTS = {Signal.RECONNECTED: State.PROBING, Signal.IMPOSSIBLE: State.LOST, **_ENDS}
-# Lines are on their way, each to be acknowledged.
+# Lines are in flight, each to be acknowledged.
 _FEEDING = {Signal.RESEND: State.QUIET, Signal.IMPLAUSIBLE: State.PROBING, Signal.STALL: State.PROBING, **_DOUBTS}
 
 TABLE: dict[State, dict[Signal, State]] = {

@@ -1,4 +1,4 @@
-"""Verdicts: the sentences with which a connection ends, one function for each reason."""
+"""Verdicts: the errors that end a connection, one function for each reason."""
 
 from machine.firmware.firmware import BAUDS
 from machine.link.protocol.decoder import LineDecoder
@@ -7,12 +7,12 @@ from profiles.errors import FirmwareError, PrinterError, SilenceError
 from profiles.messages import advice
 
 SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
-RUBBISH_TRIES = 2  # boot loaders speak at rates of their own; what comes after that is the firmware's
+RUBBISH_TRIES = 2  # boot loaders have baud rates of their own; later bytes are the firmware's
 LOST = "position and temperatures are lost, the print cannot go on"
 
 
 def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: str = "") -> PrinterError | None:
-    """Why another greeting after `tries` makes no sense; None when it does. heard: what came instead of an answer."""
+    """The error after `tries` greetings, None while another makes sense. heard: what came instead of an answer."""
     at = "this baud rate" if baud is None else f"{baud} baud"
     if tries >= RUBBISH_TRIES and decoder.rubbish:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
@@ -31,7 +31,7 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: s
 
 
 def no_line_numbers() -> PrinterError:
-    """It answers a line without number, and none that has one."""
+    """The error for a printer that answers only lines without numbers."""
     return PrinterError(
         "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
         "lines, for a damaged one could not be told"
@@ -39,27 +39,27 @@ def no_line_numbers() -> PrinterError:
 
 
 def silence(line: int, questions: int) -> PrinterError:
-    """Neither line nor questions were answered."""
+    """The error for a line and questions without answer."""
     return SilenceError(f"the printer has been silent: line {line} and {questions} questions remained without answer")
 
 
 def restart(line: int, how: str = "in the middle of the print") -> PrinterError:
-    """The printer began anew."""
+    """The error for a printer that restarted."""
     return FirmwareError(f"the printer restarted {how}, after line {line}: {LOST}")
 
 
 def firmware_fault(text: str) -> PrinterError:
-    """The printer's own words for an error of its own."""
+    """The error for a fault that the printer reports."""
     return FirmwareError(f"the printer reported: {text}")
 
 
 def torn_line(line: int) -> PrinterError:
-    """A piece of a line was run without number and checksum."""
+    """The error for part of a line executed without number and checksum."""
     return PrinterError(f"the printer ran part of a torn line after line {line}: what it did is not known")
 
 
 def lost_answer(line: int, command: str, firmware: str) -> PrinterError:
-    """A line without answer, to a firmware that does not say which line it wants."""
+    """The error for an unanswered line when the firmware never requests a resend."""
     return PrinterError(
         f"line {line} ({command}) was not answered, and {firmware} never asks for a lost line again: "
         "whether it was done is not known"
@@ -67,7 +67,7 @@ def lost_answer(line: int, command: str, firmware: str) -> PrinterError:
 
 
 def refused_line(line: int, command: str, times: int, words: str) -> PrinterError:
-    """One line is asked for again and again while those before it passed. words: the printer's, "" when it says no more."""
+    """The error for a line refused again and again while earlier ones passed. words: the printer's message, "" for none."""
     said = f": {words[:80]!r}" if words else ""
     return PrinterError(
         f"the printer has refused line {line} ({command}) {times} times{said}; lines before it passed, so its firmware does not "
@@ -76,12 +76,12 @@ def refused_line(line: int, command: str, times: int, words: str) -> PrinterErro
 
 
 def noise(line: int, too_much: str) -> PrinterError:
-    """Too many lines had to be repeated."""
+    """The error for too many repeated lines."""
     return PrinterError(f"the printer asked for {too_much} again, now for {line}: the cable or the adapter is too noisy")
 
 
 def implausible_resend(line: int, sent: int, acknowledged: int) -> PrinterError:
-    """The printer insists on a line that it cannot mean; on one of the greeting, because its numbers have begun again."""
+    """The error for a Resend of an impossible line; of a line of the greeting, because the numbers restarted."""
     if line <= GREETING_LINES:
         return restart(acknowledged, "without a word")
     return PrinterError(

@@ -1,4 +1,4 @@
-"""The lines between sender and printer: which are in flight and how many may be, which have arrived, which can be repeated."""
+"""Window: the lines in flight and their limit, the lines that have arrived, and those kept for repeats."""
 
 from collections import deque
 from typing import NamedTuple
@@ -9,30 +9,30 @@ from machine.link.protocol.framing import LINE_LIMIT, frame
 
 GREETING_LINES = 2  # M115 and M105 are lines 1 and 2; a later Resend for one of them means that the printer restarted
 HISTORY = 512  # lines kept for a repeat: far more than any printer's buffers hold
-FIRST_NUMBER_AGAIN = 1000  # numbers begin here when they begin anew: a printer that asks for line 1 or 2 has restarted
+FIRST_NUMBER_AGAIN = 1000  # restarted numbers begin here: a printer that requests line 1 or 2 has restarted
 CLEAN_LINES = 8  # acknowledgements awaited one by one before the window opens
-# After each error four times as many: when a line is refused the printer throws away what it has of the next one, and the rest of
-# that one may be run without check. A window of one line cannot be torn so, and costs a tenth of the speed.
+# After each error four times as many: with a refused line the printer discards what it has of the next one, and may run the rest
+# of it unchecked. A window of one line avoids this, and costs a tenth of the speed.
 CAUTION_MOST = 8192
 PLACES_MOST = 16  # Marlin's BUFSIZE is 4 to 16; a greater number is a damaged answer
-NEAR = 8  # one acknowledgement too many or few is usual after noise; a Resend for a line further back is asked about
+NEAR = 8  # one acknowledgement too many or few is usual after noise; a Resend for a line further back is questioned
 
 
 class LineInFlight(NamedTuple):
-    """A line that was sent and is not acknowledged yet."""
+    """A line sent and not acknowledged yet."""
 
     number: int
     size: int
     asks_temperature: bool
-    slow_timeout_s: float  # 0 of a quick command
+    slow_timeout_s: float  # 0 for a quick command
     sent_s: float
 
 
 class Window:
-    """Lines are counted from 1; `sent` is the last one given, `acknowledged` the last one known to have arrived.
+    """Lines counted from 1: `sent` is the last one sent, `acknowledged` the last one known to have arrived.
 
-    The numbers on the wire are these counts until they begin anew, then less by a constant. limit: characters of a line
-    that the firmware keeps; rx_bytes: what its receive buffer holds; numbered: its answers name the line they belong to.
+    The wire numbers equal these counts until they restart, and then differ by a constant. limit: characters of a line in the
+    firmware's buffer; rx_bytes: size of its receive buffer; numbered: its answers name their lines.
     """
 
     def __init__(self, limit: int = LINE_LIMIT, rx_bytes: int = LineRules.rx_bytes) -> None:
@@ -49,52 +49,52 @@ class Window:
         self._caution = CLEAN_LINES
 
     def reset(self, first: int = 1) -> None:
-        """Nothing was sent yet. first: the number of the first line on the wire."""
+        """Start over with no line sent. first: wire number of the first line."""
         self.clear_flight()
         self.sent = self.acknowledged = 0
         self._before = 1 - first
         self._history.clear()
 
     def wire_number(self, number: int) -> int:
-        """The number on the wire of a line."""
+        """Wire number of a line."""
         return number - self._before
 
     def line_number(self, wire_number: int) -> int:
-        """The line that has this number on the wire."""
+        """The line with a wire number."""
         return wire_number + self._before
 
     @property
     def last_acknowledged(self) -> int:
-        """The last acknowledged line as the printer counts."""
+        """Wire number of the last acknowledged line."""
         return self.wire_number(self.acknowledged)
 
     def restart_numbers(self) -> None:
-        """The next line has number FIRST_NUMBER_AGAIN + 1 on the wire. Nothing may be in flight."""
+        """Give the next line the wire number FIRST_NUMBER_AGAIN + 1. Nothing may be in flight."""
         self._before = self.sent - FIRST_NUMBER_AGAIN
         self._history.clear()
 
     def can_mean(self, number: int) -> bool:
-        """Whether a Resend can mean this line: it is kept or the next one, and neither far back nor of the greeting."""
+        """Whether a Resend can mean this line: it is kept or the next one, not far back and not of the greeting."""
         known = number in self._history or number == self.sent + 1
         return known and number > self.acknowledged - NEAR and self.wire_number(number) > GREETING_LINES
 
     def learn(self, rx_free: int | None) -> None:
-        """A numbered answer has come, with or without the free places of the printer's queue."""
+        """Note a numbered answer, perhaps with the free places of the printer's queue."""
         self.numbered = True
         if rx_free is not None:
-            self._free = max(self._free, min(rx_free + 1, PLACES_MOST))  # B counts the line itself as still there
+            self._free = max(self._free, min(rx_free + 1, PLACES_MOST))  # B still counts the line itself
 
     def slow_down(self) -> None:
-        """An answer is missing: one by one for a while."""
+        """Send lines one by one for a while, after a missing answer."""
         self._clean = 0
 
     def back_off(self) -> None:
-        """A line was refused: one by one for longer than the last time."""
+        """Send lines one by one for longer than last time, after a refused line."""
         self._clean = 0
         self._caution = min(4 * self._caution, CAUTION_MOST)
 
     def places(self, rules: LineRules, emergency_parser: bool) -> int:
-        """Lines in flight. Without an emergency parser one place of the printer stays free, so that it sees an M112 at once."""
+        """Number of lines in flight. Without an emergency parser one place stays free, so that the printer sees an M112 at once."""
         if self._clean < self._caution:
             return 1
         if not self.numbered:
@@ -104,7 +104,7 @@ class Window:
         return self._free if emergency_parser else max(1, self._free - 1)
 
     def has_space(self, command: str, rules: LineRules, emergency_parser: bool) -> bool:
-        """Whether a command may follow what is in flight."""
+        """Whether a command may follow those in flight."""
         flight = self.flight
         if not flight:
             return True
@@ -114,15 +114,15 @@ class Window:
 
     @property
     def at_slow_command(self) -> bool:
-        """Whether a command that may take its time is in flight."""
+        """Whether a slow command is in flight."""
         return any(line.slow_timeout_s for line in self.flight)
 
     def fits_buffer(self, command: str) -> bool:
-        """Whether the receive buffer has a place for it even if nothing of what is in flight has left the buffer yet."""
+        """Whether a command fits the receive buffer even if everything in flight is still in it."""
         return self._bytes + len(command) + FRAME_BYTES + len(str(self.sent + 1 - self._before)) <= self.rx_bytes
 
     def send(self, command: str, now_s: float = 0.0) -> bytes:
-        """Give a command the next number, keep it for repeats; its bytes."""
+        """Number a command and keep it for repeats; returns its bytes."""
         framed = frame(self.sent + 1 - self._before, command, self._limit)
         self.sent += 1
         self._history[self.sent] = framed
@@ -131,13 +131,13 @@ class Window:
         return framed
 
     def repeat(self, number: int, now_s: float = 0.0) -> bytes:
-        """The bytes of an earlier line, in flight again."""
+        """Bytes of an earlier line, in flight again."""
         framed = self._history[number]
         self._add_in_flight(number, framed, _unframed(framed), now_s)
         return framed
 
     def acknowledge(self, number: int | None) -> int:
-        """This line and all before it have arrived; how many that were, 0 when it is not in flight."""
+        """Note that this line and all before it have arrived; returns their number, 0 when it is not in flight."""
         flight = self.flight
         if number is None or not flight or not flight[0].number <= number <= flight[-1].number:
             return 0
@@ -151,16 +151,16 @@ class Window:
         return count
 
     def clear_flight(self) -> None:
-        """Nothing is in flight any more."""
+        """Note that nothing is in flight."""
         self.flight.clear()
         self._bytes = 0
 
     def oldest_question(self) -> int | None:
-        """The oldest M105 in flight."""
+        """Number of the oldest M105 in flight."""
         return next((line.number for line in self.flight if line.asks_temperature), None)
 
     def command(self, number: int) -> str:
-        """The command of a line that is still kept, else ""."""
+        """The command of a line that is kept, else ""."""
         framed = self._history.get(number)
         return "" if framed is None else _unframed(framed)
 
@@ -170,12 +170,12 @@ class Window:
 
 
 def _unframed(framed: bytes) -> str:
-    """The command of a framed line."""
+    """The command in a framed line."""
     return framed[framed.index(b" ") + 1 : framed.rindex(b"*")].decode("ascii")
 
 
 def _slow_timeout_s(command: str) -> float:
-    """The time limit of the answer to a slow command, s, 0 for a quick one. A slow command travels alone."""
-    if command[0] == "G" and command[1:2] in ("0", "1"):  # most lines of a program; none of these is slow
+    """Time limit for the answer to a slow command, s; 0 for a quick one. A slow command is sent alone."""
+    if command[0] == "G" and command[1:2] in ("0", "1"):  # most lines of a program, never slow
         return 0.0
     return command_in(command).answer_s
