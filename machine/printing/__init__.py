@@ -1,6 +1,6 @@
-"""Printing: one print, at a port or on a print server, whoever attends it.
+"""Printing: one print on a printer at a port or on a print server, from a terminal or a page.
 
-`destination.parse_destination` reads where it goes, a `job.PrintJob` says what is to be done there, `printers.check_print` asks
-what is asked before anything moves, and a `printers.Printer` (`serial_print`, `server_print`) prints it for a `job.Person`.
-`resumption` goes on with what was cut off, `rescue` makes a printer safe whose sender has died.
+`destination.parse_destination` parses where it goes, a `job.PrintJob` says what is done there, `printers.check_print` makes all
+checks before anything moves, and a `printers.Printer` (`serial_print`, `server_print`) prints it for a `job.Person`. `resumption`
+continues interrupted prints; `rescue` makes a printer safe after its sender has died.
 """

@@ -1,6 +1,6 @@
-"""Checks: whether a printer, the machine's profile and a program belong together, before anything moves.
+"""Checks before anything moves: whether printer, machine profile and program fit together.
 
-A reason against a job is a sentence: it is raised, or reported when --force is given.
+An objection is a sentence: it is raised, or only reported with --force.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,14 +29,14 @@ from profiles.messages import key_name, phrase
 from profiles.profile import Profile
 
 CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
-SLACK = 0.01  # mm or deg: what the firmware and the program round
-# What a program depends on: made for one such machine it is wrong on another. Speeds and accelerations are not among it.
+SLACK = 0.01  # mm or deg: rounding of firmware and program
+# The keys on which a program depends: a program made with other values is wrong here. Speeds and accelerations do not count.
 OF_AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 SHAPING = ("shape", "dialect", "coordinates", "tool_mm", *(f"{axis}.{key}" for axis in ("tilt", "turn") for key in OF_AXIS))
 
 
 def check(sentences: Iterable[str], force: bool) -> bool:
-    """Raise PrinterError for the first reason against a job, or with force report all; True when there is none."""
+    """Raise PrinterError for the first objection, or report all with force; True when there is none."""
     found = False
     for sentence in filter(None, sentences):
         if not force:
@@ -47,14 +47,14 @@ def check(sentences: Iterable[str], force: bool) -> bool:
 
 
 def check_machine(answer: Answer | None, machine: Machine) -> None:
-    """Refuse a machine whose firmware takes no lines, or is not that of the printer at a port. answer: None: nothing is known of
-    the printer. Raises PrinterError."""
+    """Refuse a machine whose firmware takes no lines, or differs from the firmware at the port (answer; None: unknown). Raises
+    PrinterError."""
     check_dialect(machine)
     check([firmware_mismatch(answer, machine)], force=False)
 
 
 def check_destination(destination: Destination, machine: Machine) -> None:
-    """Refuse a machine whose dialect is not read there, which is known before anybody is asked. Raises PrinterError."""
+    """Refuse a machine whose dialect the destination cannot read; needs no connection. Raises PrinterError."""
     if not isinstance(destination, Server):
         check_dialect(machine)
     elif sentence := dialect_mismatch(destination, machine.name, machine.dialect):
@@ -71,22 +71,23 @@ def check_dialect(machine: Machine) -> None:
 
 
 def machine_sentences(identity: Identity, machine: Machine) -> Iterator[str]:
-    """Reasons against a machine at a printer."""
+    """Objections to a machine at this printer."""
     yield firmware_mismatch(identity.printer, machine)
     yield lacking_steppers(identity, machine)
     yield _unknown_macros(lacking_macros(identity, _block_lines(machine)), machine.name)
 
 
 def program_sentences(identity: Identity, loaded: LoadedProgram, force: bool) -> Iterator[str]:
-    """Reasons against a program: it was made for another machine, leaves the limits that the firmware reports, calls macros that
-    a Klipper lacks, or its dry run has errors, for which MoveError is raised without force."""
+    """Objections to a program: made for another machine, beyond the firmware's limits, or calling macros that a Klipper lacks.
+    Raises MoveError for errors of its dry run, unless forced."""
     program, machine = loaded.program, loaded.profile.machine
     recorded, sections = read_embedded_profile(program.lines, loaded.profile, frozenset())
     if "machine" in sections:
         yield machine_mismatch(recorded.machine, machine, loaded.name)
     if identity.printer is not None:
         rotary = (machine.tilt.letter, machine.turn.letter)
-        letters = rotary if machine.coordinates == "workpiece" else None  # X Y Z of such a file are no places of the axes
+        # in workpiece coordinates X Y Z are not positions of the axes
+        letters = rotary if machine.coordinates == "workpiece" else None
         reached = {axis: reach for axis, reach in summary(program.run)["axes"].items() if reach}
         yield exceeded_limit(identity.printer, {axis: reached[axis] for axis in reached if letters is None or axis in letters})
     lacking = lacking_macros(identity, _block_lines(machine))
@@ -97,14 +98,14 @@ def program_sentences(identity: Identity, loaded: LoadedProgram, force: bool) ->
 
 
 def with_starvation(destination: Destination, program: Program, profile: Profile) -> Program:
-    """The program with the places where a serial line is too slow for it."""
+    """The program, with findings where the serial line is too slow for it."""
     if not isinstance(destination, SerialPort) or not destination.is_rate_limited:
         return program
     return replace(program, run=find_starvation(program.run, program.lines, profile.machine, destination.baud))
 
 
 def check_free(server: str, status: PrintStatus) -> None:
-    """Refuse a server that cannot begin a print now. Raises ServerError."""
+    """Refuse a server that cannot start a print now. Raises ServerError."""
     if status.state.is_printing:
         now = f"{server} is {status.state} {status.file or 'another file'} now"
         raise ServerError(
@@ -115,7 +116,7 @@ def check_free(server: str, status: PrintStatus) -> None:
 
 
 def check_idle(server: str, status: PrintStatus) -> None:
-    """Refuse a server that prints, or whose printer is not there, where only questions are asked. Raises ServerError."""
+    """Refuse to query a server that is printing or has no printer connected. Raises ServerError."""
     if status.state.is_printing:
         raise ServerError(f"{server} is {status.state} {status.file or 'a file'} now: ask it when that is done")
     if status.state is PrintState.OFFLINE:
@@ -123,11 +124,11 @@ def check_idle(server: str, status: PrintStatus) -> None:
 
 
 def firmware_mismatch(answer: Answer | None, machine: Machine) -> str:
-    """Why this firmware cannot print for a machine, as a sentence; "" when it can, or when its answer does not decide that."""
+    """Why this firmware cannot print for a machine; "" when it can, or when its answer does not decide that."""
     if answer is None:
         return ""
     firmware = identify(answer.words)
-    dialects = tuple(firmware.dialects) if firmware is not None else ()  # none: what it understands is not known
+    dialects = tuple(firmware.dialects) if firmware is not None else ()  # empty: unknown
     if dialects and machine.dialect not in dialects:
         return (
             f"the printer's firmware is {answer.firmware}, but {machine.name} writes for {machine.dialect}: "
@@ -144,9 +145,9 @@ def firmware_mismatch(answer: Answer | None, machine: Machine) -> str:
 
 
 def exceeded_limit(answer: Answer, reached: Mapping[str, Sequence[float]]) -> str:
-    """Which axis of a program leaves the limits that the firmware reports, as a sentence; "" when none does.
+    """Which axis of a program exceeds the limits that the firmware reports; "" when none does.
 
-    reached: letter -> least and greatest value of the program, mm or deg. Firmwares clip such a move without a word.
+    reached: letter -> least and greatest value of the program, mm or deg. Firmwares clip such moves silently.
     """
     for letter, (low, high) in reached.items():
         least, most = answer.limits.get(letter, (low, high))
@@ -159,7 +160,7 @@ def exceeded_limit(answer: Answer, reached: Mapping[str, Sequence[float]]) -> st
 
 
 def machine_mismatch(recorded: Machine, chosen: Machine, file: str) -> str:
-    """Why a program made for one machine is wrong on another, as a sentence; "" when both are the same to it."""
+    """Why a program made for one machine is wrong on another; "" when the two do not differ in SHAPING."""
     if recorded.name != chosen.name:
         return f"{file} was made for the machine {recorded.name}, not for {chosen.name}"
     for key in SHAPING:
@@ -174,7 +175,7 @@ def _text(value: object) -> str:
 
 
 def lacking_steppers(identity: Identity, machine: Machine) -> str:
-    """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or reports none."""
+    """Which [manual_stepper] of the machine's table a Klipper lacks; "" when it has all or reports none."""
     if identity.steppers is None or not machine.tilts:
         return ""
     wanted = [stepper_name(axis) for axis in (machine.tilt, machine.turn)]
@@ -190,7 +191,7 @@ def lacking_steppers(identity: Identity, machine: Machine) -> str:
 
 
 def lacking_macros(identity: Identity, lines: Iterable[str]) -> list[str]:
-    """The macros that lines call and a Klipper does not have; [] when it has all, or does not report them."""
+    """The macros that the lines call and a Klipper lacks; [] when it has all, or does not report them."""
     if identity.commands is None:
         return []
     called = dict.fromkeys(name for line in lines if (name := macro_name(line)))
@@ -203,7 +204,8 @@ def _block_lines(machine: Machine) -> list[str]:
 
 
 def _unknown_macros(names: list[str], caller: str) -> str:
-    """Klipper answers an unknown command with a text and goes on (klippy/gcode.py, cmd_default): nothing would be homed."""
+    """Sentence about missing macros, "" for none. Klipper answers an unknown command with a text and continues (klippy/gcode.py,
+    cmd_default): nothing would be homed."""
     if not names:
         return ""
     sections = " and ".join(f"[gcode_macro {name}]" for name in names)

@@ -1,4 +1,4 @@
-"""Command session: single commands to a printer over the same protocol as a print, and a safe end of it."""
+"""Command session: single commands to a printer over the protocol of a print, with a safe end."""
 
 from types import TracebackType
 from typing import NoReturn, Self
@@ -12,24 +12,25 @@ from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.shutdown import HeaterGuard, Heaters, shows_off
 from profiles.errors import FirmwareError, PortError, PrinterError
 
-RESTARTS = frozenset({"RESTART", "FIRMWARE_RESTART"})  # Klipper's: heaters go off and the conversation ends
+RESTARTS = frozenset({"RESTART", "FIRMWARE_RESTART"})  # Klipper's: they switch the heaters off and end the session
 
 
 class LeftError(Exception):
-    """The person has left while a command was under way."""
+    """The user left while a command was running."""
 
 
 class StopError(Exception):
-    """The person has asked for the emergency stop."""
+    """The user requested the emergency stop."""
 
 
 class CommandSession:
-    """`with session:` greet(), then command() after command. One thread at a time; order() may be called from any other.
+    """`with session:` greet(), then command() repeatedly. One thread at a time; only order() may be called from another.
 
-    However the block is left, the heaters go off: see HeaterGuard, which also adds words to an error. At a normal end
-    PrinterError is raised where the printer does not confirm that, and nothing is done when keep_heat is set. StopError becomes
-    the emergency stop. Before the greeting nothing was sent that heats.
-    unknown: commands that the printer did not know; heat, position: what it reported last.
+    However the block ends, the heaters are switched off, unless keep_heat is set: HeaterGuard does it after an error and adds its
+    result to the message; after a normal end PrinterError is raised if the printer does not confirm it. StopError causes the
+    emergency stop. Nothing that heats is sent before the greeting.
+
+    unknown: commands that the printer did not know; heat, position: its newest reports.
     """
 
     def __init__(self, wire: Wire, limit: int = LINE_LIMIT, medium: Medium = SERIAL) -> None:
@@ -65,11 +66,11 @@ class CommandSession:
             raise PrinterError("the printer did not confirm that its heaters are off: look at it")
 
     def greet(self) -> None:
-        """Agree on line numbers; raises PrinterError."""
+        """Agree on line numbers. Raises PrinterError."""
         self.exchange.greet()
 
     def command(self, line: str) -> None:
-        """Send a command and wait for its answer; a comment is none. Raises PrinterError."""
+        """Send a command and wait for its answer; a line with only a comment sends nothing. Raises PrinterError."""
         command = command_of(line, "the line", self._limit)
         if command:
             self._command = command
@@ -82,15 +83,15 @@ class CommandSession:
         return bool(self._command) and split_command(self._command.upper())[0] in RESTARTS and self._command not in self.unknown
 
     def listen(self) -> None:
-        """One short turn without sending anything."""
+        """Listen for one short turn without sending anything."""
         self.exchange.pump()
 
     def order(self, what: type[LeftError | StopError]) -> None:
-        """Raise LeftError or StopError in the thread that talks, whatever it waits for."""
+        """Raise LeftError or StopError in the talking thread, whatever it waits for."""
         self._ordered = what
 
     def heated(self) -> str:
-        """Which heaters are on, as words; "" when none is. A command under way may have switched them on a moment ago."""
+        """Which heaters are on, in words; "" when none is. A running command counts, for it may just have switched one on."""
         if not self._idle():
             return "heaters, for a command was under way"
         self.command("M105")
@@ -98,7 +99,7 @@ class CommandSession:
         return " and ".join(f"{name} set to {target_c:.0f} °C" for name, target_c in targets if target_c)
 
     def switch_off(self) -> bool:
-        """Heaters off; True when the printer's own report shows it. A command under way is broken off."""
+        """Switch the heaters off, aborting a running command; True when the printer's own report confirms it."""
         if not self._idle():
             return HeaterGuard(self.exchange, lambda: True, self._check_stop).switch_off() is not Heaters.UNPROVED
         self.heat = Temperature()  # an older report proves nothing
@@ -126,7 +127,7 @@ class CommandSession:
         self._check_stop()
 
     def _check_stop(self) -> None:
-        """Raises StopError where that was ordered: it counts while the session is left, too."""
+        """Raise StopError if it was ordered, which may also happen during the safe end."""
         if self._ordered is StopError:
             self._ordered = None
             raise StopError

@@ -1,6 +1,6 @@
-"""Destination: where a print goes: the simulated printer, a printer at a serial port, or a print server.
+"""Destination of a print: the simulated printer, a printer at a serial port, or a print server.
 
-What a person names as a port is read here, once; everything behind that asks the value.
+The port's name is parsed here, once; all other code uses the value.
 """
 
 import re
@@ -15,7 +15,7 @@ from machine.pipeline.requests import BAUD, SIMULATED
 from profiles.errors import PrinterError, ServerError
 from profiles.messages import option
 
-# The port that a server listens at where none is given: haproxy before OctoPrint (OctoPi), Moonraker's [server] port, a Duet.
+# Default ports: haproxy before OctoPrint (OctoPi), Moonraker's [server] port, a Duet.
 PORTS = {"octoprint": 80, "moonraker": 7125, "duet": 80}
 NAMES = {"octoprint": "OctoPrint", "moonraker": "Moonraker", "duet": "a Duet"}
 TLS_PORT = 443
@@ -24,15 +24,15 @@ EXPECTED = f"{SERVERS}, HOST being a name, an IP address or http(s)://HOST:PORT,
 LINES = ("socket", "rfc2217")
 ADDRESSES = ", ".join(f"{line}://HOST:PORT" for line in LINES)
 ADDRESS = re.compile(r"(?:([^:/?#]*)://)?(\[[^\]/?#]*\]|[^:/?#]*)(:[^/?#]*)?(/[^?#]*)?(.*)", re.DOTALL)
-# Paths may have colons, as those of /dev/serial/by-path; a word with one that is no line known here is a mistake.
+# Paths may contain colons, such as /dev/serial/by-path; any other name with a colon is an unknown kind of line, thus a mistake.
 DEVICE = re.compile(rf"(?:(?i:{'|'.join(LINES)})://|[^:]*[/\\]).*|[^:]+")
 NUMBER = re.compile(r":0*[1-9]\d{0,4}", re.ASCII)
-LABEL = re.compile(r"[\w-]{1,63}")  # of a host's name, in any script
+LABEL = re.compile(r"[\w-]{1,63}")  # of a host name, in any script
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """The simulated printer on a pseudo-terminal. speed: times real time, 0: as fast as it can."""
+    """The simulated printer on a pseudo-terminal. speed: times real time, 0: as fast as possible."""
 
     speed: float = 0.0
     name: ClassVar[str] = SIMULATED
@@ -40,26 +40,24 @@ class Simulated:
 
 @dataclass(frozen=True)
 class SerialPort:
-    """A printer at a device, or behind socket://HOST:PORT or rfc2217://HOST:PORT. name: as the user names it."""
+    """A printer at a device, or behind socket://HOST:PORT or rfc2217://HOST:PORT. name: as the user wrote it."""
 
     name: str
     baud: int = BAUD
 
     @property
     def is_rate_limited(self) -> bool:
-        """Whether bytes take the time that the baud rate says: not over native USB, a network or a pseudo-terminal."""
+        """Whether the baud rate limits throughput: not over native USB, a network or a pseudo-terminal."""
         if "://" in self.name:
             return False
-        device = Path(self.name).resolve()  # of a stable name under /dev/serial/by-id
+        device = Path(self.name).resolve()  # a stable name under /dev/serial/by-id is a link
         return device.parent.name != "pts" and not device.name.startswith(("ttyACM", "cu.usbmodem"))
 
 
 @dataclass(frozen=True)
 class Server:
-    """A print server, which takes whole files and prints them by itself.
-
-    kind: octoprint, moonraker or duet; name: the address as it was given, for messages; path: before that of every request.
-    """
+    """A print server, which receives whole files and prints them by itself. kind: octoprint, moonraker or duet; name: the address
+    as the user wrote it, for messages; path: prefix of every request's path."""
 
     kind: str
     scheme: str
@@ -70,18 +68,17 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Without a slash at its end."""
+        """Base URL without a trailing slash."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}{self.path}"
 
 
 Destination = Simulated | SerialPort | Server
-AtPrinter = Simulated | SerialPort  # a line to the printer itself
+AtPrinter = Simulated | SerialPort  # with a direct line to the printer
 
 
 def parse_destination(port: str, baud: int = BAUD, speed: float = 0.0) -> Destination:
-    """The destination that a port's name, a baud rate and a speed of the simulation mean. Raises ServerError, PrinterError for
-    what is not possible, a name that no device can have included."""
+    """Parse a port's name. Raises ServerError, PrinterError for what is impossible, such as a name that no device can have."""
     if is_server_address(port):
         return parse_server_address(port)
     check_baud(baud)
@@ -90,18 +87,18 @@ def parse_destination(port: str, baud: int = BAUD, speed: float = 0.0) -> Destin
     if port.lower() == SIMULATED:
         return Simulated(speed)
     if not DEVICE.fullmatch(port) or not port.isprintable() or port != port.strip():
-        shown = f"...@{port.rpartition('@')[2]}" if "@" in port else port  # what stands before it may be a password
+        shown = f"...@{port.rpartition('@')[2]}" if "@" in port else port  # the text before it may be a password
         raise PrinterError(f"port {_plain(shown)!r} cannot be one: a device, {SIMULATED}, {ADDRESSES}, {SERVERS} is expected")
     return SerialPort(port, baud)
 
 
 def parse_printer(port: str, baud: int = BAUD, speed: float = 0.0) -> AtPrinter:
-    """The destination where a line to a printer itself is needed. Raises ServerError for a print server."""
+    """Parse the name of a printer's own port. Raises PrinterError, and ServerError for a print server."""
     return at_printer(parse_destination(port, baud, speed))
 
 
 def at_printer(destination: Destination) -> AtPrinter:
-    """Refuse a print server where a line to a printer itself is needed. Raises ServerError."""
+    """The destination, if it is a printer's own port. Raises ServerError for a print server."""
     if isinstance(destination, Server):
         raise ServerError(
             f"{option('port', destination.name)} is a print server, which takes whole files by print and send: "
@@ -111,15 +108,15 @@ def at_printer(destination: Destination) -> AtPrinter:
 
 
 def is_server_address(text: str) -> bool:
-    """Whether what a person names as a port is a print server."""
+    """Whether a port's name is the address of a print server."""
     return text.partition(":")[0].lower() in PORTS and ":" in text
 
 
 def parse_server_address(text: str) -> Server:
-    """The server that is meant. Raises ServerError."""
+    """Parse the address of a print server. Raises ServerError."""
     kind, _, address = text.partition(":")
     kind = kind.lower()
-    if "@" in address:  # never repeated: what stands before it may be a password
+    if "@" in address:  # never repeat it: the text before it may be a password
         raise ServerError("server address: names and passwords do not belong into it: keys have a file of their own")
     parts = ADDRESS.fullmatch(address)
     if not is_server_address(text) or parts is None:
@@ -138,7 +135,7 @@ def parse_server_address(text: str) -> Server:
 
 
 def _is_host(host: str) -> bool:
-    """Whether a text is an IPv6 address in brackets, or can be a computer's name or IPv4 address."""
+    """Whether a text is an IPv6 address in brackets, a host name or an IPv4 address."""
     if host.startswith("["):
         try:
             IPv6Address(host[1:-1])

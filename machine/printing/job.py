@@ -1,6 +1,6 @@
-"""Print job: what is to be done at which printer, the person who attends it, and how it ended.
+"""Print job: the work and its destination, the user who attends it, and how it ended.
 
-The terminal and a page of the workbench are two persons; what prints is written once, against `Person`.
+The terminal and the workbench's page both implement `Person`; all printing code is written against it.
 """
 
 from collections.abc import Callable
@@ -20,22 +20,21 @@ from profiles.profile import Profile
 
 
 class Does(StrEnum):
-    """Kind of work that a job does at its printer."""
+    """Kind of work that a job does."""
 
     PRINT = "print"
-    RESUME = "resume"  # the rest of a print that was cut off
-    FOLLOW = "follow"  # what a print server prints already is watched and commanded
-    HAND = "hand"  # nothing is printed: a person heats and moves the machine
+    RESUME = "resume"  # the rest of an interrupted print
+    FOLLOW = "follow"  # watch and control what a print server is printing
+    HAND = "hand"  # manual control: the user heats and moves the machine
 
 
 @dataclass(frozen=True, eq=False)
 class PrintJob:
-    """A job: its printer, its program and how it is recorded.
+    """A job: its destination, its program and how it is recorded.
 
-    load: makes the program; profile: what is known of the machine before that, None: the program itself says it. starts: False: a
-    print server only gets the file and keeps it. force: go past what --force goes past. cut_off: the journal of the print whose
-    rest it is. log: file for what is sent and received, journal: for what a resume needs; None: a new one in the state folder.
-    key: of the slices that are printed.
+    load: makes the program; profile: known before loading, None: the program says it. starts: False: a print server only stores
+    the file. force: ignore objections that --force can override. cut_off: journal of the interrupted print to finish. log: file
+    for the traffic, journal: file for resuming; None: a new one in the state folder. key: identifies the slices that are printed.
     """
 
     destination: Destination
@@ -53,7 +52,7 @@ class PrintJob:
 
 @dataclass(frozen=True)
 class End:
-    """How a job ended. sentence: for a person who has not followed it."""
+    """How a job ended. sentence: for a user who has not followed it."""
 
     state: PrintState
     sentence: str = ""
@@ -65,15 +64,15 @@ NOT_BEGUN = End(PrintState.DECLINED, "nothing was printed")
 NOT_MOVED = End(PrintState.DECLINED, "nothing was moved or heated")
 
 
-Show = Callable[[PrintStatus | None], None]  # None: it begins, nothing is known of it yet
+Show = Callable[[PrintStatus | None], None]  # None: it begins, nothing is known yet
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A job as it is shown.
+    """A job as displayed.
 
-    beginning: shown as its position as long as no part is known; server: the name of the print server that goes on without this
-    program, "" for a print that ends with it; uploads: the server only gets the file.
+    beginning: its position while no part is known; server: name of the print server that continues without this program, "" for a
+    print that ends with it; uploads: the server only stores the file.
     """
 
     title: str
@@ -86,25 +85,24 @@ class Scene:
 
 
 class Person(Protocol):
-    """A person who attends a job; what is said meanwhile comes as `machine.notices`.
+    """A user who attends a job; messages come as `machine.notices`.
 
-    commands: what the person asks of it; its stop flag is set when the job is to end, heaters off.
+    commands: requests to the job; its stop flag ends the job, heaters off.
     """
 
     commands: Control
 
     def passed(self, sentence: str) -> None:
-        """Take note of what a check has found to be as it must be."""
+        """Report that a check has passed."""
 
     def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
-        """Wait for an answer: the number of a choice, 0 for a plain yes, None for no. Raises JournalError where nobody can
-        answer."""
+        """Wait for an answer: the number of a choice, 0 for yes, None for no. Raises JournalError when no user can answer."""
 
     def show(self, scene: Scene) -> AbstractContextManager[Show]:
-        """Show each moment of the job and take commands for it until the block ends."""
+        """Show the job's status and accept commands until the block ends."""
 
     def left(self) -> bool:
-        """Whether the person has left what goes on without this program."""
+        """Whether the user has left a print that continues without this program."""
 
     def gives_up(self) -> bool:
-        """Whether there is to be no print on a server, as long as none has begun."""
+        """Whether the user has cancelled a print on a server before its start."""

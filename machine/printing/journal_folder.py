@@ -1,4 +1,4 @@
-"""Journal folder: where the journals of prints are, each with its program beside it, the newest ones only."""
+"""Journal folder: journals of the newest prints, each with its program beside it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,16 +15,15 @@ from profiles.folders import state_folder
 from profiles.profile import Profile
 
 KEPT = 20
-BEGUN_S = 3600.0  # a program as new as this may be of a print that another process begins now: its journal comes after it
+# a program younger than this may belong to a print that another process is starting: its journal is written later
+BEGUN_S = 3600.0
 
 
 def new_journal(
     lines: Iterable[str], profile: Profile, name: str, source: Path | None = None, file: Path | None = None
 ) -> Journal:
-    """Begin the journal of a print. source: the G-code file that is printed; None: the lines are cached beside the journal.
-
-    file: the journal's own path, else a new one in the state folder, where the oldest ones go. Raises OutputError, GcodeError.
-    """
+    """Begin the journal of a print. Raises OutputError, GcodeError. source: the G-code file that is printed; None: the lines are
+    saved beside the journal. file: path of the journal, else a new one in the state folder, from which the oldest are deleted."""
     path = file if file is not None else _new_path(name)
     if source is None:
         source = program_beside(path)
@@ -35,23 +34,23 @@ def new_journal(
 
 
 def check_new_journal(file: Path, program: Path | None = None) -> None:
-    """Refuse a journal that is there, or whose program is: it belongs to another print, which may yet be resumed."""
+    """Refuse to overwrite a journal or its program: they belong to another print, which may yet be resumed."""
     for there in (file, *([] if program is None else [program])):
         if lexists(there):
             raise OutputError(f"journal {file}: {there} exists already: each print has one of its own, choose another name")
 
 
 def continue_journal(program: GcodeFile, profile: Profile, name: str, file: Path | None = None) -> Journal:
-    """Begin another journal of a program that is on disk already."""
+    """Begin another journal of a program that is already on disk."""
     heading = JournalHeading(str(program.path), program.sha256(), name, profile.model_dump(mode="json"))
     return Journal(file if file is not None else _new_path(name), heading)
 
 
 @dataclass(frozen=True)
 class ResumableJournal:
-    """A journal of the state folder whose print did not come to its end.
+    """A journal of the state folder whose print did not finish.
 
-    line: up to which it was surely executed; written_s: when it was written last, seconds since 1970.
+    line: last line surely executed; written_s: time of the last record, seconds since 1970.
     """
 
     path: Path
@@ -62,8 +61,7 @@ class ResumableJournal:
 
 
 def resumable_journals() -> list[ResumableJournal]:
-    """The newest first; those that cannot be read, are being printed, are resumed already or have lost their program are left
-    out."""
+    """The resumable journals, newest first: readable, not being printed, not resumed yet and with their program."""
     return [journal for journal in map(_resumable, sorted(_journals(_folder()), reverse=True)) if journal is not None]
 
 
@@ -91,7 +89,7 @@ def _journals(folder: Path) -> list[Path]:
 
 
 def _new_path(name: str) -> Path:
-    """A new file's path, named after the time and the model."""
+    """A new path named after the time and the model."""
     folder = _folder()
     try:
         folder.mkdir(0o700, exist_ok=True)
@@ -103,12 +101,12 @@ def _new_path(name: str) -> Path:
 
 
 def _delete_oldest(folder: Path) -> None:
-    """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is
-    left that names it, a new one only with its journal."""
+    """Make room for one more journal: delete all but the newest and those being printed. A program is deleted when no journal
+    beside it names it any more; a new program only with its journal."""
     journals = _journals(folder)
     before = b"".join(map(_first_line, journals))
     keep_newest(journals, KEPT - 1, _name, is_being_printed)
-    after = b"".join(map(_first_line, _journals(folder)))  # listed again: another process may have begun one
+    after = b"".join(map(_first_line, _journals(folder)))  # read again: another process may have begun one
     for program in folder.glob(f"*{PROGRAM}"):
         name = program.name.encode()
         if name not in after and (name in before or not _is_new(program)):
@@ -122,7 +120,7 @@ def _name(journal: Path) -> str:
 def _is_new(program: Path) -> bool:
     try:
         return time() - modified_s(program) < BEGUN_S
-    except FileNotFoundError:  # another process was quicker
+    except FileNotFoundError:  # another process was faster
         return False
 
 

@@ -1,7 +1,7 @@
-"""Ports: the line to a printer at a port, and what answers at each port of this computer.
+"""Ports: the line to a printer, and the survey of all ports of this computer.
 
-A simulated printer that runs keeps a file in the state folder with its path and a description, locked as long as it runs:
-another terminal may get the path of one that was killed, and must not be written to.
+A running simulated printer keeps a locked file in the state folder with its path and a description. The lock matters: after a
+simulator was killed, another terminal may get its path and must not be written to.
 """
 
 import os
@@ -33,12 +33,12 @@ ECHO = ("M114", "M115")
 STARTING_S, STARTING_AGAIN_S = 60.0, 5.0  # Klipper takes 5 to 20 s until its boards are connected
 TIMEOUT_S = 4.0
 LONGEST_S = TIMEOUT_S + QUICK_S * len(BAUDS)
-AT_A_TIME = 16  # ports asked at once: each takes seconds when nothing answers
+AT_A_TIME = 16  # ports queried at once: each takes seconds when nothing answers
 
 
 @contextmanager
 def open_line(at: AtPrinter, machine: Machine, table: ProbedTable | None = None) -> Iterator[Port]:
-    """A line to a printer, alone; to a simulated one of a machine, whose table may be sensed. Raises PortError."""
+    """Open an exclusive line to a printer, or to a new simulated one with this machine and probed table. Raises PortError."""
     if isinstance(at, Simulated):
         with SimulatedPrinter(machine, at.speed or inf, table=table) as printer, open_port(printer.path, BAUD) as wire:
             yield wire
@@ -48,15 +48,13 @@ def open_line(at: AtPrinter, machine: Machine, table: ProbedTable | None = None)
 
 
 def rate_of(at: AtPrinter) -> int:
-    """The rate of a line, bits a second."""
+    """Baud rate of the line, bits per second."""
     return BAUD if isinstance(at, Simulated) else at.baud
 
 
 def identify_printer(wire: Port, baud: int, halted: bool = False) -> Answer:
-    """Identify the printer at a port; raises PrinterError where anything else answers, or at another rate.
-
-    One that is still starting is waited for. halted: one that has halted will do, if a command lets it print again.
-    """
+    """Identify the printer at a port, waiting for one that is still starting. Raises PrinterError when something else answers, or
+    at another rate. halted: accept a halted printer that a command can revive."""
     answer, rate = ask_at_any_rate(wire, baud)
     end_s = monotonic() + STARTING_S
     while answer.kind is Kind.STARTING and monotonic() < end_s:
@@ -69,7 +67,7 @@ def identify_printer(wire: Port, baud: int, halted: bool = False) -> Answer:
 
 
 def check_answer(answer: Answer, port: str, baud: int, rate: int) -> None:
-    """Refuse what is no printer, or one that answers at another rate; raises PrinterError with a sentence of what it is."""
+    """Refuse an answer that is not from a printer or came at another rate. Raises PrinterError, PortError."""
     if answer.kind.is_printer and rate != baud:
         raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: {advice('baud', rate, 'use')}")
     if answer.kind is not Kind.PRINTER:
@@ -78,7 +76,7 @@ def check_answer(answer: Answer, port: str, baud: int, rate: int) -> None:
 
 
 def _words(answer: Answer) -> dict[str, str]:
-    """Words for the sentences about an answer. Marlin reports of its work only that it does something, or waits."""
+    """Words for the sentences about an answer. While Marlin works it only reports that it is busy or waiting."""
     words = answer.words[:60]
     usual = answer.words.startswith(("processing", "paused for", "busy")) or not words
     work = "it heats, moves or waits for a person" if usual else words
@@ -86,7 +84,7 @@ def _words(answer: Answer) -> dict[str, str]:
     return {"words": words, "work": work, "stranger": stranger, "firmware": answer.firmware, "revival": answer.revival}
 
 
-# What answers that is no printer to print on: the error, as a sentence, and how it is listed.
+# Answers that rule out printing: error class, its sentence, and the text in a list of ports.
 NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
     Kind.BUSY: (
         PrinterError,
@@ -125,7 +123,7 @@ NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
 
 
 def describe_answer(answer: Answer, baud: int) -> str:
-    """Description of an answer for a person."""
+    """Description of an answer for the user."""
     if answer.kind is Kind.PRINTER:
         axes = f", axes {' '.join(answer.letters)}" if answer.letters else ""
         return f"{answer.firmware or 'a printer that does not name its firmware'}{axes}, at {baud} baud"
@@ -134,7 +132,7 @@ def describe_answer(answer: Answer, baud: int) -> str:
 
 @dataclass(frozen=True)
 class PortReport:
-    """A port, and what answers there at which rate. trouble: why it could not be asked; reason: that without the port's name."""
+    """A port, the answer there and its rate. trouble: why it could not be queried; reason: that without the port's name."""
 
     device: SerialDevice
     answer: Answer | None = None
@@ -144,12 +142,12 @@ class PortReport:
 
 
 def known_ports() -> tuple[SerialDevice, ...]:
-    """Those in /dev/serial/by-id first, running simulators of this user last."""
+    """The serial ports, /dev/serial/by-id first, then this user's running simulators."""
     return (*serial_devices(), *running_simulators())
 
 
 def ask_ports(devices: Sequence[SerialDevice], baud: int, over: Event, in_use: Iterable[str] = ()) -> list[PortReport]:
-    """What answers at each port. over: ends the asking once it is set; in_use: ports where this program prints stay closed."""
+    """Query each port. over: ends the queries when set; in_use: ports at which this program is printing, which stay closed."""
     names = frozenset(in_use)
 
     def ask(device: SerialDevice) -> PortReport:
@@ -166,7 +164,7 @@ def ask_ports(devices: Sequence[SerialDevice], baud: int, over: Event, in_use: I
 
 
 def ask_port(device: SerialDevice, baud: int, over: Event | None = None) -> PortReport:
-    """Open a port for this program alone and see what answers; a set `over` ends the asking."""
+    """Open a port exclusively and query it; setting `over` ends the query."""
     try:
         with open_port(device.name, baud) as port:
             return PortReport(device, *ask_at_any_rate(port, baud, TIMEOUT_S, over))
@@ -179,7 +177,7 @@ def _refused(device: SerialDevice, error: PortError) -> PortReport:
 
 
 def describe(report: PortReport) -> str:
-    """Two or three lines for a person."""
+    """Report of a port for the user, two or three lines."""
     device = report.device
     lines = [device.name]
     what = [device.path if device.path != device.name else "", device.description]
@@ -190,14 +188,14 @@ def describe(report: PortReport) -> str:
 
 
 def answer_words(report: PortReport) -> str:
-    """The answer, or why the port could not be asked, for a person who sees the port's name; "" where it was not asked."""
+    """The answer, or why the port could not be queried, without the port's name; "" if it was not queried."""
     if report.answer is None:
         return report.reason
     return describe_answer(report.answer, report.baud)
 
 
 def port_json(report: PortReport) -> dict[str, Any]:
-    """A report as JSON for other programs: every key is always there, null where it is not known."""
+    """Report as JSON for other programs: every key is present, null where unknown."""
     answer, device = report.answer, report.device
     printer = answer is not None and answer.kind.is_printer
     return {
@@ -219,7 +217,7 @@ def announced(description: str, path: str) -> Iterator[Callable[[str], None]]:
     """List a simulated printer while it runs; yields a function to call when its path changes."""
     try:
         text = (_folder() / str(os.getpid())).open("w", encoding="utf-8")
-    except OSError:  # a full disk: it is not listed
+    except OSError:  # disk full: it is not listed
         yield lambda now: None
         return
     lock(text.fileno())
@@ -242,7 +240,7 @@ def announced(description: str, path: str) -> Iterator[Callable[[str], None]]:
 
 
 def running_simulators() -> tuple[SerialDevice, ...]:
-    """Those that run now, by path; what is left of others is removed."""
+    """The running simulators by path; files left by others are removed."""
     devices = []
     try:
         files = sorted(_folder().iterdir())
@@ -251,7 +249,7 @@ def running_simulators() -> tuple[SerialDevice, ...]:
     for file in files:
         with suppress(OSError), file.open("r+", encoding="utf-8") as text:
             path, _, description = text.read().partition("\n")
-            if path and lock(text.fileno()):  # an empty one is of a simulator that has not locked it yet
+            if path and lock(text.fileno()):  # an empty file belongs to a simulator that has not locked it yet
                 file.unlink(missing_ok=True)
                 continue
             if path:

@@ -1,6 +1,6 @@
-"""Printers: what a job is printed by, and the one list of what is asked before anything moves.
+"""Printers of a job, and the checks before anything moves.
 
-The printer is greeted, held against the machine, and then against the program, which is loaded when the printer fits.
+The printer is greeted and compared with the machine, then with the program, which is loaded only if the printer fits.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,7 +39,7 @@ def open_printer(job: PrintJob, person: Person) -> Iterator[Printer]:
 
 @contextmanager
 def open_server_printer(job: PrintJob, at: Server, person: Person) -> Iterator[ServerPrinter]:
-    """The printer behind a print server, for as long as the session with it lasts. Raises ServerError, ProfileError."""
+    """The printer behind a print server, while the session lasts. Raises ServerError, ProfileError."""
     title = f"what {at.name} prints" if job.does is Does.FOLLOW else f"{job.name} to {at.name}"
     with new_log("print" if job.starts else "send", title, job.log) as log:
         log.say_trouble("what is asked and answered")
@@ -48,9 +48,9 @@ def open_server_printer(job: PrintJob, at: Server, person: Person) -> Iterator[S
 
 
 def check_print(job: PrintJob, printer: Printer, tell: Callable[[LoadedProgram], object] | None = None) -> LoadedProgram:
-    """The program of a job, when nothing speaks against printing it there. The printer is asked before any work is done.
+    """The program of a job, once all checks have passed; the printer is greeted before any work is done. Raises UserError.
 
-    tell: called with the program as soon as it is there, and again with what is found of it. Raises UserError.
+    tell: called with the program when it is loaded, and again with its findings.
     """
     assert job.load is not None
     printer.greet()

@@ -1,6 +1,6 @@
-"""Rescue: a printer whose sender has died has its heaters switched off, or is stopped at once, on a connection of its own.
+"""Rescue: switch off the heaters of a printer whose sender has died, or stop it at once, over a new connection.
 
-A print server goes on printing by itself: it is only asked what it does, unless a person wants it stopped or cancelled.
+A print server continues by itself: it is only queried, unless the user wants the print stopped or cancelled.
 """
 
 from machine.link.medium import SERIAL
@@ -13,14 +13,14 @@ from machine.printing.servers.servers import open_server
 from profiles.errors import PortError, ServerError, UserError
 
 CANCEL_THERE = "if it is to be cancelled, do that on the server's own page"
-ROUNDED_S = 1.0  # servers tell whole seconds
+ROUNDED_S = 1.0  # servers report whole seconds
 STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 
 def rescue(at: SerialPort | Server, emergency: bool) -> str:
-    """Open the port anew and give the orders; what became of them as a sentence. emergency: by M112.
+    """Reopen the port, make the printer safe and return the result as a sentence. emergency: by M112.
 
-    Homing that is under way is cut short, whereupon Marlin halts: its heaters are off then, too.
+    Homing in progress is aborted, upon which Marlin halts with its heaters off.
     """
     if isinstance(at, Server):
         return _rescue_server(at, emergency)
@@ -39,10 +39,10 @@ def rescue(at: SerialPort | Server, emergency: bool) -> str:
 
 
 def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
-    """Cancel a print that nobody follows any more, if it certainly is the one that was left.
+    """Cancel a print that was left, if what the server prints certainly is that print; False when nothing is printed there.
 
-    file: its name on the server; away_s: how long ago it was last seen printing. Returns False when nothing is printed there.
-    Raises ServerError, and cancels nothing, when the server is unreachable or what it prints may be somebody else's.
+    file: its name on the server; away_s: seconds since it was last seen printing. Raises ServerError, and cancels nothing, when
+    the server is unreachable or may be printing something else.
     """
     with open_server(at) as server:
         server.greet()
@@ -54,7 +54,7 @@ def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
             raise ServerError(f"{at.name} does not say which file it prints, it may not be {file}: {CANCEL_THERE}")
         if printed != file:
             raise ServerError(f"{at.name} prints {printed} now, not {file}")
-        if status.elapsed_s + ROUNDED_S < away_s:  # begun after the one that was left was last seen
+        if status.elapsed_s + ROUNDED_S < away_s:  # started after the abandoned print was last seen
             raise ServerError(f"{at.name} may have begun to print {file} again since: {CANCEL_THERE}")
         server.order(Command.CANCEL)
         return True

@@ -1,4 +1,4 @@
-"""Serial log: what went over the line, one file a print, bounded in size, old ones deleted; and what the printer said last."""
+"""Serial log: the traffic of the line, one file per print, limited in size; and the printer's newest messages."""
 
 import os
 import time
@@ -18,24 +18,24 @@ from profiles.files import dated_name, keep_newest
 from profiles.folders import state_folder
 
 KEPT = 10  # logs of each kind
-LIMIT_BYTES = 64_000_000  # of one log: about 600,000 lines with their answers
-PIECES = 4  # the first one is kept for the beginning, the others are the newest
-WORDS_KEPT = 50  # of a printer
-LONGEST_BYTES = 4096  # of a line that is not ended yet
-UNWRITTEN_S = 1.0  # at most that much is missing after a crash: to write each chunk by itself would cost as much as sending it
+LIMIT_BYTES = 64_000_000  # per log: about 600,000 lines with their answers
+PIECES = 4  # the first is kept, the others are the newest
+WORDS_KEPT = 50  # messages of a printer
+LONGEST_BYTES = 4096  # of an unfinished line
+UNWRITTEN_S = 1.0  # at most this much is lost in a crash: writing each chunk at once would cost as much as sending it
 
 
 class SerialLog:
-    """`with SerialLog(file) as log:` hand log.note(direction, data) every chunk that is sent (">") or received ("<").
+    """`with SerialLog(file) as log:` pass each chunk sent (">") or received ("<") to log.note(direction, data).
 
-    Chunks are put together to whole lines, each with the time of its end. A log never disturbs the print: where it cannot
-    be written it ends, and `trouble` says why.
+    Chunks are joined to whole lines, each with the time of its end. A log never disturbs the print: if it cannot be written it
+    ends, and `trouble` says why.
     """
 
     def __init__(self, file: Path, title: str, limit_bytes: int = LIMIT_BYTES) -> None:
         self.file, self.title = file, title
         self.trouble = ""
-        self._torn: dict[str, bytes] = {}  # what is behind the last line's end, by direction
+        self._torn: dict[str, bytes] = {}  # unfinished line of each direction
         self._flushed_s = 0.0
         self._second, self._clock = -1, ""
         self._piece_bytes, self._written, self._piece = limit_bytes // PIECES, 0, 0
@@ -43,7 +43,7 @@ class SerialLog:
         self._write(f"# tiltprint, {datetime.now():%Y-%m-%d %H:%M:%S}, {title}\n", flush=True)
 
     def note(self, direction: str, data: bytes) -> None:
-        """Take a chunk of bytes; "#" is a remark of this program."""
+        """Record a chunk of bytes; direction "#" is a remark of this program."""
         now_s = time.time()
         data = self._torn.get(direction, b"") + data
         end = data.rfind(b"\n") + 1
@@ -55,16 +55,16 @@ class SerialLog:
             self._write(_stamped(data[: end - 1], f"{self._stamp(now_s)} {direction} "), flush)
 
     def say_trouble(self, what: str = "the traffic") -> None:
-        """Tell the person when nothing can be logged. what: that would be."""
+        """Report that nothing can be logged, if so. what: the content that is not logged."""
         if self.trouble:
             say(f"{what} is not logged: {self.file}: {self.trouble}")
 
     def remark(self, text: str) -> None:
-        """Add a line of this program's own."""
+        """Add a remark of this program."""
         self.note("#", f"{text}\n".encode())
 
     def close(self) -> None:
-        """Write what is held back, lines without an end too."""
+        """Write what is buffered, including unfinished lines."""
         for direction, line in self._torn.items():
             if line:
                 self._write(f"{self._stamp(time.time())} {direction} {_readable(line)} (unfinished)\n")
@@ -101,7 +101,7 @@ class SerialLog:
             self._fail(error)
 
     def _next_piece(self) -> None:
-        """Go on in a new file; the beginning and the newest pieces stay, together never more than the limit."""
+        """Continue in a new file; the first and the newest pieces are kept, together within the limit."""
         assert self._out is not None
         self._out.close()
         self._piece, self._written = self._piece + 1, 0
@@ -122,7 +122,7 @@ class SerialLog:
 
 
 class TappedWire:
-    """A wire whose every byte is reported, those of a safe end and of the emergency stop too."""
+    """A wire that reports every byte, including those of a safe end or an emergency stop."""
 
     def __init__(self, wire: Wire, tell: Traffic) -> None:
         self._wire, self._tell = wire, tell
@@ -134,28 +134,28 @@ class TappedWire:
         self._wire.write(data)
 
     def read(self) -> bytes:
-        """The bytes that have come."""
+        """The bytes received."""
         data = self._wire.read()
         if data:
             self._tell("<", data)
         return data
 
     def discard(self) -> None:
-        """Forget bytes that were handed over but not sent yet."""
+        """Discard bytes that are not sent yet."""
         self._wire.discard()
 
     def close(self) -> None:
-        """Close."""
+        """Close the wire."""
         self._wire.close()
 
 
 def tap(tell: Traffic, medium: Medium = SERIAL) -> Medium:
-    """A medium whose wires report all bytes that go over them."""
+    """A medium whose wires report all traffic."""
     return replace(medium, open=lambda name, baud: TappedWire(medium.open(name, baud), tell))
 
 
 def _stamped(lines: bytes, stamp: str) -> str:
-    """Whole lines, each behind its stamp; those without a character are left out."""
+    """Whole lines, each after its time stamp; empty lines are omitted."""
     text = lines.decode("latin-1")
     usual = text.isascii() and text.replace("\n", "").isprintable()
     if usual and "\n\n" not in f"\n{text}\n":
@@ -164,33 +164,33 @@ def _stamped(lines: bytes, stamp: str) -> str:
 
 
 def _readable(line: bytes) -> str:
-    """A line as ASCII; what cannot be printed is escaped, so that every byte can be read."""
+    """A line as ASCII; unprintable bytes are escaped, so that each can be read."""
     text = line.decode("latin-1").rstrip("\r")
     return text if text.isascii() and text.isprintable() else text.encode("unicode_escape").decode("ascii")
 
 
 def piece_of(file: Path, piece: int) -> Path:
-    """The file of a piece of a log: print.log, print.1.log, print.2.log."""
+    """File of a log's piece: print.log, print.1.log, print.2.log."""
     return file.with_name(f"{file.stem}.{piece}{file.suffix}") if piece else file
 
 
 def new_log(kind: str, title: str, file: Path | None = None) -> SerialLog:
-    """A log in the file, else in a new one of the state folder, named after its kind and the time; the oldest of a kind go."""
+    """A log in the file, else in a new file of the state folder named after kind and time; the oldest of the kind are deleted."""
     if file is not None:
         return SerialLog(file, title)
     folder = state_folder() / "logs"
-    with suppress(OSError):  # what cannot be deleted stays; the log itself says whether it can be written
+    with suppress(OSError):  # a file that cannot be deleted stays; the log itself reports whether it can be written
         folder.mkdir(0o700, exist_ok=True)
         files = [*folder.glob(f"{kind}-*.log")]
         kept = keep_newest((file for file in files if "." not in file.stem), KEPT - 1, lambda file: file.name)
-        for file in files:  # a piece goes with the beginning of its log
+        for file in files:  # pieces are deleted with the first of their log
             if file.with_name(f"{file.stem.partition('.')[0]}.log") not in kept:
                 file.unlink(missing_ok=True)
     return SerialLog(folder / f"{kind}-{dated_name()}.log", title)
 
 
 class PrinterMessages:
-    """The newest words of a printer beside its answers; hear() takes chunks of bytes in the thread of the port."""
+    """The newest messages of a printer; hear() is called with chunks of bytes in the port's thread."""
 
     def __init__(self, most: int = WORDS_KEPT) -> None:
         self.last: deque[str] = deque(maxlen=most)
@@ -198,7 +198,7 @@ class PrinterMessages:
         self._newest, self._times = "", 0
 
     def hear(self, direction: str, data: bytes) -> None:
-        """Take what was received ("<")."""
+        """Take received bytes; others are ignored."""
         if direction != "<":
             return
         *lines, self._half = (self._half + data).split(b"\n")
@@ -208,7 +208,7 @@ class PrinterMessages:
                 self._append(text)
 
     def _append(self, text: str) -> None:
-        """What is said again takes no line of its own but a count."""
+        """Append a message; a repeated one is counted instead."""
         again = text == self._newest and bool(self.last)
         self._newest, self._times = text, self._times + 1 if again else 1
         if again:
@@ -217,14 +217,14 @@ class PrinterMessages:
             self.last.append(text)
 
     def add(self, text: str) -> None:
-        """Take the stream's message of this moment; one that stays is added once."""
+        """Add the stream's current message once, however long it stays."""
         if text and text != self._message:
             self._append(text)
         self._message = text
 
 
 def printer_message(line: bytes) -> str:
-    """The words of a line for a person; "" for reports and answers."""
+    """The message in a line for the user; "" for reports and answers."""
     event = read_event(line)
     if event.kind is Kind.START:
         return "the printer has started"

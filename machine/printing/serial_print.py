@@ -1,4 +1,4 @@
-"""Serial print: a program streamed to a printer at a port, or to the simulated one on a pseudo-terminal, before a person."""
+"""Serial print: stream a program to a printer at a port, or to the simulated one on a pseudo-terminal."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -28,17 +28,17 @@ from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import OutputError, PrinterError
 from profiles.machine import Machine
 
-USB_BYTES, QUEUE = 1024, 16  # the simulated printer is a board with native USB: more lines at a time halve what a line costs
+USB_BYTES, QUEUE = 1024, 16  # the simulated board has native USB: sending more lines at once halves the cost per line
 HEATERS = {
     True: "heaters off",
     False: "the printer did not confirm that its heaters are off: look at it",
     None: "nothing had been sent yet",
 }
-Begin = Callable[[PrinterStatus], ResumePoint]  # of a resumed print: decides where it goes on, by where the printer stands
+Begin = Callable[[PrinterStatus], ResumePoint]  # of a resumed print: decides where it continues, given the printer's status
 
 
 class SerialPrinter:
-    """The printer of a job at a port, or the simulated one, of which nothing is asked."""
+    """The printer at a port, or the simulated one, which is not identified."""
 
     def __init__(self, job: PrintJob, at: AtPrinter, person: Person) -> None:
         self.person = person
@@ -46,13 +46,13 @@ class SerialPrinter:
         self._job, self._at = job, at
 
     def greet(self) -> None:
-        """Identify what answers at the port. Raises PrinterError."""
+        """Identify the printer at the port. Raises PrinterError."""
         if isinstance(self._at, SerialPort):
             with open_port(self._at.name, self._at.baud) as wire:
                 self.identity = Identity("", identify_printer(wire, self._at.baud))
 
     def print(self, loaded: LoadedProgram) -> End:
-        """Stream it and say how it ended, with a log and a journal."""
+        """Stream the program, with a log and a journal, and report how it ended."""
         simulated = isinstance(self._at, Simulated)
         journalled = self._journal(loaded) if not simulated or self._job.journal is not None else nullcontext()
         title = f"{loaded.name} to {'the simulated printer' if simulated else self._at.name}"
@@ -63,7 +63,7 @@ class SerialPrinter:
             return report_end(outcome, log, journal)
 
     def _journal(self, loaded: LoadedProgram) -> AbstractContextManager[Journal | None]:
-        """The journal. A print whose journal has no file of its own goes on without one where none can be written."""
+        """The journal. If a journal in the state folder cannot be written, the print continues without one."""
         file = self._job.journal
         try:
             return new_journal(loaded.program.lines, loaded.profile, loaded.name, loaded.source, file)
@@ -74,7 +74,7 @@ class SerialPrinter:
             return nullcontext()
 
     def fits(self, machine: Machine) -> str:
-        """That the printer is one for a machine, as a sentence."""
+        """A sentence that the printer fits a machine."""
         if isinstance(self._at, Simulated):
             speed = f"{self._at.speed:g} times as fast as a real one" if self._at.speed else "as fast as it can"
             return f"a simulated {machine.name}, {speed}"
@@ -110,8 +110,8 @@ def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person:
 def stream_program(
     loaded: LoadedProgram, at: SerialPort, scene: Scene, person: Person, *, begin: Begin | None = None, pace: float | None = 1.0
 ) -> Outcome:
-    """Stream a program while a person watches and commands it. pace: seconds of the print that pass in one of the clock; None: as
-    fast as it goes. What is shown begins when a resumed print does: before, the person is asked."""
+    """Stream a program while the user watches and controls it; a resumed print is shown once it begins to print. pace: seconds of
+    the print per second of the clock; None: as fast as possible."""
     timeline = Timeline(loaded.program.run)
 
     def traffic(direction: str, data: bytes) -> None:
@@ -153,10 +153,10 @@ def stream_program(
 
 
 def time_left_s(remaining_s: Callable[[int], float], first: int, status: PrintStatus, pace: float | None) -> float | None:
-    """Time left of a print that began with a line of its file; None where nothing is known yet.
+    """Time left of a print that began at a line of its file, s; None while unknown.
 
-    remaining_s: what is left of the program after a line, s, at its own feed rates. pace: seconds of the print that pass in one
-    of the clock; None: as many as have so far, whatever the feed.
+    remaining_s: seconds of the program after a line, at its own feed rates. pace: seconds of the print per second of the clock;
+    None: the mean pace so far, whatever the feed.
     """
     left_s = remaining_s(status.file_line)
     if pace is not None:
@@ -167,20 +167,20 @@ def time_left_s(remaining_s: Callable[[int], float], first: int, status: PrintSt
 
 @contextmanager
 def _pointing_to(log: SerialLog) -> Iterator[None]:
-    """Say where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
+    """Report where the serial log is when the print fails, and at the start if nothing can be logged."""
     log.say_trouble()
     try:
         yield
     except PrinterError:
         _point_to(log)
         raise
-    except KeyboardInterrupt:  # the second one: nobody waited for the printer's word
+    except KeyboardInterrupt:  # the second one: the printer's confirmation was not awaited
         say("ended at once: whether the heaters are off is not known, look at the printer")
         raise
 
 
 def _point_to(log: SerialLog) -> None:
-    """Say where the log is, and whether it is whole; it ends here."""
+    """Close the log and report where it is, and whether it is complete."""
     log.close()
     if log.trouble:
         say(f"what was sent and received is not wholly in {log.file}: {log.trouble}")
@@ -189,8 +189,8 @@ def _point_to(log: SerialLog) -> None:
 
 
 def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal | None = None) -> End:
-    """Report how the print ended, where its log is when the printer had something to say, and how to resume a stopped one, or
-    that this is not possible. Closes the journal first: only what is on the disk is promised."""
+    """Report how the print ended, the log if the printer sent warnings, and how to resume a stopped print or why it is
+    impossible. Closes the journal first: only what is on disk is promised."""
     if journal is not None:
         journal.close()
         if journal.trouble:

@@ -1,4 +1,4 @@
-"""Server print: a program handed over to a print server, started there and followed to its end; one that runs there followed."""
+"""Server print: upload a program to a print server, start it there and follow it; or follow a print that is running there."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ LIMITS = (
 
 
 class ServerPrinter:
-    """The printer of a job behind a print server, which prints without this program: a person may leave it printing."""
+    """The printer behind a print server, which prints without this program: the user may leave it printing."""
 
     def __init__(self, job: PrintJob, server: PrintServer, log: SerialLog, person: Person) -> None:
         self.server, self.person = server, person
@@ -35,19 +35,19 @@ class ServerPrinter:
         self._job, self._log = job, log
 
     def greet(self) -> None:
-        """Ask the server who it is, and whether it is free where something is to be printed."""
+        """Identify the server; before a print also check that it is free."""
         self.identity = self.server.greet()
         say(f"{self.identity.text} answers at {self.server.name}")
         if self._job.starts and self._job.does is Does.PRINT:
             check_free(self.server.name, self.server.status())
 
     def fits(self, machine: Machine) -> str:
-        """That the printer is one for a machine, as a sentence."""
+        """A sentence that the printer fits a machine."""
         free = ", is free," if self._job.starts else ""
         return f"{self.identity.text} answers at {self.server.name}{free} and prints for {machine.name}"
 
     def send(self, loaded: LoadedProgram) -> End:
-        """Hand it over, and have it printed where the job says so, without following it."""
+        """Upload the program, start it if the job says so, and do not follow it."""
         try:
             file = hand_over(self.server, GcodeUpload(loaded.name, loaded.program.lines), loaded.name, self._scene(), self.person)
         except CancelledError:
@@ -69,16 +69,16 @@ class ServerPrinter:
             raise ServerError(f"{error}; whether it prints {file} is not known: look at the printer") from None
 
     def print(self, loaded: LoadedProgram) -> End:
-        """Hand it over, have it printed where the job says so, and show it until it ends or the person leaves.
+        """Upload the program, start it if the job says so, and show it until it ends or the user leaves.
 
-        Raises ServerError, FirmwareError after an emergency stop.
+        Raises ServerError, and FirmwareError after an emergency stop.
         """
         if not self._job.starts:
             return self.send(loaded)
         person, server, upload = self.person, self.server, GcodeUpload(loaded.name, loaded.program.lines)
         try:
             file = hand_over(server, upload, loaded.name, self._scene(), person)
-            check_free(server.name, server.status())  # somebody else may have begun while the program was made
+            check_free(server.name, server.status())  # another client may have started a print in the meantime
             if person.gives_up():
                 return NOT_BEGUN
         except CancelledError:
@@ -87,9 +87,9 @@ class ServerPrinter:
         return self._follow(file, loaded.name, ReportedProgress(upload, loaded), self._scene())
 
     def follow(self, now: PrintStatus) -> End:
-        """Show a print that the server is at already until it ends or the person leaves. now: of running_print().
+        """Show a running print until it ends or the user leaves. now: result of running_print().
 
-        Raises ServerError, FirmwareError after an emergency stop.
+        Raises ServerError, and FirmwareError after an emergency stop.
         """
         scene = replace(self._scene(), beginning="a file that is not known here")
         return self._follow(now.file, file_name(now), ReportedProgress(), scene, now)
@@ -97,7 +97,7 @@ class ServerPrinter:
     def _follow(
         self, file: str, name: str, progress: "ReportedProgress", scene: Scene, running: PrintStatus | None = None
     ) -> End:
-        """Have a file printed, or follow a print that is running, and report how it ended. name: for a person."""
+        """Start a file, or follow a running print, and report how it ended. name: for the user."""
         server, person = self.server, self.person
         with person.show(scene) as tell:
             tell(None)
@@ -132,8 +132,7 @@ class ServerPrinter:
 
 
 def hand_over(server: PrintServer, upload: GcodeUpload, named: str, scene: Scene, person: Person) -> str:
-    """Upload with progress; returns the name by which the server prints it. Raises ServerError, CancelledError when the person
-    gives it up."""
+    """Upload with progress and return the file's name on the server. Raises ServerError, CancelledError."""
     if upload.name != named:
         say(f"{named} becomes {upload.name} there")
     if server.has(upload.name):
@@ -161,7 +160,7 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, scene: Scene
 
 
 def running_print(server: PrintServer) -> PrintStatus:
-    """The state of the print that a server is at. Raises ServerError when there is none."""
+    """Status of the print that is running on a server. Raises ServerError when none is."""
     status = server.status()
     if not status.state.is_printing:
         raise ServerError(f"{server.name} prints nothing now ({status.message or status.state}): there is nothing to follow")
@@ -169,13 +168,13 @@ def running_print(server: PrintServer) -> PrintStatus:
 
 
 def file_name(status: PrintStatus) -> str:
-    """Name of the file that a server prints, for a person."""
+    """Name of the file that a server prints, for the user."""
     return status.file or "its file"
 
 
 class ReportedProgress:
-    """Progress of a print on a server. Where the program is known here, part and layer follow from the position up to which the
-    server has read the file. size: of that file, bytes, 0: not known."""
+    """Progress of a print on a server; part and layer follow from how far the server has read a program that is known here. size:
+    of the file, bytes, 0: unknown."""
 
     def __init__(self, upload: GcodeUpload | None = None, loaded: LoadedProgram | None = None) -> None:
         self.line, self.elapsed_s = 0, 0.0
@@ -188,12 +187,12 @@ class ReportedProgress:
 
     @property
     def last_known(self) -> str:
-        """The newest temperatures, as words behind the last ones of a print."""
+        """The newest temperatures, in words, for the end of a print."""
         return "" if self._last_status is None else last_known(self._last_status.temperature, monotonic() - self._last_status_s)
 
     def at(self, status: PrintStatus, message: str) -> PrintStatus:
-        """The status with its age, and with part and layer of the line it has reached. message: replaces the server's own."""
-        if status is not self._last_status:  # a server that does not answer leaves what it told last
+        """The status with its age, part and layer. message: replaces the server's own."""
+        if status is not self._last_status:  # a silent server leaves its last status
             self._last_status, self._last_status_s = status, monotonic()
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s)
         heat_age_s = monotonic() - self._last_status_s

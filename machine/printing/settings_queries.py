@@ -1,6 +1,6 @@
-"""Settings queries: the settings that a printer at a port or behind a print server reports, as text for detection.
+"""Settings queries: the settings that a printer reports at a port or through a print server, as text for detection.
 
-Only questions are asked: nothing moves, nothing heats. A printer that prints is left alone.
+Nothing moves or heats; a printer that is printing is left alone.
 """
 
 import re
@@ -22,8 +22,8 @@ from profiles.messages import option
 
 ANSWER_S = 5.0  # M503 of a full build is some 4 KiB, half a second at 115200 baud
 OK = re.compile(r"ok\b.*")
-QUIET_S = 0.25  # what still comes of the questions before is over
-# Answers Marlin's M27 while it prints a file of its own (sd/cardreader.cpp), RepRapFirmware's object model, and grblHAL.
+QUIET_S = 0.25  # silence that ends the answers to earlier queries
+# Answers of a busy printer: Marlin's to M27 (sd/cardreader.cpp), RepRapFirmware's object model, and grblHAL.
 WORK = "processing|simulating|pausing|paused|resuming|cancelling|busy|changingTool"
 AT_WORK = re.compile(rf'.*(?:SD printing byte|"state\.status".*"result":"(?:{WORK})").*')
 CUT = re.compile(r'"next":([1-9]\d*)\}$')
@@ -39,7 +39,7 @@ OTHERWISE = {
 
 
 def settings_text(at: Destination, simulated: Machine) -> ConfigText:
-    """What answers there; simulated: the machine of the simulated printer. Raises PrinterError."""
+    """Query the settings; simulated: the machine of the simulated printer. Raises PrinterError."""
     if isinstance(at, Server):
         with open_server(at) as server:
             server.greet()
@@ -66,7 +66,7 @@ def _conversation(wire: Port, baud: int) -> str:
 
 
 def _hear_out(wire: Port) -> None:
-    """Read what still comes, so that no answer is taken for that of the next question."""
+    """Read late answers, so that none is taken for the answer to the next query."""
     quiet_s, end_s = monotonic() + QUIET_S, monotonic() + ANSWER_S
     while (now_s := monotonic()) < min(quiet_s, end_s):
         if wire.read():
@@ -74,7 +74,7 @@ def _hear_out(wire: Port) -> None:
 
 
 def _pages(wire: Port, question: str) -> Iterator[str]:
-    """The lines of an answer; where RepRapFirmware cuts an array, the question is repeated from there."""
+    """The lines of an answer; where RepRapFirmware truncates an array, the query is repeated from there."""
     for _ in range(MOST_PAGES):
         answer = list(_ask(wire, question))
         yield from answer
@@ -84,7 +84,7 @@ def _pages(wire: Port, question: str) -> Iterator[str]:
 
 
 def _ask(wire: Port, question: str) -> Iterator[str]:
-    """The lines of an answer until its ok. Raises SilenceError."""
+    """The lines of an answer before its ok. Raises SilenceError."""
     wire.write(f"{question}\n".encode("ascii"))
     half, end_s = b"", monotonic() + ANSWER_S
     while monotonic() < end_s:

@@ -1,5 +1,4 @@
-"""Servers: print servers (OctoPrint, Moonraker, Duet): files are handed over, printed from there, followed and stopped over HTTP.
+"""Print servers (OctoPrint, Moonraker, Duet): upload, start, follow and stop prints over HTTP.
 
-`servers.open_server` is a session with a `server.PrintServer`, `follow.Follower` has a file printed and follows it to its
-end.
+`servers.open_server` opens a session with a `server.PrintServer`; `follow.Follower` starts a file and follows it to its end.
 """

@@ -1,9 +1,9 @@
-"""A Duet's rr_ requests: RepRapFirmware 3 alone, or behind DuetSoftwareFramework, whose web server answers them, too.
+"""Requests rr_ of a Duet: RepRapFirmware alone, or DuetSoftwareFramework, whose web server answers them too.
 
-Read in RepRapFirmware (src/Networking/HttpResponder.cpp, GCodes/GCodeInput.cpp, "HTTP requests.md" and the object model of
-PrintMonitor.cpp) and in DuetSoftwareFramework (RepRapFirmwareController.cs); never tried on a board. A session ends after 8 s
-without a request, so a 401 begins a new one. The file is written as NAME.part and renamed when length and CRC are right. M112
-is recognised as its characters come in, whatever waits. A print can only be cancelled while it is paused (M25, then M0).
+According to RepRapFirmware (src/Networking/HttpResponder.cpp, GCodes/GCodeInput.cpp, "HTTP requests.md" and the object model of
+PrintMonitor.cpp) and DuetSoftwareFramework (RepRapFirmwareController.cs); never tried on a board. A session ends after 8 s
+without a request, so a 401 begins a new one. A file is written as NAME.part and renamed when length and CRC are right. M112 is
+recognised as its characters arrive, whatever waits. A print can only be cancelled while paused (M25, then M0).
 """
 
 import json
@@ -23,7 +23,7 @@ from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, 
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
-DEFAULT_PASSWORD = "reprap"  # of a board on which none was set; its name must be sent all the same
+DEFAULT_PASSWORD = "reprap"  # of a board without a password, which must be sent nevertheless
 WRITTEN_S = 120.0
 START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
 MOST_PAGES = 16
@@ -45,17 +45,17 @@ ORDERS = {Command.PAUSE: "M25", Command.RESUME: "M24", Command.CANCEL: "M25", Co
 
 
 class Duet(PrintServer):
-    """PrintServer of a Duet."""
+    """A Duet as a PrintServer."""
 
     def __init__(self, address: Server, key: str = "", ca_file: Path | None = None, tell: Tell | None = None) -> None:
         super().__init__(address, key, ca_file, tell)
-        self._nozzle, self._bed = 1, 0  # heaters
+        self._nozzle, self._bed = 1, 0  # heater numbers
         self._connected = False
-        self._last: PrintState | None = None  # of the print, for idle says nothing of how it ended
-        self._up_s = 0.0  # since the board was reset
+        self._last: PrintState | None = None  # of the print: "idle" does not say how it ended
+        self._up_s = 0.0  # time since the board's reset, s
 
     def greet(self) -> Identity:
-        """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
+        """Log in; read firmware, axes with their limits, and the heaters of nozzle and bed."""
         self._connect()
         board = table(self._model("boards[0]"))
         name, version = str(board.get("firmwareName") or "RepRapFirmware"), str(board.get("firmwareVersion") or "")
@@ -82,23 +82,23 @@ class Duet(PrintServer):
             raise ServerError(f"{self.name} is no Duet: it does not answer rr_connect as one")
         self._connected = True
         key = whole(value.get("sessionKey"))
-        if key:  # firmware from 3.5 on; before that, and from DuetSoftwareFramework, a session is this computer's address
+        if key:  # firmware from 3.5; earlier, and with DuetSoftwareFramework, a session belongs to this computer's address
             self.client.headers["X-Session-Key"] = str(key)
 
     def status(self) -> PrintStatus:
-        """From what the object model calls frequently changing, and what the firmware has said since."""
-        before = self._last  # an answer that was on its way when the print began is none of its end
+        """Status from the frequently changing values of the object model."""
+        before = self._last  # an answer sent before the print began does not mark its end
         model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
         job, machine_state = table(model.get("job")), table(model.get("state"))
         state, up_s = str(machine_state.get("status") or ""), number(machine_state.get("upTime"))
         if up_s is not None:
-            if up_s < self._up_s:  # reset since (Platform/RepRap.cpp): idle is not the end of the print
+            if up_s < self._up_s:  # the board was reset (RepRap.cpp): idle is not the end of the print
                 before = self._last = None
             self._up_s = up_s
         elapsed_s = number(job.get("duration"))
         under_way = (
             PrintState.READY if elapsed_s is None else PrintState.PRINTING
-        )  # busy, changingTool: within a print or without one
+        )  # busy, changingTool: inside or outside a print
         phase = STATES.get(state, under_way)
         heaters, said = table(model.get("heat")).get("heaters"), self._get("/rr_reply")
         words = plain(said.body.decode("utf-8", "replace")) if said.status == 200 else ""
@@ -111,13 +111,12 @@ class Duet(PrintServer):
         )
 
     def file_in_print(self) -> str:
-        """From the object model: job.file.fileName is not among its frequently changing values."""
+        """Name of the printed file, job.file.fileName, which is not among the frequently changing values."""
         path = self._model("job.file.fileName")
         return path.removeprefix(FOLDER) if isinstance(path, str) else ""
 
     def _since_start(self, phase: PrintState, before: PrintState | None) -> PrintState:
-        """The phase, with idle after a print as its end: a cancelled one was paused before. before: what it was last, as it was
-        asked."""
+        """The phase, with idle after a print as its end: a cancelled print was paused before. before: the phase at the request."""
         if phase in ACTIVE:
             self._last = phase
         if phase is not PrintState.READY or before is None or self._last is None:
@@ -128,8 +127,8 @@ class Duet(PrintServer):
         return table(self._value("/rr_fileinfo", {"name": FOLDER + file})).get("err") == 0
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
-        self._connect()  # the one before may have ended while the program was made
-        crc32 = f"{zlib.crc32(upload.content):08x}"  # eight digits: DuetSoftwareFramework compares them as text
+        self._connect()  # the earlier session may have ended while the program was made
+        crc32 = f"{zlib.crc32(upload.content):08x}"  # eight digits: DuetSoftwareFramework compares text
         params = {"name": FOLDER + upload.name, "crc32": crc32}
         reply = self.post_file("/rr_upload", params, upload.read_by(sent), WRITTEN_S)
         if table(self.check(reply, "the file")).get("err") != 0:
@@ -144,7 +143,7 @@ class Duet(PrintServer):
         while time.monotonic() < deadline_s:
             try:
                 status = self.status()
-            except ServerError:  # it has the order: whether it prints is seen when it answers again
+            except ServerError:  # the order was sent: its status shows whether it prints
                 return
             if "Error" in status.message:
                 raise ServerError(f"{self.name} cannot start it now: {status.message}")
@@ -153,7 +152,7 @@ class Duet(PrintServer):
             time.sleep(LOOK_S)
 
     def order(self, command: Command) -> None:
-        """A print is only cancelled while it is paused; then the firmware runs cancel.g, or switches heaters off without one."""
+        """Give an order. A print is paused before it is cancelled; the firmware then runs cancel.g, or switches the heaters off."""
         self.command(ORDERS[command])
         if command is not Command.CANCEL:
             return
@@ -171,13 +170,13 @@ class Duet(PrintServer):
             raise ServerError(f"{self.name} has not taken {line}: it is busy")
 
     def settings(self) -> str:
-        """Those keys of its object model, as M409 answers them."""
+        """The settings keys of the object model, as M409 answers them."""
         lines = [{"key": key, "result": self._array(key)} for key in SETTINGS_ARRAYS]
         lines += [{"key": key, "result": self._model(key)} for key in SETTINGS_KEYS]
         return "\n".join(json.dumps(line) for line in lines)
 
     def close(self) -> None:
-        """End the session, so that others find room, and leave."""
+        """End the session, which frees its slot for others."""
         try:
             if self._connected:
                 self.get("/rr_disconnect")
@@ -190,7 +189,7 @@ class Duet(PrintServer):
         return table(self._value("/rr_model", {"key": key, "flags": "d99vn"})).get("result")
 
     def _array(self, key: str) -> list[Any]:
-        """An array of the object model, which comes in pages."""
+        """A paged array of the object model."""
         entries: list[Any] = []
         flags = "d99vn"
         for _ in range(MOST_PAGES):
@@ -207,7 +206,7 @@ class Duet(PrintServer):
         return self.check(self._get(path, params), "to answer", sentence)
 
     def _get(self, path: str, params: Mapping[str, str] | None = None) -> Reply:
-        """The reply; a session that has ended is begun again."""
+        """The reply; an expired session is renewed."""
         reply = self.get(path, params)
         if reply.status == 401:
             self._connect()

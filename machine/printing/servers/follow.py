@@ -1,7 +1,7 @@
-"""Follow: a print on a server watched to its end, while a person asks for a pause, the end, or the emergency stop.
+"""Follower: watches a print on a server to its end and passes on pause, cancel and emergency stop.
 
-The server prints without this program. What it is asked may be answered late: polls and orders have threads of their own, so
-that the emergency stop never waits for them.
+The server prints without this program and may answer late: polls and orders have threads of their own, so that the emergency stop
+never waits for them.
 """
 
 import threading
@@ -19,22 +19,22 @@ from machine.printing.servers.server import PrintServer
 from profiles.errors import NoAnswerError, ServerError
 
 POLL_S, TURN_S = 1.0, 0.05
-SHOW_S = 0.25  # what is shown is drawn again: a question to the person stands beside it
-JOIN_S = 0.5  # an order that still waits for its answer is left to the server
-BEGIN_S = 15.0  # a server that has taken the order to start shows it by then
-QUIET_S = 15.0  # without an answer or an error for so long, it is said
-LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
+SHOW_S = 0.25  # refresh interval; a question to the user appears beside the display
+JOIN_S = 0.5  # an order that still waits for its answer then is left to the server
+BEGIN_S = 15.0  # a server that has accepted a start shows it within this time
+QUIET_S = 15.0  # silence after which it is reported
+LOST_S = 120.0  # silence after which the state of the print counts as unknown
 UNKNOWN = "whether the print goes on there is not known"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
-OnStatus = Callable[[PrintStatus, str], None]  # with a message to the person, "" when there is none
+OnStatus = Callable[[PrintStatus, str], None]  # with a message for the user, "" for none
 
 
 @dataclass(eq=False)
 class Follower:
-    """Has a file printed that a server holds, and follows that to its end: run() once.
+    """Starts a file on a server and follows its print to the end: call run() once.
 
-    size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
-    the server is at already, which is not to be started.
+    size: of the file, bytes, 0: unknown; left(): whether the user has left. running: active status of a print that is already
+    running and is not to be started.
     """
 
     server: PrintServer
@@ -46,25 +46,25 @@ class Follower:
     running: PrintStatus | None = None
 
     def __post_init__(self) -> None:
-        # Status, error of a later answer, and when the newest answer came: the polling thread replaces them together.
+        # Status, error of a later request, and time of the newest answer: the polling thread replaces them together.
         self._heard: tuple[PrintStatus | None, ServerError | None, float] = (None, None, time.monotonic())
         self._over = threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
         self._last_active: PrintState | None = self.running.state if self.running else None
         self._read, self._heat = 0, Temperature()
-        self._cancels = False  # the server has the order, or may have it
-        self._began_s: float | None = None  # since when the server has been told to start
-        self._failed: Exception | None = None  # of the start, or of a thread
+        self._cancels = False  # the server has or may have the order
+        self._began_s: float | None = None  # when the server was ordered to start
+        self._failed: Exception | None = None  # by the start, or by a thread
         self._shown: tuple[PrintStatus | None, str] = (None, "")
         self._shown_s = 0.0
-        self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
+        self._percents: dict[Command, float] = {}  # ordered values: not every server reports them
 
     def run(self) -> PrintState:
-        """DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
+        """Follow the print to DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
 
-        A stop asked for before the start prevents it; one that comes as the following ends is still given. Raises ServerError
-        when the print is refused, fails or is lost, or when the server no longer prints it and nobody here has cancelled it.
+        A stop requested before the start prevents it; one requested at the end is still sent. Raises ServerError when the print
+        is refused, fails or is lost, or when the server stopped printing without an order from here.
         """
         if self._take_requests():
             return PrintState.FAILED
@@ -97,14 +97,14 @@ class Follower:
                 thread.join(JOIN_S)
 
     def _guard(self, work: Callable[[], None]) -> None:
-        """Have a thread's error raised where the print is followed: nobody would miss the thread."""
+        """Keep a thread's error, so that run() raises it."""
         try:
             work()
         except Exception as error:  # noqa: BLE001 - raised again by _look()
             self._failed = error
 
     def _look(self) -> PrintState | None:
-        """Tell the newest status; how the print has ended, None while it goes on."""
+        """Show the newest status; returns how the print has ended, None while it continues."""
         if self._failed is not None:
             raise self._failed
         status, error, answered_s = self._heard
@@ -120,7 +120,7 @@ class Follower:
         if status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
             self._shown, self._shown_s = (status, message), time.monotonic()
             self.on_status(status, message)
-        return None if quiet else self._end_of(status)  # what was told last may be true no more
+        return None if quiet else self._end_of(status)  # the last report may be outdated
 
     def _end_of(self, status: PrintStatus) -> PrintState | None:
         if self._began_s is None:
@@ -143,11 +143,12 @@ class Follower:
 
     @property
     def _reached(self) -> str:
-        """How far the server has read, in words; "" where it is not known."""
+        """How far the server has read, in words; "" if unknown."""
         return f"{100 * self._read / self.size:.0f} %" if self._read and self.size else ""
 
     def _ended_there(self, status: PrintStatus) -> str:
-        """A server that has died and come back, or somebody else who has cancelled: the heaters may still be on."""
+        """Sentence for a print that ended without an order from here, after a server crash or another client's cancel: heaters
+        may be on."""
         known = ", ".join(filter(None, (f"{self._reached} read" if self._reached else "", self._heat.words)))
         return (
             f"{self.server.name} no longer prints {self.file or 'its file'} ({status.message or status.state})"
@@ -155,8 +156,8 @@ class Follower:
         )
 
     def _end_unseen(self, status: PrintStatus, waited_s: float) -> PrintState | None:
-        """A print that was never seen running: the status may still be that of the print before, or it ended before the first
-        look."""
+        """End of a print that was never seen running: the status may still be of an earlier print, or it ended before the first
+        poll."""
         if waited_s < BEGIN_S:
             return None
         if status.state is PrintState.DONE and status.file in ("", self.file):
@@ -175,7 +176,7 @@ class Follower:
             self._over.wait(POLL_S)
 
     def _take_requests(self) -> bool:
-        """Hand on what a person has asked for; True after an emergency stop."""
+        """Pass on the user's requests; True after an emergency stop."""
         while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
                 try:
@@ -197,7 +198,7 @@ class Follower:
         return partial(self.server.order, command) if command in (Command.PAUSE, Command.RESUME) else None
 
     def _cancel(self) -> None:
-        """What ends from now on was cancelled here, unless the order was refused."""
+        """Cancel; the print's end then counts as cancelled here, unless the order is refused."""
         self._cancels = True
         try:
             self.server.order(Command.CANCEL)
@@ -218,9 +219,9 @@ class Follower:
         return replace(status, feed_percent=feed, flow_percent=flow)
 
     def _carry_out(self) -> None:
-        """The start, then orders one after the other; a refusal becomes a message, and following goes on.
+        """Start the print, then give the orders in turn; a refusal becomes a message.
 
-        A start without an answer may have been taken: whether it was is seen by the status.
+        A start without an answer may have been accepted: the status will show it.
         """
         if self.running is None:
             with suppress(NoAnswerError):

@@ -1,7 +1,7 @@
-"""HTTP: requests to one print server, a sentence for every way in which they fail, and values out of its JSON.
+"""HTTP client of one print server: requests, a sentence for each kind of failure, and values from its JSON.
 
-Redirects are not followed and no proxy of the environment is used: either would carry the key to somebody else. Certificates
-are verified; nothing turns that off.
+Redirects are not followed and proxies of the environment are ignored: either would send the key to another host. Certificates are
+always verified.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ if TYPE_CHECKING:
 
 VARIABLE = "TILTPRINT_SERVER_KEY"
 CONNECT_S, ANSWER_S, WRITE_S = 5.0, 10.0, 30.0
-WHOLE_S = 30.0  # from the first byte of an answer to its last: ANSWER_S is between any two of them
+WHOLE_S = 30.0  # from an answer's first byte to its last; ANSWER_S limits the gap between two
 ERRNO = re.compile(r"^\[errno -?\d+\] ")
 MOST_BYTES = 16_000_000  # of an answer
 FILE_TYPE = "application/octet-stream"
 MOST_PICTURE, PICTURES = 8_000_000, ("image/jpeg", "image/png", "image/webp")  # of a camera
-OWN_HOSTS = ("127.0.0.1", "localhost", "::1")  # as a server calls itself
-WORDS = 160  # characters of a server's own words in a message
-Tell = Callable[[str, bytes], None]  # direction and what went over the line, as a log takes it
+OWN_HOSTS = ("127.0.0.1", "localhost", "::1")  # names by which a server refers to itself
+WORDS = 160  # characters of a server's message that are quoted
+Tell = Callable[[str, bytes], None]  # direction and bytes, for a log
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What a server has answered. path: what was asked for, for messages."""
+    """A server's answer. path: of the request, for messages."""
 
     status: int
     body: bytes
@@ -50,7 +50,7 @@ class Reply:
     location: str = ""
 
     def json(self) -> Any:
-        """The body's value; None when it is none."""
+        """The body's JSON value; None when it is not JSON."""
         try:
             return json.loads(self.body)
         except (ValueError, RecursionError):
@@ -58,21 +58,21 @@ class Reply:
 
 
 def servers_file() -> Path:
-    """The user's file of print servers; it need not be there."""
+    """The user's file of print servers, which may not exist."""
     return settings_folder() / "servers.toml"
 
 
 def how_to_give_a_key(address: Server) -> str:
-    """Where the key of a server belongs, for a person."""
+    """Instruction for the user on where to put a server's key."""
     return f'give it as key = "..." below [servers."{address.host}"] in {servers_file()}, or in the variable {VARIABLE}'
 
 
 class HttpSession:
-    """get() and post() below a server's address; from any thread. Raises ServerError with a sentence for a person, NoAnswerError
-    where the request may have been taken.
+    """get() and post() below a server's address, from any thread.
 
-    key: "" when there is none; ca_file: None: the authorities that this computer trusts. key_header: which header carries a key;
-    key_refused: statuses that are about the key. name: the server as the user names it.
+    Raises ServerError with a sentence for the user, NoAnswerError when the request may have been accepted. key: "" for none;
+    ca_file: None: this computer's trusted authorities. key_header: header that carries the key; key_refused: statuses that mean a
+    bad key. name: the server as the user wrote it.
     """
 
     key_header = ""
@@ -81,7 +81,7 @@ class HttpSession:
     def __init__(self, address: Server, key: str = "", ca_file: Path | None = None, tell: Tell | None = None) -> None:
         import httpx
 
-        for name in ("httpx", "httpcore"):  # they would log addresses, and a Duet's password is part of one
+        for name in ("httpx", "httpcore"):  # they would log addresses, which contain a Duet's password
             logging.getLogger(name).setLevel(logging.WARNING)
         self.address, self.name, self.key = address, address.name, key
         self._tell = tell or (lambda direction, data: None)
@@ -101,15 +101,15 @@ class HttpSession:
             raise ServerError(f"server address {address.name!r} names no host: {plain(str(error)).lower()}") from None
 
     def close(self) -> None:
-        """End all connections."""
+        """Close all connections."""
         self.client.close()
 
     def get(self, path: str, params: Mapping[str, str] | None = None, secret: bool = False) -> Reply:
-        """GET. secret: the parameters are not logged."""
+        """GET. secret: do not log the parameters."""
         return self._request("GET", path, params=params, note=path if secret else _shown(path, params))
 
     def post(self, path: str, value: Any = None, answer_s: float = ANSWER_S) -> Reply:
-        """POST a value as JSON, or nothing."""
+        """POST a value as JSON, or an empty body."""
         note = path + ("" if value is None else f" {json.dumps(value)}")
         timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S)
         return self._request("POST", path, json=value, timeout=timeout, note=note)
@@ -117,7 +117,7 @@ class HttpSession:
     def post_file(self, path: str, values: Mapping[str, str], file: BinaryIO, answer_s: float, form_name: str = "") -> Reply:
         """POST a file as the body, with the values as parameters; the answer may take answer_s after its last byte.
 
-        form_name: the file's name in a multipart form, where it stands as `file` after the values.
+        form_name: send a multipart form instead, with the values and then the file under this name.
         """
         timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S, write=WRITE_S)
         if form_name:
@@ -137,7 +137,7 @@ class HttpSession:
             self._log("#", sentence)
             reached = not isinstance(error, self._httpx.ConnectError | self._httpx.ConnectTimeout)
             raise (NoAnswerError if reached else ServerError)(sentence) from None
-        except UnicodeError as error:  # idna's errors are of this kind, here and above
+        except UnicodeError as error:  # idna's errors are UnicodeErrors, here and above
             raise ServerError(f"server address {self.name!r} names no host: {plain(str(error)).lower()}") from None
         except (self._httpx.InvalidURL, self._httpx.DecodingError) as error:
             raise ServerError(f"what answers at {self.address.url} speaks no proper HTTP: {plain(str(error))}") from None
@@ -150,7 +150,7 @@ class HttpSession:
         return reply
 
     def _body(self, answer: httpx.Response) -> bytes:
-        """All of an answer, which is small from every such server. Raises ServerError."""
+        """The whole body of an answer, limited in size and time. Raises ServerError."""
         body, until_s = b"", time.monotonic() + WHOLE_S
         for piece in answer.iter_bytes():
             body += piece
@@ -168,16 +168,15 @@ class HttpSession:
         return text.replace(self.key, "***") if self.key else text
 
     def check(self, reply: Reply, purpose: str, refusals: Mapping[int, str] | None = None) -> Any:
-        """The value of a good reply. Raises ServerError; purpose: what was wanted, as `starting the print`; refusals: what a
-        status means to this request, where that is not what it usually means.
-        """
+        """The value of a successful reply. Raises ServerError. purpose: the aim of the request, such as `starting the print`;
+        refusals: sentences for statuses with a special meaning here."""
         status, address = reply.status, self.address
         if 200 <= status < 300:
             return reply.json()
         words = self.words(reply)
         if refusals and status in refusals:
             raise ServerError(refusals[status].format(words=words or f"status {status}"))
-        if 300 <= status < 400:  # behind a question mark a Duet's password may be repeated
+        if 300 <= status < 400:  # the query is omitted: it may repeat a Duet's password
             where = plain(self._without_key(reply.location.partition("?")[0])) or "nowhere"
             raise ServerError(f"{self.name} redirects to {where}: give that server's address, no key is carried there")
         if status in self.key_refused:
@@ -190,21 +189,22 @@ class HttpSession:
         raise ServerError(f"{self.name} refuses {purpose}: {words or f'status {status}'}")
 
     def words(self, reply: Reply) -> str:
-        """A server's own words on what it refuses, short and without the key; "" when it has none."""
+        """A server's own reason for a refusal, short and without the key; "" when it gives none."""
         value = reply.json()
         error = value.get("error", value.get("message")) if isinstance(value, dict) else None
         if isinstance(error, dict):
             error = error.get("message")
         if isinstance(value, str):
             error = value
-        if error is None and not reply.body.lstrip().startswith(b"<"):  # a page says nothing in a line
+        if error is None and not reply.body.lstrip().startswith(b"<"):  # an HTML page has no one-line message
             error = reply.body[: 4 * WORDS].decode("utf-8", "replace")
         return plain(self._without_key(str(error or "")))
 
 
 def picture_address(told: object, server: Server) -> str:
-    """The URL of a picture at the server's own host; "" where there is none, or it is on another host: a server's answer
-    must not make this computer ask others.
+    """URL of a picture on the server's own host; "" if there is none or it is on another host.
+
+    A server's answer must not make this computer contact other hosts.
 
     >>> from machine.printing.destination import parse_server_address
     >>> picture_address("/webcam/?action=snapshot", parse_server_address("moonraker:printer.local"))
@@ -226,7 +226,7 @@ def picture_address(told: object, server: Server) -> str:
 
 
 def fetch_picture(url: str) -> tuple[bytes, str]:
-    """A picture and its media type. Raises ServerError where nothing, or no picture, is found."""
+    """A picture and its media type. Raises ServerError when there is none."""
     import httpx
 
     try:
@@ -244,7 +244,7 @@ def fetch_picture(url: str) -> tuple[bytes, str]:
 
 
 def plain(text: str) -> str:
-    """Words of a server as part of one line: nothing in them can act on a terminal."""
+    """A server's text as part of one line, without control characters."""
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     return line if len(line) <= WORDS else line[: WORDS - 3] + "..."
 
@@ -255,15 +255,15 @@ def _shown(path: str, params: Mapping[str, str] | None) -> str:
 
 def _certificates(address: Server, ca_file: Path | None) -> ssl.SSLContext:
     if address.scheme == "http":
-        return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trusts nobody, and need not: there is no TLS on this way
+        return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trusts no certificate and need not: this connection has no TLS
     try:
         return ssl.create_default_context(cafile=ca_file)
-    except OSError as error:  # ssl.SSLError is one
+    except OSError as error:  # includes ssl.SSLError
         raise ServerError(f"ca_file {ca_file} for {address.name} holds no certificates: {error.strerror or error}") from None
 
 
 def _transport_sentence(error: httpx.TransportError, address: Server, httpx_: Any) -> str:
-    """What went wrong below HTTP, and what to look at."""
+    """What failed below HTTP, and what to check."""
     where, chain = f"{address.host} at port {address.port}", causes(error)
     if any(isinstance(cause, socket.gaierror) for cause in chain):
         return f"{address.name}: no computer of the name {address.host} is known here: an IP address will do, too"
@@ -293,22 +293,22 @@ def _reason(error: Exception) -> str:
 
 
 def temperature(nozzle: Any, bed: Any, now: str, target: str) -> Temperature:
-    """Temperatures of nozzle and bed in two JSON objects, under these keys."""
+    """Temperatures of nozzle and bed from two JSON objects, under these keys."""
     return Temperature(*(number(table(heater).get(key)) for heater in (nozzle, bed) for key in (now, target)))
 
 
 def table(value: Any) -> Mapping[str, Any]:
-    """A JSON object; an empty one where it is none."""
+    """A JSON object; any other value becomes an empty one."""
     return value if isinstance(value, dict) else {}
 
 
 def entry(value: Any, index: Any) -> Any:
-    """An entry of a JSON array; None where there is none."""
+    """An entry of a JSON array, or None."""
     return value[index] if isinstance(value, list) and isinstance(index, int) and 0 <= index < len(value) else None
 
 
 def number(value: Any) -> float | None:
-    """A JSON number; None where it is none."""
+    """A JSON number, or None."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return None
     try:
@@ -319,6 +319,6 @@ def number(value: Any) -> float | None:
 
 
 def whole(value: Any) -> int | None:
-    """The same, without its fraction."""
+    """A JSON number truncated to an integer, or None."""
     read = number(value)
     return None if read is None else int(read)

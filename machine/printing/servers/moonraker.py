@@ -1,8 +1,8 @@
-"""Moonraker's HTTP API (moonraker.readthedocs.io/en/latest/external_api, read in the sources of 0.11), which drives Klipper.
+"""Moonraker's HTTP API (moonraker.readthedocs.io/en/latest/external_api; sources of 0.11), which drives Klipper.
 
-A wrong key is 401; 403 of an upload is a file that is being printed. Klipper works on orders one after the other: a pause or a
-cancellation waits for the command under way, a heating included, and is answered when it is done (docs/API_Server.md); the
-emergency stop is not.
+401 means a wrong key; 403 for an upload, a file that is being printed. Klipper carries out orders in turn: a pause or
+cancellation waits for the running command, even for heating, and is answered when it is done (docs/API_Server.md). An emergency
+stop does not wait.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ STATES = {
 }
 REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed", "gcode_move")
 
-ORDERS = {  # Klipper's macros PAUSE, RESUME and CANCEL_PRINT say what each means
+ORDERS = {  # the meaning of each is defined by Klipper's macros PAUSE, RESUME and CANCEL_PRINT
     Command.PAUSE: "/printer/print/pause",
     Command.RESUME: "/printer/print/resume",
     Command.CANCEL: "/printer/print/cancel",
@@ -39,14 +39,14 @@ ORDERS = {  # Klipper's macros PAUSE, RESUME and CANCEL_PRINT say what each mean
 
 
 class Moonraker(PrintServer):
-    """PrintServer of a Moonraker."""
+    """A Moonraker as a PrintServer."""
 
     key_header = "X-Api-Key"
     key_refused = (401,)
     tells_percents = True
 
     def greet(self) -> Identity:
-        """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
+        """Its version; axes, limits, steppers and commands if its Klipper is ready."""
         server = table(self._get("/server/info"))
         if "klippy_state" not in server:
             raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
@@ -64,7 +64,7 @@ class Moonraker(PrintServer):
         return Identity(f"{text}, {klipper}", printer, steppers, commands)
 
     def _commands(self) -> frozenset[str] | None:
-        """All commands that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to report them."""
+        """All commands, macros included (klippy/gcode.py, get_status); None when Klipper is too old to report them."""
         commands = table(self._query(("gcode",)).get("gcode")).get("commands")
         return frozenset(name.upper() for name in commands) if isinstance(commands, dict) else None
 
@@ -82,7 +82,7 @@ class Moonraker(PrintServer):
         return next(filter(None, pictures), "")
 
     def status(self) -> PrintStatus:
-        """From the objects that Klipper reports; where it does not run, from what Moonraker says of it."""
+        """Status from Klipper's objects; from Moonraker while Klipper is not running."""
         server = table(self._get("/server/info"))
         if server.get("klippy_state") != "ready":
             return PrintStatus(PrintState.OFFLINE, message=self._trouble(server))
@@ -109,16 +109,16 @@ class Moonraker(PrintServer):
         return f"Klipper is in the state {server.get('klippy_state')}: {table(words).get('state_message') or 'no reason given'}"
 
     def has(self, file: str) -> bool:
-        """Whether it holds a file of this name, by what lies in its folder.
+        """Whether its folder holds a file of this name.
 
-        /server/files/metadata answers 404 for a file that it has not scanned (file_manager.py, _handle_metadata_request).
+        /server/files/metadata answers 404 for a file not scanned yet (file_manager.py, _handle_metadata_request).
         """
         reply = self.get("/server/files/directory", {"path": "gcodes"})
         files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
         return any(table(item).get("filename") == file for item in files) if isinstance(files, list) else False
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
-        """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
+        """Upload a file with its checksum, without which a truncated file would be accepted."""
         fields = {"root": "gcodes", "checksum": hashlib.sha256(upload.content).hexdigest()}
         reply = self.post_file("/server/files/upload", fields, upload.read_by(sent), READ_S, upload.name)
         sentences = {
@@ -137,17 +137,17 @@ class Moonraker(PrintServer):
         self._order("/printer/print/start", {"filename": file}, sentence)
 
     def order(self, command: Command) -> None:
-        if command is Command.EMERGENCY_STOP:  # Klipper shuts down at once, whatever it is at
+        if command is Command.EMERGENCY_STOP:  # Klipper shuts down at once, whatever it is doing
             self._value(self.post("/printer/emergency_stop"), "the emergency stop")
         else:
             self._order(ORDERS[command])
 
     def command(self, line: str) -> None:
-        """Have a line of G-code executed, after the one under way."""
+        """Execute a line of G-code, after the running command."""
         self._order("/printer/gcode/script", {"script": line})
 
     def settings(self) -> str:
-        """Its Klipper's configuration and version (docs/Status_Reference.md, configfile)."""
+        """Klipper's configuration and version (docs/Status_Reference.md, configfile)."""
         version = str(table(self._get("/printer/info")).get("software_version") or "")
         return json.dumps({"software_version": version, **self._query(("configfile",))})
 

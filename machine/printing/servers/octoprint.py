@@ -1,7 +1,7 @@
-"""OctoPrint's REST API (docs.octoprint.org/en/master/api, read in octoprint/server/api of 1.11.8).
+"""OctoPrint's REST API (docs.octoprint.org/en/master/api; octoprint/server/api of 1.11.8).
 
-Any refusal for want of a key is 403. The file is kept under temporary names until it is whole. `printing` among the flags of
-/api/printer is true in all the phases of a print, so the others are asked first.
+403 means a missing or wrong key. A file has temporary names until it is complete. The flag `printing` of /api/printer is true in
+all phases of a print, so the other flags are evaluated first.
 """
 
 from collections.abc import Mapping
@@ -23,21 +23,21 @@ FLAGS = (
     ("printing", PrintState.PRINTING),
 )
 
-ORDERS = {  # path, value, and what is refused when it is not taken
+ORDERS = {  # path, value, and the name of the order in a refusal
     Command.PAUSE: ("/api/job", {"command": "pause", "action": "pause"}, "to pause"),
     Command.RESUME: ("/api/job", {"command": "pause", "action": "resume"}, "to resume"),
-    Command.CANCEL: ("/api/job", {"command": "cancel"}, "to cancel"),  # its own script for it switches heaters off
+    Command.CANCEL: ("/api/job", {"command": "cancel"}, "to cancel"),  # its own script switches the heaters off
     Command.EMERGENCY_STOP: ("/api/printer/command", {"command": "M112"}, "M112"),  # sent ahead of its queue
 }
 
 
 class OctoPrint(PrintServer):
-    """PrintServer of an OctoPrint."""
+    """An OctoPrint as a PrintServer."""
 
     key_header = "X-Api-Key"
 
     def greet(self) -> Identity:
-        """Its version; the API does not report what it drives."""
+        """Its version; the API does not report the firmware."""
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
         if not isinstance(text, str) or not text.startswith("OctoPrint"):
@@ -47,12 +47,12 @@ class OctoPrint(PrintServer):
         return Identity(text)
 
     def webcam(self) -> str:
-        reply = self.get("/api/settings")  # some keys may not read them
+        reply = self.get("/api/settings")  # some keys may not read the settings
         settings = table(reply.json()) if reply.status == 200 else {}
         return picture_address(table(settings.get("webcam")).get("snapshotUrl"), self.address)
 
     def status(self) -> PrintStatus:
-        """From /api/job, and from /api/printer where its printer is connected."""
+        """Status from /api/job, and from /api/printer while a printer is connected."""
         job = table(self._get("/api/job", "to tell of its print"))
         progress, file = table(job.get("progress")), table(table(job.get("job")).get("file"))
         reply = self.get("/api/printer", {"exclude": "sd"})
@@ -73,7 +73,7 @@ class OctoPrint(PrintServer):
         return reply.status != 404 and self.check(reply, "to tell of its files") is not None
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
-        """Hand over a file; the name is the one that the server has made of it."""
+        """Upload a file; returns the name chosen by the server."""
         reply = self.post_file("/api/files/local", {}, upload.read_by(sent), STORED_S, upload.name)
         sentence = {409: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})"}
         value = table(self.check(reply, "the file", sentence))

@@ -1,4 +1,4 @@
-"""Server: a G-code file as a print server takes it, and what every kind of server can be asked for."""
+"""Print server: a G-code file as it is uploaded, and the interface of every kind of server."""
 
 import re
 import unicodedata
@@ -17,18 +17,18 @@ from machine.link.print_state import PrintStatus
 from machine.printing.servers.http import HttpSession
 from profiles.errors import ServerError
 
-LONGEST_NAME = 80  # RepRapFirmware keeps 120 characters of a whole path
+LONGEST_NAME = 80  # RepRapFirmware allows 120 characters for a whole path
 SUFFIX = ".gcode"
-TAKEN = (".gcode", ".gco", ".g")  # OctoPrint takes no others for programs
+TAKEN = (".gcode", ".gco", ".g")  # OctoPrint accepts no others for programs
 STRANGE = re.compile(r"[^A-Za-z0-9._-]+")
-Sent = Callable[[int], None]  # called with how many bytes have gone
+Sent = Callable[[int], None]  # called with the number of bytes sent
 
 
 class GcodeUpload:
-    """A program under the name it will have there.
+    """A program and its name on the server.
 
-    Its lines are those that were dry-run, with the text that the dry run has read: without remarks in parentheses, which the
-    server or its firmware would execute. Raises GcodeError for a line that the dry run refuses, too.
+    Its lines are the text that was dry-run: without comments in parentheses, which the server or its firmware would execute.
+    Raises GcodeError for lines that the dry run refuses too.
     """
 
     def __init__(self, name: str, lines: Iterable[str]) -> None:
@@ -38,11 +38,11 @@ class GcodeUpload:
         self._ends = list(accumulate(map(len, encoded)))
 
     def line_at(self, position: int) -> int:
-        """How many whole lines of the file lie before a byte position."""
+        """Number of complete lines before a byte position."""
         return bisect_right(self._ends, position)
 
     def read_by(self, sent: Sent) -> BinaryIO:
-        """The content as a file; calls sent() with the bytes read so far, before each piece and at the end."""
+        """The content as a file that calls sent() with the bytes read so far, before each read and at the end."""
         return _ReportedBytes(self.content, sent)
 
 
@@ -57,9 +57,9 @@ class _ReportedBytes(BytesIO):
 
 
 def server_name(name: str) -> str:
-    """The name that a file gets on any server: letters without accents, digits, . _ and -, ending in .gcode.
+    """File name for any server: letters without accents, digits, . _ and -, ending in .gcode.
 
-    Klipper reads it from between quotes, RepRapFirmware from a card with FAT names, OctoPrint replaces what it does not like.
+    Klipper reads it from between quotes, RepRapFirmware from FAT names; OctoPrint replaces other characters.
     """
     stem, suffix = name.removeprefix("demo:"), ""
     for ending in (*TAKEN, ".nc", ".ngc"):
@@ -73,11 +73,10 @@ def server_name(name: str) -> str:
 
 @dataclass(frozen=True)
 class Identity:
-    """Who answers. text: a server with its version and what it drives, "" of a printer at a port; printer: its answer, or what
-    it would answer at a port, None where that is not known.
+    """Identity of a server or printer. text: server, version and firmware, "" for a printer at a port; printer: its answer at a
+    port, None if unknown.
 
-    steppers: names of the [manual_stepper] sections, commands: names of all commands and macros, in capitals; None where there
-    is no such thing.
+    steppers: names of the [manual_stepper] sections, commands: all commands and macros, in capitals; None if not reported.
     """
 
     text: str
@@ -87,24 +86,24 @@ class Identity:
 
 
 class PrintServer(HttpSession, ABC):
-    """One print server. All methods raise ServerError; status() and orders may come from any thread."""
+    """A print server. All methods raise ServerError; status() and orders may come from any thread."""
 
-    tells_percents = False  # whether status() tells feed and flow
+    tells_percents = False  # whether status() reports feed and flow
 
     @abstractmethod
     def greet(self) -> Identity:
-        """Make sure that it is such a server, that the key is good, and learn what it drives."""
+        """Check the kind of server and the key, and identify the firmware."""
 
     @abstractmethod
     def status(self) -> PrintStatus:
-        """The state of its print now."""
+        """Status of its print."""
 
     def webcam(self) -> str:
-        """The address of its camera's picture; "" where it has none, or does not report it."""
+        """URL of its camera's picture; "" if it has none or does not report it."""
         return ""
 
     def file_in_print(self) -> str:
-        """The file that it prints now, by the name that upload() returns; "" where it does not report it."""
+        """Name, as returned by upload(), of the file it prints; "" if it does not report it."""
         return self.status().file
 
     @abstractmethod
@@ -113,20 +112,20 @@ class PrintServer(HttpSession, ABC):
 
     @abstractmethod
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
-        """Hand over a file and return the name by which it is printed; half a file is never kept."""
+        """Upload a file and return its name on the server; an incomplete file is never kept."""
 
     @abstractmethod
     def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
+        """Start printing a stored file."""
 
     @abstractmethod
     def order(self, command: Command) -> None:
-        """Pause, resume or cancel the print, or halt at once: PAUSE, RESUME, CANCEL, EMERGENCY_STOP."""
+        """Give PAUSE, RESUME, CANCEL or EMERGENCY_STOP."""
 
     @abstractmethod
     def command(self, line: str) -> None:
-        """Have a line of G-code executed."""
+        """Execute a line of G-code."""
 
     def settings(self) -> str:
-        """The settings of its firmware as JSON, a line for each answer."""
+        """Settings of its firmware as JSON, one line per answer."""
         raise ServerError(f"{self.name} does not know its firmware's settings: ask the printer at its own port")

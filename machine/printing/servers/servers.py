@@ -1,12 +1,12 @@
-"""Servers: which kinds there are, which firmwares each can print on, their keys, and a session with one.
+"""Print servers: their kinds, the dialects each prints, their keys, and a session with one.
 
-The key of a print server and whose certificates are trusted come from the user's own file or a variable:
+The key of a print server and the trusted authority come from the user's file or a variable:
 
     [servers."octopi.local"]          host, or host:port, as in the address
     key = "..."                       API key of OctoPrint or Moonraker, password of a Duet
-    ca_file = "workshop-ca.pem"       for https: trust the certificates of this authority alone
+    ca_file = "workshop-ca.pem"       for https: trust only certificates of this authority
 
-Neither is an argument, where every user of the computer could read it.
+Neither is an argument, which every user of the computer could read.
 """
 
 import os
@@ -27,13 +27,13 @@ from profiles.messages import phrase
 from profiles.places import parse, shipped, tables
 
 KINDS: Mapping[str, type[PrintServer]] = {"octoprint": OctoPrint, "moonraker": Moonraker, "duet": Duet}
-# What a server's firmware reads; OctoPrint sends lines to whatever takes them over a serial port.
+# Dialects of a server's firmware; OctoPrint drives any firmware with a serial port.
 DIALECTS = {"moonraker": ("klipper", "klipper_steppers"), "duet": ("reprapfirmware",)}
 KEYS = ("key", "ca_file")
 
 
 def dialect_mismatch(address: Server, machine: str, dialect: str) -> str:
-    """Why a server cannot print what is written in a dialect, as a sentence; "" when it can."""
+    """Why a server cannot print a dialect; "" when it can."""
     allowed = DIALECTS.get(address.kind) or tuple(name for name, dialect in dialects().items() if dialect.serial)
     if dialect in allowed:
         return ""
@@ -47,7 +47,7 @@ def dialect_mismatch(address: Server, machine: str, dialect: str) -> str:
 
 @contextmanager
 def open_server(address: Server, tell: Tell | None = None) -> Iterator[PrintServer]:
-    """A session with a server. tell: called with what goes over the line, without keys. Raises ServerError, ProfileError."""
+    """A session with a server. tell: called with the traffic, without keys. Raises ServerError, ProfileError."""
     server = KINDS[address.kind](address, *read_credentials(address), tell)
     try:
         yield server
@@ -56,9 +56,9 @@ def open_server(address: Server, tell: Tell | None = None) -> Iterator[PrintServ
 
 
 def read_credentials(address: Server) -> tuple[str, Path | None]:
-    """The key of a server, and the file of the authority that it alone trusts; "" and None where there is none.
+    """The key of a server and the file of the only authority to trust; "" and None by default.
 
-    The variable's key goes before the file's. Raises ServerError, ProfileError.
+    A key in the variable takes precedence over the file. Raises ServerError, ProfileError.
     """
     file = servers_file()
     table = _table(file, address) if file.is_file() else {}
@@ -73,8 +73,8 @@ def read_credentials(address: Server) -> tuple[str, Path | None]:
 
 
 def _table(file: Path, address: Server) -> dict[str, str]:
-    """The entry of a server in the user's file, {} where it has none. Raises ServerError for a file that is not as it must be, or
-    that others can read; Windows keeps a user's folders to the user."""
+    """The entry of a server in the user's file, {} without one. Raises ServerError for an invalid file or one that others can
+    read; on Windows a user's folders are private anyway."""
     if os.name == "posix" and stat.S_IMODE(file.stat().st_mode) & 0o077:
         raise ServerError(f"{file} holds keys and can be read or written by others: chmod 600 {file} makes it yours alone")
     document = parse(file, "file of servers")
@@ -88,5 +88,6 @@ def _table(file: Path, address: Server) -> dict[str, str]:
             raise ServerError(f'{file}: [servers."{name}"] has {key!r}: {" and ".join(KEYS)} are known')
         if not isinstance(value, str):
             raise ServerError(f'{file}: {key} of [servers."{name}"] must be a text in quotes')
-    known: dict[str, dict[str, str]] = {name.lower(): table for name, table in servers.items()}  # as the address has its host
+    # host names in lower case, as in the address
+    known: dict[str, dict[str, str]] = {name.lower(): table for name, table in servers.items()}
     return known.get(f"{address.host}:{address.port}", known.get(address.host, {}))
