@@ -1,5 +1,4 @@
-"""The pipeline: the stages joined, from a model to its program and its dry run, and what is compiled for them beforehand.
+"""Pipeline: the stages joined, from a model to its program and dry run, and the kernels compiled beforehand.
 
-`pipeline.decompose_model` and `pipeline.build` are the way of a model, `programs.load_program` that of a model or a G-code
-file.
+`pipeline.decompose_model` and `pipeline.build` process a model, `programs.load_program` a model or a G-code file.
 """

@@ -1,4 +1,4 @@
-"""Batch model: one model of a batch, from its file to its row, in whatever process it runs."""
+"""Batch model: processes one model of a batch, from its file to its row, in any process."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -28,15 +28,17 @@ from profiles.profile import Profile, load, with_part_settings
 from slicer.estimate.estimate import estimate
 
 DONE, REFUSED, FAILED = STATUSES = ("done", "refused", "failed")
-BETWEEN = ";"  # two files of a row
+BETWEEN = ";"  # separates the files of a row
 
 
 @dataclass(frozen=True)
 class Row:
-    """What came of a model. status: refused for a reason that a person can fix, failed by a bug, by a time limit or because its
-    process was killed each time; time_s, filament_mm, support_mm3: of the dry run where it was exported, else estimated;
-    findings: codes of what the dry run found; files: written, in the folder of the table; core_s: of processor time; inputs:
-    digest of the model's file and of all that was asked."""
+    """Result for a model.
+
+    status: refused for a reason that the user can fix; failed by a bug, by a time limit or because its process was killed each
+    time; time_s, filament_mm, support_mm3: from the dry run of an export, else estimated; findings: codes of the dry run; files:
+    written in the table's folder; core_s: processor time; inputs: digest of the model's file and the job.
+    """
 
     model: str
     status: str = DONE
@@ -53,7 +55,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Job:
-    """What is done with every model. do: one of ACTIONS; asked: all but the model; out: folder to write in, absolute."""
+    """The work for every model. do: one of ACTIONS; asked: the request without a model; out: output folder, absolute."""
 
     do: str
     asked: ModelRequest
@@ -62,12 +64,12 @@ class Job:
 
 
 def job_of(do: str, asked: ModelRequest, out: Path) -> Job:
-    """The job, with a digest of all that its results depend on beside the model's file."""
+    """The job, with a digest of everything except the model's file on which its results depend."""
     ranker: str | bytes = asked.ranker
-    if asked.ranker.endswith(SUFFIX):  # other machines start elsewhere
+    if asked.ranker.endswith(SUFFIX):  # processes of a batch may have another working directory
         file = Path(asked.ranker).resolve()
         asked, ranker = replace(asked, ranker=str(file)), file.read_bytes()
-    named = asked.profile_names, asked.settings, asked.profile.parts  # over what a project says
+    named = asked.profile_names, asked.settings, asked.profile.parts  # these take precedence over a project
     words = (
         version("tiltprint"),
         do,
@@ -82,7 +84,7 @@ def job_of(do: str, asked: ModelRequest, out: Path) -> Job:
 
 
 def inputs_of(file: Path, job: Job) -> str:
-    """Digest of a model's file and its job; empty where the file cannot be read."""
+    """Digest of a model's file and its job; "" when the file cannot be read."""
     try:
         with file.open("rb") as content:
             digest = sha256(job.digest.encode())
@@ -94,13 +96,13 @@ def inputs_of(file: Path, job: Job) -> str:
 
 
 def row_of(file: Path, job: Job) -> Row:
-    """Do the job with one model."""
+    """Process one model."""
     began, row = process_time(), Row(file.name, inputs=inputs_of(file, job))
     try:
         row = ACTIONS[job.do](request_of(str(file), job), row, job.out / file.stem)
     except UserError as error:
         row = replace(row, status=REFUSED, sentence=_sentence(str(error), file))
-    except Exception as error:  # noqa: BLE001 - a bug over one model must not end the others
+    except Exception as error:  # noqa: BLE001 - a bug with one model must not end the others
         row = replace(row, status=FAILED, sentence=_sentence(bug_in_words(error, [job.do, str(file)]), file))
     finally:
         close_projects()
@@ -108,7 +110,7 @@ def row_of(file: Path, job: Job) -> Row:
 
 
 def request_of(model: str, job: Job) -> ModelRequest:
-    """What is asked of one model; a project decides what the options of the batch leave open. Raises UserError."""
+    """The request for one model; a project provides what the batch's options leave open. Raises UserError."""
     project = open_project(model)
     if project is None:
         return replace(job.asked, model=model)
@@ -119,7 +121,7 @@ def request_of(model: str, job: Job) -> ModelRequest:
 
 
 def _sentence(text: str, file: Path) -> str:
-    """What is said of a model, without the folder that all have in common."""
+    """A message about a model without the common folder."""
     return plain_line(without_folders(text).replace(str(file), file.name))
 
 
@@ -146,7 +148,7 @@ def _decompose(request: ModelRequest, row: Row, out: Path) -> Row:
     row = replace(row, parts=len(decomposition.parts), files=BETWEEN.join(f"{out.name}/{name}" for name in names))
     try:
         return _estimated(row, decomposition.parts, profile)
-    except UserError as error:  # the parts can be looked at all the same
+    except UserError as error:  # the parts can still be inspected
         return replace(row, sentence=_sentence(str(error), Path(request.model)))
 
 

@@ -1,4 +1,4 @@
-"""Choice: by what a search chooses how a model lies and into which parts it is cut, and in words what was chosen."""
+"""Choice of orientation and parts: its criteria, and its description in words."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ HARDLY_HELD = (
 
 
 def pricing(profile: Profile) -> Pricing:
-    """What parts take to print by this profile; None for parts that cannot be sliced or that the machine has no room for."""
+    """Function for the time and filament of parts; it returns None for parts that cannot be sliced or do not fit the machine."""
 
     def price(parts: Sequence[Part]) -> Price | None:
         try:
@@ -41,20 +41,19 @@ def pricing(profile: Profile) -> Pricing:
 
 
 def lays_down(request: ModelRequest, given: PlanFile | None, profile: Profile) -> bool:
-    """Whether it is searched how the model lies: where the user asks for it, or nothing says how it lies, as a plan does."""
+    """Whether to search for the orientation: if the user requests it, or if neither options nor a plan give one."""
     if request.orient is not None or given is not None:
         return bool(request.orient) and given is None
     return lies_freely(profile)
 
 
 def lies_freely(profile: Profile) -> bool:
-    """Whether a profile leaves it open how a model lies; turns and the paper's terms mean it as it is."""
+    """Whether a profile leaves the orientation open; rotations and the paper's terms fix it."""
     return profile.search.effective.seam_mm > 0.0 and not any(profile.process.rotate_deg)
 
 
 def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
-    """The profile whose turns lay the model down as a (3, 3) rotation has turned it further, so that its G-code says how it
-    lies; None: it was not turned."""
+    """The profile with rotate_deg including a further (3, 3) rotation, so that its G-code records the orientation; None: none."""
     if orientation is None:
         return profile
     rotate_deg = turned_further(profile.process.rotate_deg, orientation)
@@ -62,8 +61,7 @@ def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
 
 
 def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
-    """How a model was laid down, what that is better by, and how to change it; nothing where it stays. Then a warning where the
-    plate hardly holds it."""
+    """The chosen orientation, its advantage and how to change it; then a warning when the plate hardly holds the model."""
     orientation, standing, laid = oriented.orientation, oriented.standing, oriented.decomposition.chosen
     warning = () if oriented.held else (HARDLY_HELD,)
     if orientation is None:
@@ -77,7 +75,7 @@ def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
 
 
 def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
-    """A warning where the plate hardly holds a model as it stands."""
+    """A warning when the plate hardly holds a model as it stands."""
     return () if BuildPlate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
 
 

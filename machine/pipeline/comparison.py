@@ -1,4 +1,4 @@
-"""Compare: this print beside the same model printed in one part, straight up and in its best single orientation."""
+"""Comparison of a print with the same model in one part: as it stands, and in its best single orientation."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,12 +27,12 @@ from slicer.paths import Kind
 from slicer.raft import lift_mm
 
 BEST = "best single orientation"
-NAMES = ("parts", "upright", "oriented")  # as scripts know the alternatives
+NAMES = ("parts", "upright", "oriented")  # names of the alternatives for scripts
 SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 
 
 def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternative, ...]:
-    """This print, then the two in one part."""
+    """This print, then the two prints in one part; () for G-code without a decomposition."""
     if program.decomposition is None:
         return ()
     x, y = profile.process.place_mm
@@ -40,11 +40,10 @@ def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternati
 
 
 def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = None) -> tuple[Alternative, Alternative]:
-    """The models of a decomposition in one part each, straight up and laid down, with the same marks and modifiers; all get
-    support whatever the process says: without it they would fail.
+    """The models in one part each, as they stand and in the best orientation, with the same marks and modifiers.
 
-    An alternative that the machine cannot print stays in the list, with the reason. report: where progress is shown; None: on the
-    terminal. The model lies about the turn axis.
+    All get support whatever the process says, for they would fail without. An alternative that the machine cannot print is
+    returned with the reason. report: shows progress; None: on the terminal. The model is centred on the turn axis.
     """
     tell = say if report is None else report
     tell("comparing: straight up")
@@ -58,20 +57,20 @@ def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = N
 def in_parts(program: Program, profile: Profile) -> Alternative:
     """The print that is exported. program: of a decomposition."""
     ours = program.decomposition
-    assert ours is not None  # programs of other slicers have nothing to compare with
+    assert ours is not None  # programs of other slicers are not compared
     count = len(ours.parts)
     way = Alternative(f"in {count} part{'s' * (count > 1)}", "", count, risky_mm2=ours.residual_area_mm2)
     return replace(_figures(way, program, profile), joints=joints_of_print(program, profile))
 
 
 def straight_up(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
-    """The models of a decomposition in one part each as they stand."""
+    """The models in one part each as they stand."""
     way = Alternative("straight up", "as it stands", 1, risky_mm2=ours.risky_area_mm2)
     return _in_one_part(way, _uncut(ours, profile), profile, report)
 
 
 def best_lying(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
-    """The models of a decomposition in one part each, laid down so that least needs support."""
+    """The models in one part each, oriented for the least support."""
     parts = _uncut(ours, profile)
     best = {part: _best(part.mesh, profile) for part in dict.fromkeys(parts)}
     lying = {part: _laid_down(part, orientation) for part, orientation in best.items()}
@@ -82,7 +81,7 @@ def best_lying(ours: Decomposition, profile: Profile, report: Report | None = No
 
 
 def _uncut(ours: Decomposition, profile: Profile) -> Sequence[Part]:
-    """The models of a decomposition in one part each; without marks where that is not known."""
+    """The models in one part each; without marks if those are unknown."""
     return ours.uncut or (one_piece(ours.mesh, profile.machine),)
 
 
@@ -91,7 +90,7 @@ def _best(mesh: Mesh, profile: Profile) -> Orientation:
 
 
 def _laid_down(part: Part, best: Orientation) -> Part:
-    """A model in one part turned, with its marks."""
+    """A model in one part rotated with its marks."""
     mesh, rotation = set_on_plate(part.mesh, best.rotation), best.rotation
     shift = mesh.vertices[0] - rotation @ part.mesh.vertices[0]
     turned = replace(part, mesh=mesh)
@@ -99,7 +98,7 @@ def _laid_down(part: Part, best: Orientation) -> Part:
 
 
 def _in_one_part(way: Alternative, parts: Sequence[Part], profile: Profile, report: Report | None) -> Alternative:
-    """Models in one part each as they stand, with support whatever the process says. way: what is known of it beforehand."""
+    """Print models in one part each as they stand, with support whatever the process says. way: what is known in advance."""
     bare = profile.of_all_parts
     profile = bare.model_copy(update={"process": bare.process.model_copy(update={"support": "auto"})})
     models = {
@@ -115,7 +114,7 @@ def _in_one_part(way: Alternative, parts: Sequence[Part], profile: Profile, repo
 
 
 def _figures(way: Alternative, program: Program, profile: Profile) -> Alternative:
-    """A way with what its program comes to."""
+    """An alternative with the figures of its program."""
     run = program.run
     filament_mm = float(np.max(run.program.filament_mm, initial=0.0))
     seam_mm, stairs_mm2 = 0.0, 0.0
@@ -138,13 +137,13 @@ def _figures(way: Alternative, program: Program, profile: Profile) -> Alternativ
 
 
 def support_mm3(run: DryRun) -> float:
-    """The plastic that a program lays as support."""
+    """Volume of a program's support, mm³."""
     supports = [number for number, kind in enumerate(run.program.types) if kind in SUPPORT]
     return float(run.segment_mm3[np.isin(run.program.type[run.segment_row], supports)].sum())
 
 
 def _stairs_mm2(decomposition: Decomposition, profile: Profile) -> float:
-    """What the stairs of a decomposition count; of one that comes from no search, which is in one piece, those of its surface."""
+    """Stair-stepping of a decomposition, mm², weighted; for one in one piece without a search, that of its surface."""
     if decomposition.chosen is not None:
         return decomposition.stairs_mm2
     mesh, direction = decomposition.mesh, decomposition.parts[0].direction
@@ -152,7 +151,7 @@ def _stairs_mm2(decomposition: Decomposition, profile: Profile) -> float:
 
 
 def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, Any]]:
-    """The alternatives for `export --json`: the print that is exported, then upright, then the best single orientation."""
+    """The alternatives for `export --json`: the exported print, the model upright, and its best single orientation."""
     return [
         {
             "name": name,

@@ -1,8 +1,7 @@
-"""Compilers: processes that compile the kernels which the first run needs, one a core, while the command goes on.
+"""Compilers: processes, one per core, that compile the kernels of a first run while the command continues.
 
-The command says early what it will need, in the order of need, and waits for a bundle where it needs it. Where a process
-cannot be had or fails, the work compiles by itself what is missing. Below: what a command does so that its own process, and with
-it those that are forked from it, stay small.
+A command names its bundles of kernels early, in the order of need, and waits for each when it needs it. If a process cannot be
+started or fails, the command compiles by itself. The last functions keep its own process, and those forked from it, small.
 """
 
 import ctypes
@@ -32,7 +31,7 @@ COMPILE = "machine.pipeline.precompile:compile_bundle"
 
 
 class Compilers:
-    """The processes of this command. Threads: one a process reads what it answers; `changed` guards what they share."""
+    """The compiling processes of a command. One thread per process reads its answers; `changed` guards the shared state."""
 
     def __init__(self) -> None:
         self._waiting: deque[str] = deque()
@@ -44,7 +43,7 @@ class Compilers:
         self._changed = Condition()
 
     def begin(self, bundles: Sequence[str]) -> None:
-        """Have the bundles compiled that are not cached yet, the first ones first."""
+        """Start compiling the bundles that are not cached, in order."""
         new = [bundle for bundle in bundles if bundle not in self._asked and not trouble() and not is_cached(bundle)]
         with self._changed:
             self._asked.update(new)
@@ -55,7 +54,7 @@ class Compilers:
             harmless(Thread(target=self._work, daemon=True)).start()
 
     def wait_for(self, bundles: Sequence[str], report: Report | None = None) -> None:
-        """Return when the bundles are compiled, or cannot be in a process of their own; report: where progress is shown."""
+        """Return when the bundles are compiled, or cannot be in a separate process. report: shows progress."""
         self.begin(bundles)
         if self._ready(bundles):
             return
@@ -72,10 +71,10 @@ class Compilers:
         return not self._working or all(bundle not in self._asked or bundle in self._done for bundle in bundles)
 
     def _work(self) -> None:
-        """In a thread: hand bundles to a process of our own until there are none."""
+        """In a thread: pass bundles to a process until none are left."""
         try:
             self._hand_over()
-        except (CallError, OSError):  # no process can be had, or it has ended
+        except (CallError, OSError):  # no process could be started, or it has ended
             pass
         finally:
             with self._changed:
@@ -103,7 +102,7 @@ class Compilers:
 
 
 def bundles_to_build(profile: Profile) -> tuple[str, ...]:
-    """What slicing, the dry run and the pictures of a file need."""
+    """Bundles for slicing, dry run and pictures of a file."""
     return (*PROGRAM, *(PICTURES if profile.machine.thumbnails_px else ()))
 
 
@@ -112,10 +111,10 @@ begin, wait_for = COMPILERS.begin, COMPILERS.wait_for
 
 
 def return_large_arrays() -> None:
-    """Have glibc take arrays of a megabyte and more from the system one by one.
+    """Make glibc map arrays of a megabyte or more one by one; does nothing without glibc.
 
-    By itself it puts those below 32 MB into its heap, whose gaps a dry run of 700,000 lines leaves 190 MB too large. Where there
-    is no glibc nothing happens. Two free megabytes stay at the end of the heap: else small arrays are mapped again and again.
+    By default arrays below 32 MB are in its heap, whose gaps waste 190 MB after a dry run of 700,000 lines. Two free megabytes
+    stay at the heap's end: otherwise small arrays are mapped again and again.
     """
     with suppress(AttributeError, OSError, TypeError):
         libc = ctypes.CDLL(None)
@@ -124,13 +123,13 @@ def return_large_arrays() -> None:
 
 
 def keep_modules() -> None:
-    """Exclude all that is loaded so far from garbage collection: scanning it takes 70 ms a time and frees nothing."""
+    """Exclude everything loaded so far from garbage collection: a scan takes 70 ms and frees nothing."""
     if gc.get_freeze_count() == 0:
         gc.freeze()
 
 
 def return_unused() -> None:
-    """Have glibc give back what lies unused in its heap: after a search 90 MB, which every forked process would have, too."""
+    """Make glibc return unused memory of its heap: 90 MB after a search, which every forked process would inherit."""
     gc.collect()
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)

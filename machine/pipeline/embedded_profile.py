@@ -1,4 +1,4 @@
-"""Embedded profiles: that of a G-code file of ours, in the comments at its end, and that of another slicer's project file."""
+"""Embedded profiles: in the final comments of tiltprint's G-code, and in project files of other slicers."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,16 +16,15 @@ from profiles.part_settings import PartSettings
 from profiles.profile import SECTIONS, Profile, sound_section, with_part_settings
 from profiles.toml_text import read_toml, value_text
 
-SOURCE = re.compile(r"(machine\.sources\.)(.+)")  # the key of another setting, dots and all
-TEXT = re.compile(r"machine\.(?:gcode|sources)\.|.*\.(?:name|stepper)$")  # whatever it looks like
+SOURCE = re.compile(r"(machine\.sources\.)(.+)")  # the key of another setting, with its dots
+TEXT = re.compile(r"machine\.(?:gcode|sources)\.|.*\.(?:name|stepper)$")  # text even if the value looks like a number
 INDEX = re.compile(r"\[(\d+)\]")
 
 
 def read_embedded_profile(lines: Sequence[str], profile: Profile, named: frozenset[str]) -> tuple[Profile, tuple[str, ...]]:
-    """The profile with the file's own machine, material, process and search, but for those the user has named.
+    """The profile with the file's machine, material, process and search, except those that the user has named.
 
-    Returns it and the names of the sections taken over. A file without the comments, or with ones that make no valid
-    section, changes nothing.
+    Returns it and the names of the sections taken from the file. Missing comments and invalid sections change nothing.
     """
     embedded = _tables(lines)
     tables = {name: table for name, table in embedded.items() if name in SECTIONS and name not in named}
@@ -36,7 +35,7 @@ def read_embedded_profile(lines: Sequence[str], profile: Profile, named: frozens
 
 
 def _with_parts(profile: Profile, tables: Any) -> Profile:
-    """The profile with the file's settings of single parts; without them where they are not valid."""
+    """The profile with the file's settings of single parts, if these are valid."""
     try:
         return with_part_settings(profile, [PartSettings.model_validate(settings) for settings in tables])
     except (ProfileError, ValueError):
@@ -44,7 +43,7 @@ def _with_parts(profile: Profile, tables: Any) -> Profile:
 
 
 def _tables(lines: Sequence[str]) -> dict[str, Any]:
-    """Section -> nested table of the values as they were written; {} where that is no TOML."""
+    """Section -> nested table of the values as written; {} for invalid TOML."""
     text = Lines.of(lines)
     at = {
         mark: next((k for k in text.beginning_with(mark) if text[k].rstrip() == mark), None)
@@ -65,12 +64,12 @@ def _tables(lines: Sequence[str]) -> dict[str, Any]:
 
 
 def _block(value: Any) -> Any:
-    """A block of several lines as the text that it was."""
+    """The text of a multi-line block."""
     return "".join(f"{line}\n" for line in value) if isinstance(value, list) else value
 
 
 def _as_toml(comment: str) -> str:
-    """A setting as a line of TOML; the places of a list are the keys of a table."""
+    """A setting as a line of TOML; the indices of a list become keys of a table."""
     key, _, value = comment.removeprefix("; ").partition(" =")
     value = value.removeprefix(" ")
     source = SOURCE.fullmatch(key)
@@ -87,7 +86,7 @@ def _is_toml(value: str) -> bool:
 
 
 def _with_lists(value: Any) -> Any:
-    """Tables whose keys count from 0 as lists, the text None as none."""
+    """Tables with keys 0, 1, ... as lists, and the text None as None."""
     if not isinstance(value, dict):
         return None if value == "None" else value
     below = {key: _with_lists(item) for key, item in value.items()}
@@ -96,7 +95,7 @@ def _with_lists(value: Any) -> Any:
 
 
 def in_words(taken: Sequence[str], profile: Profile) -> str:
-    """What was taken over, for a person."""
+    """Names of the sections taken over."""
     names: Mapping[str, str] = {
         "machine": profile.machine.name, "material": profile.material.name, "process": profile.process.name,
     }  # fmt: skip
@@ -104,7 +103,7 @@ def in_words(taken: Sequence[str], profile: Profile) -> str:
 
 
 def has_settings(file: Path) -> bool:
-    """Whether a model's file is one of another slicer that keeps print settings, damaged ones included."""
+    """Whether a model file comes from another slicer and holds print settings, damaged ones included."""
     if not is_slicer_file(file):
         return False
     try:
@@ -116,8 +115,8 @@ def has_settings(file: Path) -> bool:
 def settings_inside(file: Path, name: str, kinds: Iterable[str] = KINDS) -> tuple[Given, str]:
     """The nearest shipped material with the settings inside a slicer file, and a note on how many of them are used.
 
-    name: of the file as its user knows it; kinds: the profiles to make of them, material, process or both. Raises
-    ProfileError for a file that keeps none, or damaged ones.
+    name: the user's name of the file; kinds: the profiles to make, material, process or both. Raises ProfileError for a file
+    without settings, or with damaged ones.
     """
     if not is_slicer_file(file):
         raise ProfileError(f"{file} is no .3mf that a slicer has saved with its settings inside")

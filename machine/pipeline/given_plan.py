@@ -1,4 +1,4 @@
-"""Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
+"""Given plan: the file with planes to cut by or to start the search from, and the options that conflict with it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ from profiles.profile import Profile, with_part_settings
 
 
 def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
-    """What is asked for of each model of a plate alone, with the plan that names it. Raises PlanError."""
+    """The request for each model of a plate, with the plan that names it. Raises PlanError."""
     models = list(dict.fromkeys((request.model, *request.beside)))
     each = {name: replace(request, model=name, beside=(), plans=()) for name in models}
     names = [own.name for own in each.values()]
@@ -48,7 +48,8 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
 
 
 def with_file_marks(plan: PlanFile, zones: Zones, before: Mesh, after: Mesh, pedestal_mm: float) -> PlanFile:
-    """The plan with marks of the model's file, which lie on the model as it is read. after: the same model as it lies now."""
+    """The plan with the marks in the model's file, whose coordinates are those of the file. before, after: the model as read and
+    in its orientation; pedestal_mm: height of the pedestal."""
     if zones == NO_ZONES:
         return plan
     rotation, shift_mm = (np.eye(3), np.zeros(3)) if after is before else motion_between(before, after)
@@ -64,8 +65,7 @@ def check_number(request: ModelRequest) -> None:
 
 
 def read_given_plan(request: ModelRequest) -> PlanFile | None:
-    """The plan to cut by or the planes to start from; None: all is searched. Raises PlanError, also for options that do not go
-    together."""
+    """The plan to cut by or start from; None: search freely. Raises PlanError, also for conflicting options."""
     plan, planes, record = request.plan, request.planes, request.outputs.record
     if request.parts is not None:
         check_part_count(request.parts)
@@ -91,14 +91,14 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
 
 
 def _plan_of_demo(request: ModelRequest) -> Path | None:
-    """The plan that a demo comes with, unless the user wants it cut or laid down otherwise."""
+    """The plan shipped with a demo, unless the user wants other parts or another orientation."""
     otherwise = request.parts is not None or request.orient or request.outputs.record is not None
     return None if otherwise else plan_beside(request.model)
 
 
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
-    """The profile with the settings that a plan has for single parts, under those of --part. Raises PlanError, also for settings
-    that no modifier may have."""
+    """The profile with a plan's settings for single parts, overridden by those of --part. Raises PlanError, also for settings
+    that a modifier may not have."""
     if given is None:
         return profile
     check_modifiers(profile, given.zones.modifiers, f"plan {given.name}")
@@ -112,7 +112,7 @@ def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
 
 
 def check_modifiers(profile: Profile, modifiers: Sequence[Modifier], where: str) -> None:
-    """Raise PlanError for settings that no modifier may have with a profile. where: the name of what has them."""
+    """Raise PlanError for settings that a modifier may not have with a profile. where: name of their source."""
     for number, modifier in enumerate(modifiers, start=1):
         problems = list(problems_of_place(profile.process, modifier.process, profile.machine.head.nozzle_mm))
         if problems:
@@ -120,7 +120,7 @@ def check_modifiers(profile: Profile, modifiers: Sequence[Modifier], where: str)
 
 
 def check_parts_named(profile: Profile, parts: int) -> None:
-    """Raise ProfileError for settings of parts that are not there."""
+    """Raise ProfileError for settings of parts that do not exist."""
     for settings in profile.parts:
         if settings.part > parts:
             there = parts_in_words(parts)

@@ -1,10 +1,10 @@
-"""Output: files appear whole or not at all, none is written over one that is read, and stdout carries results only."""
+"""Output: files are written completely or not at all, never over an input; stdout carries only results."""
 
 import json
 import os
 import sys
 from collections.abc import Iterable
-from os.path import exists, isdir, isfile, islink, splitext  # pathlib's raise for a name that is too long
+from os.path import exists, isdir, isfile, islink, splitext  # pathlib raises for names that are too long
 from pathlib import Path
 from typing import Any
 from unicodedata import normalize
@@ -20,13 +20,13 @@ from profiles.messages import option
 from profiles.places import is_file_name
 
 STREAMED = ("gcode", "json")  # outputs that can go to standard output
-PROGRAM = ".gcode"  # ends the name of a program that is kept beside its journal
-Role = tuple[str, Path | None]  # what the file is for, as a message says it, and its path; None: not asked for
-LONGEST_NAME, LONGEST_SUFFIX = 150, 20  # bytes, which a disk counts
+PROGRAM = ".gcode"  # suffix of a program kept beside its journal
+Role = tuple[str, Path | None]  # the file's purpose, for messages, and its path; None: not requested
+LONGEST_NAME, LONGEST_SUFFIX = 150, 20  # bytes, as disks count
 
 
 def plain_name(name: str) -> str:
-    """A name that a file has on any system: letters and digits of any script stay.
+    """A file name valid on any system, with letters and digits of any script.
 
     >>> plain_name("Kätzchen 猫/2")
     'Kätzchen_猫_2'
@@ -40,7 +40,7 @@ def plain_name(name: str) -> str:
 
 
 def check_writable(path: Path) -> None:
-    """Refuse early what could not be written at the end of long work."""
+    """Refuse a file that could not be written, before long work. Raises OutputError."""
     if path == STDOUT:
         raise OutputError(f"output -: a file name is expected; {option('json')}, and -o of export, can go to standard output")
     if isdir(path):
@@ -53,7 +53,7 @@ def check_writable(path: Path) -> None:
 
 
 def check_outputs(outputs: Outputs) -> None:
-    """The same for all files and the folder that a command was asked for."""
+    """Refuse files and a folder of a command that could not be written. Raises OutputError."""
     if outputs.folder is not None:
         check_folder(outputs.folder)
     if STDOUT in (outputs.gcode, outputs.json) and getattr(sys.stdout, "name", "") == os.devnull:  # see machine.cli.start
@@ -64,7 +64,7 @@ def check_outputs(outputs: Outputs) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """The folder, with those above it. Raises OutputError."""
+    """Create a folder with its parents. Raises OutputError."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -76,7 +76,7 @@ def _check_name(path: Path) -> None:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         return
-    except OSError as error:  # too long, a link to itself, a folder that may not be looked into
+    except OSError as error:  # too long, a link to itself, or an inaccessible folder
         raise _not_written(path, error) from None
 
 
@@ -94,7 +94,7 @@ def _check_parent(path: Path, folder: Path) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Refuse early a folder that cannot be made or written."""
+    """Refuse a folder that could not be created or written, before long work. Raises OutputError."""
     if path == STDOUT:
         raise OutputError(f"output -: a folder is expected; only {option('json')} can go to standard output")
     _check_name(path)
@@ -108,10 +108,7 @@ def check_folder(path: Path) -> None:
 
 
 def write_bytes(path: Path, content: bytes, private: bool = False) -> None:
-    """Write a file whole or not at all, through a link that stands in its place; private: for this user only.
-
-    Raises OutputError.
-    """
+    """Write a file completely or not at all, following a link; private: readable for this user only. Raises OutputError."""
     check_writable(path)
     try:
         if _is_device(path):
@@ -129,7 +126,7 @@ def refuse_to_overwrite(file: Path, replace: bool) -> None:
 
 
 def write_own(file: Path, text: str, replace: bool) -> None:
-    """Write a profile of the user's own, the file before beside it. Raises OutputError."""
+    """Write a profile of the user, keeping the previous one beside it. Raises OutputError."""
     refuse_to_overwrite(file, replace)
     make_folder(file.parent)
     if file.exists():
@@ -146,12 +143,12 @@ def delete(path: Path) -> None:
 
 
 def write_lines(path: Path, lines: Iterable[str], private: bool = False) -> None:
-    """Write text lines, whole or not at all; the path - stands for standard output."""
+    """Write text lines, completely or not at all; the path - is standard output."""
     _write_text(path, "\n".join(lines) + "\n", private)
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as JSON; the path - stands for standard output."""
+    """Write a value as JSON; the path - is standard output."""
     _write_text(path, json.dumps(value, indent=2) + "\n")
 
 
@@ -163,7 +160,7 @@ def _write_text(path: Path, text: str, private: bool = False) -> None:
 
 
 def _is_device(path: Path) -> bool:
-    """Whether a name stands for a device or a pipe (/dev/null, /dev/stdout), which must not be replaced by a file."""
+    """Whether a path is a device or a pipe (/dev/null, /dev/stdout), which must not be replaced by a file."""
     return exists(path) and not isfile(path) and not isdir(path)
 
 
@@ -171,7 +168,7 @@ MODEL, FIGURES, PLAN, SCENE = FOLDER_FILES
 
 
 def save_parts(folder: Path, decomposition: Decomposition, figures: dict[str, Any]) -> None:
-    """Write the parts, the scenes that hold them all, and the figures. Raises OutputError."""
+    """Write the parts, the scenes with all of them, and the figures. Raises OutputError."""
     make_folder(folder)
     for part in decomposition.parts:
         write_bytes(folder / part_file(part.index), stl(part.mesh))
@@ -182,7 +179,7 @@ def save_parts(folder: Path, decomposition: Decomposition, figures: dict[str, An
 
 
 def _drop_earlier_parts(folder: Path, parts: int) -> None:
-    """Delete the parts that an earlier run has left beside the new ones; files of other programs stay."""
+    """Delete the parts of an earlier run; files of other programs stay."""
     now = {part_file(index) for index in range(1, parts + 1)}
     for file in folder.glob(PART_FILES):
         if file.name not in now and file.is_file() and file.open("rb").read(len(HEADING)) == HEADING:
@@ -190,8 +187,8 @@ def _drop_earlier_parts(folder: Path, parts: int) -> None:
 
 
 def check_model_files(request: ModelRequest, written: Iterable[Role], *also_read: Role) -> None:
-    """Raise OutputError for an output that cannot be written, and where a command would write over what it reads or one file
-    twice. written: files beside the outputs of the request."""
+    """Raise OutputError for an output that cannot be written, is also an input, or is named twice. written: files beside the
+    request's outputs."""
     check_outputs(request.outputs)
     read = [*_read_by(request), *also_read]
     check_roles(read, (*_written(request.outputs), *written))
@@ -206,13 +203,12 @@ def printing_files(log: Path | None, journal: Path | None) -> tuple[Role, ...]:
 
 
 def program_beside(journal: Path) -> Path:
-    """Where the program of a journal is kept when it is no file of its own."""
+    """Path of a journal's program that is not a file of its own."""
     return journal.with_name(journal.name + PROGRAM)
 
 
 def check_roles(read: Iterable[Role], written: Iterable[Role]) -> None:
-    """Raise OutputError for a file that is read and written, or written twice. Two names of one file, by links or another
-    folder's name, are one file."""
+    """Raise OutputError for a file that is read and written, or written twice. Names of one file through links are the same file."""
     known: dict[object, str] = {}
     for role, path in read:
         if path is not None and (same := _identity(path)) is not None:
@@ -226,7 +222,7 @@ def check_roles(read: Iterable[Role], written: Iterable[Role]) -> None:
 
 
 def _identity(path: Path) -> object:
-    """What is the same for all names of a file; None for a device or a pipe, which keeps nothing."""
+    """Key that is equal for all names of a file; None for a device or a pipe, which stores nothing."""
     try:
         status = os.stat(path)
     except OSError:
@@ -256,7 +252,7 @@ def _written(outputs: Outputs) -> list[Role]:
 
 
 def _check_folder(folder: Path, read: Iterable[Role]) -> None:
-    """A folder's own files have fixed names: none of them may be one that is read."""
+    """Raise OutputError for an input with one of the fixed names in the output folder."""
     own = {_identity(folder / name): name for name in FOLDER_FILES}
     own |= {_identity(file): file.name for file in folder.glob(PART_FILES)} if folder.is_dir() else {}
     for role, path in read:

@@ -1,9 +1,8 @@
-"""Pictures: a decomposition as images, as PNG files, and in the head of G-code.
+"""Pictures of decompositions and calibrations, as images, PNG files and thumbnails in G-code.
 
-The model and its parts side by side, the print as a sheet of frames, a frame for every number of parts that a search found, and
-what a calibration leaves over.
-In G-code pictures have PrusaSlicer's form, base64 between comments, which Mainsail, Fluidd, RepRapFirmware and Prusa's printers
-show beside the file's name.
+They show the model beside its parts, the print order as a sheet of frames, a frame for each number of parts, or the residuals of
+a calibration. Thumbnails have PrusaSlicer's format, base64 in comments, which Mainsail, Fluidd, RepRapFirmware and Prusa's
+printers display.
 """
 
 from base64 import b64encode
@@ -32,19 +31,19 @@ from mdp.pose import UP, Pose, unit
 from profiles.machine import Machine
 from profiles.profile import Profile
 
-if TYPE_CHECKING:  # which only calibration loads
+if TYPE_CHECKING:  # only calibration loads it
     from machine.setup.calibration.fit import Calibration
 
 PLAIN = (214.0, 217.0, 222.0)
 PRINTED = (196.0, 202.0, 210.0)
 FLOOR = (236.0, 238.0, 241.0)
 NOZZLE = (128.0, 131.0, 138.0)
-SPREAD = 0.13  # gap between exploded parts as a share of the model's size
+SPREAD = 0.13  # gap between exploded parts as a fraction of the model's size
 SEGMENTS = 96
 
 
 def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[int, int] = (1600, 800)) -> Image:
-    """The model straight up with its risky faces red beside its parts, moved apart, with what stays risky red.
+    """The upright model and its exploded parts, with faces that need support in red.
 
     Returns (h, w, 3), uint8; size is width and height in pixels.
     """
@@ -59,23 +58,23 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
 
 
 def parts_apart(parts: Sequence[Part]) -> list[Mesh]:
-    """The meshes of parts, each moved away from the part that it stands on."""
+    """Meshes of the parts, each moved away from the part below it."""
     low, high = (pick([part.mesh.bounds_mm[side] for part in parts], axis=0) for side, pick in enumerate((np.min, np.max)))
     gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(high - low))
     return [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
 
 
 def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[int, int]) -> Image:
-    """The parts in colour where they belong. Returns (h, w, 3), uint8; size is width and height in pixels."""
+    """The coloured parts in place. Returns (h, w, 3), uint8; size is width and height in pixels."""
     risky = needing_upright(decomposition.mesh, profile)
     parts = [part.mesh for part in decomposition.parts]
     return draw(parts, list(part_colours(len(parts))), axes=best_view(decomposition.mesh, risky), size=size)
 
 
 def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:
-    """One numbered frame a part in print order: the table tilted as for that part, the part in colour under the nozzle.
+    """A numbered frame per part in print order: the table in the part's pose, the part in colour under the nozzle.
 
-    Returns (h, w, 3), uint8: the model's name, below it frames of frame_pixels squared in rows.
+    Returns (h, w, 3), uint8: the model's name, below it rows of square frames of frame_pixels.
     """
     parts, model = decomposition.parts, decomposition.mesh
     view = _along_the_tilt_axis(parts, machine)
@@ -92,7 +91,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
 
 
 def _shifts(parts: Sequence[Part], gap_mm: float) -> list[Floats]:
-    """Where each part is moved: along its direction away from the part it stands on, which has moved itself."""
+    """Displacement of each part: along its direction from the part below it, which is displaced itself."""
     shifts: list[Floats] = [np.zeros(3)]
     for position, part in enumerate(parts[1:], start=1):
         foot = part.mesh.vertices[part.base.heights_mm(part.mesh.vertices) < 1e-3].mean(axis=0)
@@ -102,7 +101,7 @@ def _shifts(parts: Sequence[Part], gap_mm: float) -> list[Floats]:
 
 
 def best_view(model: Mesh, risky: NDArray[np.bool_]) -> Floats:
-    """The side that shows most of the model's outline and of its risky faces, a little from above."""
+    """Camera axes for the side, slightly from above, that shows most of the model's outline and risky faces."""
     azimuths = np.arange(-180.0, 180.0, 10.0)
     toward = np.stack([np.cos(np.radians(azimuths)), np.sin(np.radians(azimuths)), np.zeros(len(azimuths))])
     facing = model.normals @ toward
@@ -113,7 +112,7 @@ def best_view(model: Mesh, risky: NDArray[np.bool_]) -> Floats:
 
 
 def _along_the_tilt_axis(parts: tuple[Part, ...], machine: Machine) -> Floats:
-    """Nearly along the tilt axis, from the side to which most of the tilted tables show their upper faces."""
+    """Camera axes nearly along the tilt axis, from the side to which most tilted tables show their upper faces."""
     axis = unit(machine.tilt.axis)
     across = np.cross(UP, axis)
     shown = sum(float(np.sign(np.round(part.rotation @ UP @ across, 6))) for part in parts)
@@ -122,7 +121,7 @@ def _along_the_tilt_axis(parts: tuple[Part, ...], machine: Machine) -> Floats:
 
 
 def floor_of(model: Mesh) -> Mesh:
-    """A disc that suggests the platform: as wide as the model reaches."""
+    """A disc as wide as the model, which suggests the build plate."""
     reach = float(np.hypot(*model.vertices[:, :2].T).max())
     return _revolve([(0.0, -0.03 * reach), (reach, -0.03 * reach), (reach, -0.01), (0.0, -0.01)])
 
@@ -136,13 +135,13 @@ def _nozzle(machine: Machine) -> Mesh:
 
 
 def _last_point(mesh: Mesh) -> Floats:
-    """The highest place of a part in the pose it is printed at, a hair above it."""
+    """The highest point of a part in its pose, 0.3 mm above the surface."""
     above: Floats = mesh.vertices[int(np.argmax(mesh.vertices[:, 2]))] + np.array([0.0, 0.0, 0.3])
     return above
 
 
 def _revolve(outline: list[tuple[float, float]]) -> Mesh:
-    """The closed surface of an outline (radius, z) from axis to axis, counter-clockwise, turned about z."""
+    """Surface of revolution about z of an outline (radius, z) from axis to axis, counter-clockwise."""
     turns = np.linspace(0.0, 2.0 * np.pi, SEGMENTS, endpoint=False)
     rings = np.array([[(r * np.cos(t), r * np.sin(t), z) for t in turns] for r, z in outline])
     k = np.arange(SEGMENTS)
@@ -155,7 +154,7 @@ def _revolve(outline: list[tuple[float, float]]) -> Mesh:
 
 
 def tile(frames: list[Image]) -> Image:
-    """Frames in rows, white where none is left."""
+    """Frames in rows, padded with white."""
     rows = max(1, round(sqrt(len(frames) / 1.6)))
     columns = ceil(len(frames) / rows)
     blank = np.full_like(frames[0], 255)
@@ -172,9 +171,9 @@ def add_title(sheet: Image, name: str, frame_pixels: int) -> Image:
 
 
 def write_text(image: Image, text: str, at: tuple[float, float], height: float, grey: int) -> Image:
-    """The image (h, w, 3) with a line of text, in the font that Pillow brings along, so that it is the same on every machine.
+    """The image (h, w, 3) with a line of text in Pillow's own font, which is the same on every machine.
 
-    at: where its baseline begins, height: of the font, all in pixels.
+    at: start of the baseline, height: of the font, in pixels.
     """
     picture = Pillow.fromarray(image)
     ImageDraw.Draw(picture).text(at, text, (grey, grey, grey), ImageFont.load_default(height), anchor="ls")
@@ -182,7 +181,7 @@ def write_text(image: Image, text: str, at: tuple[float, float], height: float, 
 
 
 def _label(frame: Image, part: Part, machine: Machine) -> Image:
-    """The frame with the part's number in its upper left corner, and where the table stands in the lower left one."""
+    """The frame with the part's number at the top left and its tilt and turn at the bottom left."""
     pixels, pose = len(frame), part.pose
     left = pixels / 32
     labelled = write_text(frame, str(part.index), (left, pixels / 10), pixels / 12, 90)
@@ -197,9 +196,9 @@ BORDER = (0, 114, 178)
 
 
 def front_picture(decomposition: Decomposition, profile: Profile, frame_pixels: int = 480) -> Image:
-    """A frame for every row of the front: its parts in colour with what needs support red, its figures below.
+    """A frame for each row of the front: coloured parts with faces that need support in red, and figures below.
 
-    Returns (h, w, 3), uint8: the model's name, below it frames of frame_pixels squared in rows.
+    Returns (h, w, 3), uint8: the model's name, below it rows of square frames of frame_pixels.
     """
     model = decomposition.mesh
     view = best_view(model, risky_upright(model, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces))
@@ -223,7 +222,7 @@ def _frame(row: FrontRow, model: Mesh, profile: Profile, view: Floats, pixels: i
 
 
 def _cut(row: FrontRow, model: Mesh, profile: Profile) -> tuple[list[Mesh], list[Mask]]:
-    """The parts in print order and which of their faces need support."""
+    """The parts in print order, and their faces that need support."""
     angle_deg, rest = profile.process.self_supporting_angle_deg, solid_of(model)
     parts, reds = list[Mesh](), list[Mask]()
     for plane in row.planes:
@@ -241,7 +240,7 @@ def _with_border(frame: Image, width: int) -> Image:
     return bordered
 
 
-ROW = 78  # characters of base64 a line, as PrusaSlicer writes them
+ROW = 78  # characters of base64 per line, as PrusaSlicer writes them
 
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:
@@ -252,12 +251,12 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
 
 
 def write_png(path: Path, image: NDArray[np.uint8]) -> None:
-    """Write an image (h, w, 3), uint8; the file appears complete or not at all. Raises OutputError."""
+    """Write an image (h, w, 3), uint8, as a PNG file, completely or not at all. Raises OutputError."""
     write_bytes(path, png_bytes(image))
 
 
 def with_thumbnails(lines: Lines, decomposition: Decomposition, profile: Profile) -> Lines:
-    """The G-code with the pictures that machine.thumbnails_px asks for after its first comments."""
+    """The G-code with the pictures of machine.thumbnails_px after its first comments."""
     head = next((k for k, line in enumerate(lines) if not line.startswith("; ")), len(lines))
     comments: list[str] = []
     for width, height in profile.machine.thumbnails_px:
@@ -266,7 +265,7 @@ def with_thumbnails(lines: Lines, decomposition: Decomposition, profile: Profile
 
 
 def thumbnail(png: bytes, width: int, height: int) -> list[str]:
-    """One picture's comment lines."""
+    """Comment lines of a picture."""
     text = b64encode(png).decode("ascii")
     rows = [text[k : k + ROW] for k in range(0, len(text), ROW)]
     return [f"; thumbnail begin {width}x{height} {len(text)}", *(f"; {row}" for row in rows), "; thumbnail end"]
@@ -278,7 +277,7 @@ RINGS = 4
 
 
 def residual_picture(calibration: "Calibration", poses: Sequence[Pose], machine: Machine) -> Image:
-    """Left x and y of the residuals in the workpiece frame, right a bar a pose, a colour a tilt; (h, w, 3), uint8."""
+    """Residuals of a calibration: x and y in the workpiece frame, and a bar per pose, coloured by tilt; (h, w, 3), uint8."""
     picture = Pillow.new("RGB", (WIDTH, HEIGHT), "white")
     pen = ImageDraw.Draw(picture)
     tilts = sorted({round(pose.tilt_deg, 1) for pose in poses})
@@ -297,7 +296,7 @@ def residual_picture(calibration: "Calibration", poses: Sequence[Pose], machine:
 
 
 def _round_up(value_mm: float) -> float:
-    """A scale's end: the next hundredth of a mm in steps that divide well."""
+    """End of a scale: the next multiple of 0.02 mm."""
     return max(0.02, 0.02 * ceil(value_mm / 0.02))
 
 

@@ -1,4 +1,4 @@
-"""Pipeline: joins the stages, from a model's name to parts, sliced parts, G-code lines and the dry run."""
+"""Pipeline: joins the stages from a model's name to parts, sliced parts, G-code lines and the dry run."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
@@ -50,16 +50,14 @@ from slicer.interface.interface import pin_width_mm, room_around_mm
 from slicer.paths import SlicedPart
 from slicer.slice import SlicingProgress, slice_parts
 
-Record = tuple[
-    Decomposition, list[bytes]
-]  # what a search has found, and what it saw, of which there is one where it was asked for
+Record = tuple[Decomposition, list[bytes]]  # result and record of a search; the record only on request
 
 
 @dataclass(frozen=True, eq=False)
 class Decomposed:
-    """A decomposition, the plan that cuts it again, and how long its steps took.
+    """A decomposition, the plan that repeats its cuts, and the times of its steps.
 
-    profile: what it is printed with, the plan's settings of single parts and how the model lies included.
+    profile: for its print, with the plan's settings of single parts and the orientation.
     """
 
     decomposition: Decomposition
@@ -70,13 +68,13 @@ class Decomposed:
 
 
 def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed:
-    """Read a model and find its parts, or those of all models of a plate, each for itself; repairs and notes go to stderr.
+    """Read and decompose a model, or each model of a plate; repairs and notes go to stderr.
 
-    to_build: `build` comes next, the first run may compile what it needs meanwhile, and the rows of the front that need not be
-    chosen from get no time. Raises PlanError where models have no room beside each other, and for what goes with one alone.
+    to_build: `build` follows: its kernels are compiled meanwhile, and rows of the front without a choice get no time. Raises
+    PlanError for models that do not fit on a plate, and for options of a single model.
     """
     compilers.keep_modules()
-    ranker_named(request.ranker)  # a wrong one is told before anything else is done
+    ranker_named(request.ranker)  # report a wrong ranker before any other work
     check_copies(request.copies, option("copies"))
     check_number(request)
     requests = request_of_each(request)
@@ -87,14 +85,14 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
         with naming(Path(name).name if request.beside else ""):
             each[name] = _decompose_alone(requests[name], to_build)
     first = each[request.model]
-    profile = first.profile if len(each) == 1 else request.profile  # each lies in its own way
+    profile = first.profile if len(each) == 1 else request.profile  # each has an orientation of its own
     settings = {own.decomposition: own.profile.parts for own in each.values()}
     decomposition, profile = on_one_plate([each[name].decomposition for name in models], profile, settings)
     return replace(first, decomposition=decomposition, profile=profile, total_s=perf_counter() - began)
 
 
 def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
-    """One of the models, as if it were the only one."""
+    """Decompose one of the models by itself."""
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)
     if to_build:
@@ -112,7 +110,7 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
         mesh = set_on_plate(mesh, orientation)
     laying = lays_down(request, given, profile)
     if to_build and not laying:
-        check_standing(mesh, profile)  # a search may take minutes
+        check_standing(mesh, profile)  # before a search, which may take minutes
     with reporting() as report:
         price, records = _price(request, to_build and not laying), list[Record]()
 
@@ -136,7 +134,7 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
 
 
 def _price(request: ModelRequest, unused: bool) -> Pricing | None:
-    """By what the search prices parts; None: by nothing. unused: only what the choice of a row needs is priced."""
+    """Prices of parts for the search, None for none. unused: only prices needed to choose a row matter."""
     profile = request.profile.of_all_parts
     free = request.plan is not None or request.parts is not None or not Weights.of(profile)
     return None if unused and free else pricing(profile)
@@ -145,7 +143,7 @@ def _price(request: ModelRequest, unused: bool) -> Pricing | None:
 def _search(
     request: ModelRequest, given: PlanFile | None, price: Pricing | None, report: Report, records: list[Record], mesh: Mesh
 ) -> Decomposition:
-    """The parts of a mesh that lies one way or another, searched, or cut by a plan. records: gets what the search saw."""
+    """The parts of a mesh in its orientation, searched or cut by a plan. records: receives the search's record."""
     asked = SearchRequest(given or NO_PLAN, request.parts, request.ranker, price)
     if request.plan is not None:
         return cut_by_plan(mesh, request.name, request.profile, asked)
@@ -166,7 +164,7 @@ def _search(
 
 
 def _plan_with_marks(request: ModelRequest, given: PlanFile | None, model: ReadModel, mesh: Mesh) -> PlanFile | None:
-    """The plan with the marks that the model's file has, on the model as it lies now; None: there are neither."""
+    """The plan with the marks of the model's file, in the model's orientation; None: neither exists."""
     zones = model.zones if request.own_marks else model.zones.shapes
     if zones == NO_ZONES:
         return given
@@ -183,11 +181,11 @@ def build(
     report: Report | None = None,
     on_slices: Callable[[SlicingProgress], None] | None = None,
 ) -> Program:
-    """Slice, plan, write and dry-run a decomposition, at its place on the plate. Before slicing it raises MoveError for a part
-    that the machine has no room for, ProfileError for a G-code block that the machine's firmware refuses.
+    """Slice, plan, write and dry-run a decomposition at its place on the plate.
 
-    pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
-    for a person. report: where progress is shown; None: on the terminal. on_slices: is shown the parts while they are sliced.
+    Raises MoveError before slicing for a part that does not fit the machine, ProfileError for a G-code block that the firmware
+    refuses. pictures: the G-code becomes a file, with thumbnails for the machine's pages. stops: where the print waits for the
+    user. report: shows progress; None: on the terminal. on_slices: receives the parts during slicing.
     """
     parts = decomposition.parts
     check_blocks(profile)
@@ -196,7 +194,7 @@ def build(
     decomposition = standing_at(decomposition, profile.process.place_mm)
     parts = decomposition.parts
     compilers.wait_for(compilers.PROGRAM, report)
-    compilers.return_unused()  # of the search
+    compilers.return_unused()  # memory of the search
     with naming_parts(parts), reporting() if report is None else nullcontext(report) as tell:
 
         def show(slicing: SlicingProgress) -> None:
@@ -214,7 +212,7 @@ def build(
         if pictures and profile.machine.thumbnails_px:
             compilers.wait_for(compilers.PICTURES, tell)
             lines = with_thumbnails(lines, decomposition, profile)
-        del program  # as large as its text, and that tells all of it
+        del program  # as large as its text, which contains all of it
         compilers.return_unused()
         tell("dry run")
         run = dry_run(lines, profile)
@@ -222,7 +220,7 @@ def build(
 
 
 def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decomposition:
-    """The row of the front that is printed with the print's own time and filament where it has no estimate."""
+    """The decomposition, whose chosen row gets the print's time and filament if it has no estimate."""
     chosen = decomposition.chosen
     if chosen is None or chosen.time_s is not None or chosen.parts != len(decomposition.parts):
         return decomposition
@@ -231,7 +229,7 @@ def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decompositio
 
 
 def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
-    """Layers that no line is narrow enough for, with what is above them; the tip that a vase ends below."""
+    """Warnings of layers too thin for any line, and of the height at which a vase stops."""
     for part in sliced:
         if part.too_thin and profile.process.spiral_vase and part.layers[-1].z_mm <= part.too_thin_mm + 1e-6:
             yield f"the vase stops at {part.too_thin_mm:.2f} mm: above that the model is too narrow for a spiral wall"
@@ -243,7 +241,7 @@ def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
 
 
 def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
-    """Which parts were to have pins and have no room for any."""
+    """Warnings of parts without room for pins."""
     for part, piece in zip(parts, sliced, strict=True):
         own = profile.of_part(part.index)
         if not part.on_plate and own.process.interlock == "pins" and not piece.pins:
@@ -253,7 +251,7 @@ def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: 
 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
-    """What was asked for and is not in the program."""
+    """Warnings of settings without effect in the program."""
     if profile.process.raft_layers and profile.process.brim_mm > 0.0:
         yield (
             f"{key_name('process.brim_mm')} has no effect with a raft: "

@@ -1,7 +1,7 @@
-"""Plate: several models or copies on one plate: where they stand, and in which order their parts are printed.
+"""Plate: several models or copies on one plate, their places and the order of their parts.
 
-Layer by layer: the first parts of all models are one part of the print, the others follow one after the other, as limbs that are
-printed beside what stands. Or one model after the other (process.complete_objects): then the first parts are such limbs, too.
+Layer by layer: the first parts of all models form one part of the print; the others follow in turn, as limbs printed beside
+standing parts. One model after the other (process.complete_objects): the first parts are limbs, too.
 """
 
 import re
@@ -29,18 +29,18 @@ from profiles.profile import Profile
 from slicer.geometry.polygons import clean
 from slicer.raft import reach_mm as raft_reach_mm
 
-GAP_MM = 5.0  # between models, or between their brims
+GAP_MM = 5.0  # between models or their brims
 NUMBERED = re.compile(r"\bpart (\d{1,9})\b")
 
 
 def on_one_plate(
     models: Sequence[Decomposition], profile: Profile, settings: Mapping[Decomposition, Sequence[PartSettings]] | None = None
 ) -> tuple[Decomposition, Profile]:
-    """Models side by side about their place on the plate as one print, and what it is printed with. Copies of a model are one and
-    the same value. settings: of single parts of each model; None: those of the profile hold for the parts of every model.
+    """Models side by side around their place on the plate as one print, and its profile.
 
-    Raises PlanError for models that the plate, or the head beside the others, has no room for, and for settings of a part that
-    cannot hold where the first parts of all models are one.
+    Copies of a model are the same value. settings: of single parts of each model; None: the profile's apply to every model.
+    Raises PlanError for models that do not fit on the plate, or the head beside the others, and for settings of a part that
+    cannot apply when the first parts of all models are one.
     """
     if len(models) == 1:
         return models[0], profile
@@ -66,13 +66,14 @@ def on_one_plate(
         plated += [given.model_copy(update={"part": number}) for given in own[k] if given.part == n + 1]
     process = profile.process
     if plate.together:
-        process = process.model_copy(update={"brim_mm": plate.brim_mm})  # judged alone: together they stand wider
+        # the brim of each model alone: together they have a wider base
+        process = process.model_copy(update={"brim_mm": plate.brim_mm})
     return _one_print(moved, parts), profile.model_copy(update={"process": process, "parts": plated})
 
 
 @contextmanager
 def naming(model: str) -> Iterator[None]:
-    """Have a MoveError name its model, one of several; "": there is only one."""
+    """Add the model's name to a MoveError; "" for a single model."""
     try:
         yield
     except MoveError as error:
@@ -83,7 +84,7 @@ def naming(model: str) -> Iterator[None]:
 
 @contextmanager
 def naming_parts(parts: Sequence[Part]) -> Iterator[None]:
-    """Have a refused part of one of several models named by that, too."""
+    """Add the model's name to errors about a part, for several models."""
     try:
         yield
     except UserError as error:
@@ -96,7 +97,7 @@ def naming_parts(parts: Sequence[Part]) -> Iterator[None]:
 
 
 def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[Place], Plate]:
-    """Where the middles of models stand on the plate, and in which order the head prints their parts there. Raises PlanError."""
+    """Centres of the models on the plate, and the order in which their parts are printed. Raises PlanError."""
     about_axis = {model: _about_axis(model) for model in dict.fromkeys(models)}
     lowest_first = sorted(range(len(models)), key=lambda k: (float(models[k].mesh.bounds_mm[1, 2]), k))
     together = [] if profile.process.complete_objects else [(k, 0) for k in range(len(models))]
@@ -111,13 +112,13 @@ def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[P
 
 
 def _about_axis(model: Decomposition) -> Decomposition:
-    """A model moved so that the middle of its box is at the turn axis."""
+    """A model moved so that its bounding box is centred on the turn axis."""
     x, y = model.mesh.bounds_mm[:, :2].mean(axis=0).tolist()
     return standing_at(model, (-x, -y))
 
 
 def _brim_mm(models: Sequence[Decomposition], profile: Profile) -> float:
-    """Width of the brim around all models: that of a small base as soon as one of them would tip over alone."""
+    """Width of the brim around all models: that of a small base if one of them would tip over alone."""
     process = profile.process
     small = process.brim_mm == 0.0 and process.small_base_brim_mm > 0.0 and not process.raft_layers
     if small and any(_tips_over(model.mesh, profile) for model in dict.fromkeys(models)):
@@ -132,17 +133,17 @@ def _tips_over(mesh: Mesh, profile: Profile) -> bool:
 
 
 def _gap_mm(process: Process, brim_mm: float) -> float:
-    """The distance that the boxes of models keep."""
+    """Distance between the bounding boxes of models, mm."""
     if process.raft_layers:
         brim_mm = raft_reach_mm(process)
     skirt_mm = process.skirt_distance_mm + (process.skirt_loops + 1) * process.line_width_mm
-    if process.complete_objects and brim_mm == 0.0 and process.skirt_loops:  # round the first model alone
+    if process.complete_objects and brim_mm == 0.0 and process.skirt_loops:  # around the first model only
         return max(GAP_MM, skirt_mm)
     return GAP_MM + 2.0 * brim_mm
 
 
 def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[Place], gap_mm: float, profile: Profile) -> str:
-    """Why models do not go on the plate together, in a sentence."""
+    """Why the models do not fit on the plate together."""
     (width, depth), alike = sizes_mm[misfit.number], len(dict.fromkeys(models)) == 1
     what = f"{models[misfit.number].name} measures {width:.1f} x {depth:.1f} mm, the plate of {profile.machine.name} has"
     if alike:
@@ -167,7 +168,7 @@ def _size_mm(mesh: Mesh) -> Place:
 
 
 def _first_of_all(parts: Sequence[Part]) -> Part:
-    """The first parts of several models as one."""
+    """The first parts of several models as one part."""
     mesh, counts = together([part.mesh for part in parts]), [len(part.mesh.faces) for part in parts]
 
     def joined(marks: Iterable[Marked]) -> Marked:
@@ -188,18 +189,18 @@ def _first_of_all(parts: Sequence[Part]) -> Part:
 
 
 def _room(mesh: Mesh) -> Zone:
-    """The box around a model that reaches half of the gap to other models."""
+    """The box around a model that extends half the gap to other models."""
     low, high = mesh.bounds_mm + 0.5 * GAP_MM * np.array([[-1.0], [1.0]])
     return Zone((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
 
 def _within(room: Zone, part: Part) -> Part:
-    """A model's part with the boxes of its marks and the modifiers confined to the model's room."""
+    """A model's part with its marks and modifiers confined to the model's room."""
     return part.with_marks(lambda mark: mark.within(room), lambda own: replace(own, volume=in_room(own.volume, room)))
 
 
 def _with_place_settings(part: Part, model: Decomposition, given: Sequence[PartSettings]) -> Part:
-    """A model's first part, which is printed as one with others', with its own settings as a modifier of its room."""
+    """A model's first part, printed as one with the others', with its own settings as a modifier of its room. Raises PlanError."""
     process = {key: value for own in given if own.part == 1 for key, value in own.process.items()}
     for key in process:
         if key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:
@@ -218,7 +219,7 @@ def _joined(masks: Sequence[Mask | None]) -> Mask | None:
 
 
 def _beside(part: Part, index: int, pose: Pose, machine: Machine) -> Part:
-    """A part that is printed alone, where others stand: a limb, but for the very first one."""
+    """A part printed where others stand: a limb, except for the very first."""
     base = part.base
     if index > 1 and base.limbs_mm is None:
         base = Plane(base.normal, base.offset_mm, part.mesh.vertices[[int(np.argmax(base.heights_mm(part.mesh.vertices)))]])

@@ -1,7 +1,7 @@
-"""Precompile: what the kernels are compiled with that a first run needs: tiny models, in bundles that processes share.
+"""Precompile: exercises on tiny models, in bundles, that compile the kernels of a first run.
 
-A bundle does what the command does later, so that it compiles exactly the kernels that will be called; later runs find them
-cached. The processes are those of `machine.pipeline.compilers`.
+A bundle does what the command does later, and so compiles exactly the kernels that will be called; later runs find them cached.
+The processes are those of `machine.pipeline.compilers`.
 """
 
 import gc
@@ -42,7 +42,7 @@ from slicer.slice import slice_part
 LEANING = np.array([0.0, np.sin(0.2), np.cos(0.2)])
 PLANE = Plane(LEANING, 20.0)
 COARSE = {"layer_height_mm": 0.3, "line_width_mm": 0.6, "first_layer_height_mm": 0.3, "support": "auto", "walls": 2}
-NO_COLLECTION = 100_000  # numba's garbage is little and looking for it a tenth of the time
+NO_COLLECTION = 100_000  # numba leaves little garbage, and collecting it takes a tenth of the time
 
 PROGRAM = """;LAYER_CHANGE
 ;TYPE:Outer wall
@@ -63,7 +63,7 @@ G1 Z1 F3000
 
 
 def _judge() -> None:
-    """What every model goes through: what needs support, what it takes to print, and where seams would hide."""
+    """Steps for every model: support need, print time, and places that hide seams."""
     profile = load()
     decompose(
         mesh_of(m3.Manifold.cube((8.0, 8.0, 3.0), True).translate((0.0, 0.0, 1.5))),
@@ -77,7 +77,7 @@ def _judge() -> None:
 
 
 def _sweep() -> None:
-    """The largest kernel of the search, and those that lay out a surface for it."""
+    """The largest kernel of the search, and those that prepare a surface for it."""
     sweep(_remainder(), LEANING[None], 1.0)
 
 
@@ -95,7 +95,7 @@ def _search() -> None:
 
 
 def _limbs(remainder: Remainder) -> None:
-    """The kernels of cuts that take single limbs off."""
+    """Kernels of cuts that remove single limbs."""
     row = np.zeros(1)
     find_limbs(remainder, LimbGrid(LEANING[None], 1.0, row, np.zeros((1, 0, 2)), 0.8, 20.0, 5.0, 100.0, 4.0, 2.0), -0.7)
     limb = replace(PLANE, limbs_mm=remainder.mesh.vertices[:1])
@@ -115,7 +115,7 @@ def _slice() -> None:
 
 
 def _dry_run() -> None:
-    """Read a short program, try it, and hold it against a model."""
+    """Read a short program, dry-run it and compare it with a model."""
     profile = _coarse()
     run = dry_run(PROGRAM.splitlines(), profile)
     agreement(run, mesh_of(m3.Manifold.cube((4.0, 4.0, 1.0), True)), profile)
@@ -151,7 +151,7 @@ def _tee() -> m3.Manifold:
 
 
 def _fin() -> m3.Manifold:
-    """A fin of the tee, thinner and thinner, for walls of varying width."""
+    """A tapering fin of the tee, for walls of variable width."""
     outline = np.array([[0.0, -0.8], [9.0, -0.2], [9.0, 0.2], [0.0, 0.8]])
     return m3.Manifold.extrude(m3.CrossSection([outline]), 12.0)
 
@@ -170,21 +170,21 @@ def _two_parts(profile: Profile) -> Decomposition:
 
 @cache
 def _prepare() -> None:
-    """What a process does before its first bundle."""
+    """Prepare a process for its first bundle."""
     gc.freeze()
     gc.set_threshold(NO_COLLECTION)
     on_compiled(_tell_kernel)
 
 
 def _tell_kernel() -> None:
-    """Tell that a kernel is compiled; one that is not cached is of no use to the one who asks."""
+    """Report a compiled kernel, or exit when it cannot be cached and so cannot help the caller."""
     if trouble():
         os._exit(1)
     tell("a kernel")
 
 
 def compile_bundle(name: str) -> None:
-    """In a worker: compile a bundle and report each kernel. Raises OSError where compiled kernels cannot be kept."""
+    """In a worker: compile a bundle and report each kernel. Raises OSError when compiled kernels cannot be cached."""
     _prepare()
     BUNDLES[name]()
     if trouble():

@@ -1,4 +1,4 @@
-"""Profile file: a machine, a material or a process with a person's settings over it, as the text of a profile of one's own."""
+"""Profile file: the text of a user's profile, a machine, material or process with settings over it."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -15,11 +15,11 @@ Tables = dict[str, Any]
 
 
 def profile_text(kind: str, name: str, settings: Iterable[str] = (), stated: Iterable[str] = ()) -> str:
-    """The text of a profile file that reads back to this profile with these settings.
+    """Text of a profile file that reads back as this profile with these settings.
 
-    It inherits the shipped profile that this one is or goes back to and says what differs; where that cannot say it, as a row
-    taken out of a table, it says all itself. stated: keys that are said although the shipped profile has the same, so that they
-    stay when that changes. Raises ProfileError.
+    It inherits the shipped profile behind this one and states the differences; if that cannot express it, as with a row removed
+    from a table, it states everything. stated: keys to state even if equal to the shipped profile, so that they stay when that
+    changes. Raises ProfileError.
     """
     wanted = load_one(name, settings, kind)
     base, whole = shipped_base(kind, name), _values(wanted)
@@ -35,7 +35,7 @@ def profile_text(kind: str, name: str, settings: Iterable[str] = (), stated: Ite
 
 
 def _values(sections: Mapping[str, Frozen]) -> Tables:
-    """What a file would say; a machine whose table stands still says nothing of its axes."""
+    """All values of a file; a machine with a fixed table has none for its axes."""
     whole = {section: model.model_dump(mode="json") for section, model in sections.items()}
     machine = sections.get("machine")
     if isinstance(machine, Machine) and not machine.tilts:
@@ -44,7 +44,7 @@ def _values(sections: Mapping[str, Frozen]) -> Tables:
 
 
 def _read(kind: str, text: str) -> dict[str, Frozen | None]:
-    """The sections of a profile file; None for one that is not valid."""
+    """The sections of a profile file; None for an invalid one."""
     document = read_toml(text)
     whole: Tables = {section: {} for section in OF_KIND[kind]} | merged(tables(kind, document[PARENT]), own_tables(document))
     return {section: sound_section(section, whole[section]) for section in OF_KIND[kind]}
@@ -57,7 +57,7 @@ def _only(whole: Mapping[str, Any], path: Sequence[str]) -> Tables:
 
 
 def _differing(shared: Mapping[str, Any], whole: Mapping[str, Any]) -> Tables:
-    """The entries of tables that differ from those of others; an empty text for what is left out."""
+    """The entries that differ from shared tables; an empty text for an omitted value."""
     out: Tables = {}
     for key, value in whole.items():
         base = shared.get(key)
@@ -75,7 +75,7 @@ def _text(whole: Mapping[str, Any], head: str = "") -> str:
 
 
 def _blocks(path: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[str]:
-    """A table, then those in it; what is left out of a profile is not written."""
+    """A table, then its subtables, without values that are None."""
     lines = [f"{key_text(key)} = {_value(value)}" for key, value in table.items() if value is not None and not _is_table(value)]
     if path and (lines or not any(map(_is_table, table.values()))):
         yield "\n".join((f"[{'.'.join(map(key_text, path))}]", *lines, ""))
@@ -89,7 +89,7 @@ def _is_table(value: object) -> bool:
 
 
 def _value(value: Any) -> str:
-    """A text of several lines as such where it needs no sign of its own, a long list row by row."""
+    """A multi-line text as a literal block if it needs no escapes, a long list row by row."""
     if (
         isinstance(value, str)
         and "\n" in value

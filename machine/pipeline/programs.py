@@ -1,4 +1,4 @@
-"""Programs: of a model, which is cut, sliced and planned, or of a G-code file as it is; dry-run either way."""
+"""Programs: made from a model by cutting, slicing and planning, or read from a G-code file; dry-run in both cases."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ from profiles.profile import Profile
 
 @dataclass(frozen=True, eq=False)
 class LoadedProgram:
-    """A program and the profile it was tried with, which a G-code file may hold itself. name: of what it prints.
+    """A program and the profile of its dry run, which a G-code file may contain. name: of the printed object.
 
-    source: the G-code file that holds it; None: it is kept beside the journal. machine_known: the machine is told by the file
-    or by the user, not guessed.
+    source: the G-code file that holds it; None: it is saved beside the journal. machine_known: the file or the user names the
+    machine, it is not assumed.
     """
 
     name: str
@@ -33,7 +33,7 @@ class LoadedProgram:
 
 
 def load_program(request: ModelRequest, pictures: bool = False) -> LoadedProgram:
-    """The program of a model or of a G-code file. pictures: a model's has pictures in its head, for it becomes a file.
+    """The program of a model or of a G-code file. pictures: a model's program gets thumbnails, for it becomes a file.
 
     Raises GcodeError for a file that cannot be read.
     """
@@ -56,7 +56,7 @@ def load_program(request: ModelRequest, pictures: bool = False) -> LoadedProgram
 
 
 def _refuse_cuts(request: ModelRequest) -> None:
-    """Raise PlanError where a G-code file is to be cut, sliced or set up anew."""
+    """Raise PlanError for options that would cut, slice or place a G-code file."""
     if request.beside:
         raise PlanError(f"{request.model} is G-code, which is a plate of its own: {request.beside[0]} cannot go beside it")
     cut, sliced = "is cut already", "is sliced already"
@@ -73,7 +73,7 @@ def _refuse_cuts(request: ModelRequest) -> None:
 
 
 def read_gcode_lines(path: Path) -> Lines:
-    """The lines of a G-code file. Raises GcodeError when it cannot be read, is no text or is empty."""
+    """The lines of a G-code file. Raises GcodeError when it is unreadable, not text, or empty."""
     lines = GcodeFile(path).lines()
     if not any(line.strip() for line in lines):
         raise GcodeError(f"G-code file {path} is empty")
@@ -81,7 +81,7 @@ def read_gcode_lines(path: Path) -> Lines:
 
 
 def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
-    """Raise MoveError for a program whose dry run found errors; force: only say so."""
+    """Raise MoveError for a program whose dry run found errors; force: only report them."""
     if not errors:
         return
     count = count_of_errors(errors)
@@ -94,5 +94,5 @@ def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
 
 
 def count_of_errors(errors: Sequence[Finding]) -> str:
-    """How many errors a dry run found, as a sentence; "" when there are none."""
+    """Number of errors of a dry run, as a sentence; "" for none."""
     return f"the dry run found {len(errors)} error{'s' * (len(errors) > 1)}" if errors else ""

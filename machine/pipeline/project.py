@@ -1,8 +1,8 @@
-"""Project: a model with all that decides its print: plan, marks, profiles, placement, pauses, copies.
+"""Project: a model with everything that decides its print: plan, marks, profiles, placement, pauses, copies.
 
-A project's folder holds `work.json`, which says what was asked for and names the other files: the model's file as it was, the
-plan, meshes of modifiers, and profiles that do not ship with the program. The workbench keeps its work in such folders. A project
-file is a 3MF of the model as it lies, which any slicer opens, with a picture and the folder's files under Metadata/tiltprint.
+A project's folder holds `work.json`, with the settings and the names of the other files: the original model file, the plan,
+meshes of modifiers, and profiles that are not shipped. The workbench stores its work in such folders. A project file is a 3MF of
+the oriented model, which any slicer opens, with a picture and the folder's files under Metadata/tiltprint.
 """
 
 import hashlib
@@ -50,31 +50,31 @@ from profiles.messages import option
 from profiles.places import KINDS, PARENT, is_file_name, own, shipped
 from profiles.toml_text import read_toml
 
-STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
+STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # orientation of the file
 PLAN = "plan.toml"
 INSIDE, THUMBNAIL = "Metadata/tiltprint/", "Metadata/thumbnail.png"
 PICTURE_PX = (256, 256)
-MESH_DIGEST = "mesh.sha256"  # of the 3MF's model part, to see whether another program has changed it
+MESH_DIGEST = "mesh.sha256"  # of the 3MF's model part, to detect changes by other programs
 PROGRAM = f"tiltprint {version('tiltprint')}"
 SUFFIX = ".3mf"
-FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: in no other folder, on any disk
-ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-([0-9a-f]{{12}})-")  # to the names of a project's files
+FILE_NAME = re.compile(r"(?!\.)[\w.+-]{1,240}")  # of a file in a project: without a folder, valid on any disk
+ADDED = re.compile(rf"^(model|modifier|{'|'.join(KINDS)})-([0-9a-f]{{12}})-")  # prefix of the names of a project's files
 MOST_FILES, LARGEST_BYTES = 100, 2**30  # of a project: a zip of a few kB can unpack to more than any disk
-DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, OSError)  # of a zip archive
+DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, OSError)  # errors of a damaged zip archive
 PREFIX = "tiltprint-project-"  # of temporary folders
-BEGUN_S = 60.0  # a folder as new as this may belong to a program that has not locked it yet
-_unpacked: list[tuple[TemporaryDirectory[str], str, int | None]] = []  # projects that were opened: folder, file, lock
+BEGUN_S = 60.0  # a newer folder may belong to a program that has not locked it yet
+_unpacked: list[tuple[TemporaryDirectory[str], str, int | None]] = []  # open projects: folder, file, lock
 
 
 def without_folders(text: str) -> str:
-    """A sentence that names a project where it named its temporary folder."""
+    """A message that names a project instead of its temporary folder."""
     for folder, model, _ in _unpacked:
         text = text.replace(f"{folder.name}/.model/", "").replace(folder.name, model)
     return text
 
 
 def close_projects() -> None:
-    """Remove the folders of all projects that were opened; else that is done when the program ends."""
+    """Remove the folders of all open projects, which otherwise happens at the program's exit."""
     while _unpacked:
         folder, _, lock = _unpacked.pop()
         if lock is not None:
@@ -84,13 +84,13 @@ def close_projects() -> None:
 
 @dataclass(frozen=True)
 class Project:
-    """A model and everything that decides its print; files lie in the project's folder once it is read.
+    """A model and everything that decides its print; once read, its files are in the project's folder.
 
-    model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows
-    them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
-    parts: 0 where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the
-    print waits for a person; marks_in_plan: the plan has the boxes that the model's own file marks; figures: of the print,
-    for people and other programs; plate: of the model where that is a slicer file.
+    model: None for a demo, found by its name; own_names: the user's names of profiles that are files, by kind; rotation: rows of
+    the model's rotation after reading; plan: None if the model is neither cut nor marked; parts: 0 before a decomposition;
+    locked: the parts, counted from the second, whose planes are locked; stops: where the print waits for the user; marks_in_plan:
+    the plan includes the boxes of the model's file; figures: of the print, for users and other programs; plate: of the model in a
+    slicer file.
     """
 
     name: str
@@ -109,10 +109,9 @@ class Project:
     marks_in_plan: bool = False
 
     def applied(self, request: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
-        """A request for the model inside: the project decides what the command line leaves open.
+        """A request for the project's model: the project provides what the command line leaves open.
 
-        file: the project; copies: as the user has given it, None for as many as the project has. Raises PlanError for options
-        that do not go with it.
+        file: the project; copies: the user's number, None: the project's. Raises PlanError for conflicting options.
         """
         self.check_plate(request.plate, file)
         own_plan = self.plan if not request.plans and request.planes is None else None
@@ -130,7 +129,7 @@ class Project:
         )
 
     def check_plate(self, plate: int | None, file: Path) -> None:
-        """Raises PlanError where another plate is asked for: the parts of the project are those of one."""
+        """Raise PlanError when another plate is requested: the project's parts belong to one."""
         if plate is not None:
             raise PlanError(f"{option('plate', plate)}: {file} is a project of tiltprint, whose plan is of one plate")
 
@@ -145,15 +144,13 @@ class Project:
 
     @property
     def argument(self) -> str:
-        """What a command line says for MODEL."""
+        """MODEL on a command line."""
         return self.name if self.model is None else str(self.model)
 
 
 def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
-    """Write a project's folder. Older models in it go; profiles and meshes stay, for a step that is undone may name them.
-
-    Raises OSError, ProfileError and PlanError; the record is written last, so that it names only what is there.
-    """
+    """Write a project's folder. Older models in it are deleted; profiles and meshes stay, for an undone step may name them.
+    Raises OSError, ProfileError and PlanError; the record is written last, so that it only names existing files."""
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
     model = "" if project.model is None else _copied(project.model, folder, "model")
     if plan is not None:
@@ -188,7 +185,7 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
 
 
 def _profile_file(folder: Path, kind: str, name: str) -> str:
-    """The name of a file with a profile of the user's own; "" for one that ships with the program."""
+    """Name of the file with a user's profile, which is written if missing; "" for a shipped one."""
     if name in shipped(kind) and name not in own(kind):
         return ""
     text = profile_text(kind, name).encode()
@@ -199,12 +196,12 @@ def _profile_file(folder: Path, kind: str, name: str) -> str:
 
 
 def with_meshes(plan: PlanFile, folder: Path) -> PlanFile:
-    """The plan with copies of the meshes of its marks and modifiers in a folder."""
+    """The plan with the meshes of its marks and modifiers copied to a folder."""
     return _with_mesh_files(plan, lambda file: (folder / _copied(file, folder, "modifier")).absolute())
 
 
 def with_meshes_beside(plan: PlanFile) -> tuple[PlanFile, dict[str, Path]]:
-    """The plan with meshes that lie beside it, under the names that `with_meshes` gives them, and their files by these."""
+    """The plan with meshes beside it, named as `with_meshes` names them, and the original files by these names."""
     files = dict[str, Path]()
 
     def beside(file: Path) -> Path:
@@ -234,7 +231,7 @@ def _check_alone(model: Path | None) -> None:
 
 
 def _digest(file: Path) -> str:
-    """What tells the content of a file from others, as its name in a project has it."""
+    """Digest of a file's content for its name in a project."""
     with file.open("rb") as source:
         return hashlib.file_digest(source, "sha256").hexdigest()[:12]
 
@@ -244,12 +241,12 @@ def _name_inside(file: Path, role: str) -> str:
 
 
 def _bare_name(file: Path) -> str:
-    """The name of a file as it was before it became one of a project."""
+    """A file's name without the prefix of a project."""
     return ADDED.sub("", file.name)
 
 
 def _copied(file: Path, folder: Path, role: str) -> str:
-    """The name in a folder of a copy of a file, which is made where it is not there yet."""
+    """Copy a file into a folder, if it is not there yet; returns its name there."""
     name = _name_inside(file, role)
     if not (folder / name).exists():
         with file.open("rb") as source, whole_file(folder / name) as copy:
@@ -258,7 +255,7 @@ def _copied(file: Path, folder: Path, role: str) -> str:
 
 
 def read_folder(folder: Path) -> Project:
-    """The project in a folder. Raises PlanError with a sentence where it cannot be read, or not by this version."""
+    """The project in a folder. Raises PlanError if it is unreadable or from a newer version."""
     try:
         return _project_of(folder, read_record(folder))
     except NewerError:
@@ -292,7 +289,7 @@ def _project_of(folder: Path, record: Record) -> Project:
 
 
 def _check_inside(folder: Path, project: Project) -> None:
-    """Raise PlanError where the files of an unpacked project are not those that it names, or not as they were saved."""
+    """Raise PlanError when an unpacked project's files are not those it names, or have changed."""
     if project.model is None and not project.name.startswith(DEMO):
         raise PlanError(f"{RECORD}: model is missing")
     if project.model is not None and not project.model.name.startswith("model-"):
@@ -338,15 +335,15 @@ def _toml(file: Path) -> dict[str, Any]:
 
 
 def figures_of(row: FrontRow | None) -> dict[str, float]:
-    """The figures of a decomposition, as far as they are known."""
+    """The known figures of a decomposition."""
     names = ("time_s", "filament_mm", "support_area_mm2", "seam_mm", "cost_mm2")
     return {name: value for name in names if (value := getattr(row, name, None)) is not None}
 
 
 def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
-    """The content of a project file: mesh is the model as it lies, picture a PNG.
+    """Content of a project file. mesh: the oriented model; picture: a PNG.
 
-    Raises OSError, and PlanError for what could not be opened again.
+    Raises OSError, and PlanError for a project that could not be opened again.
     """
     _check_alone(project.model)
     if not is_file_name_anywhere(project.name):
@@ -365,7 +362,7 @@ def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) 
 
 
 def is_project(path: Path) -> bool:
-    """Whether a file is a project that `project_bytes` made, or one that was damaged since."""
+    """Whether a file is a project of `project_bytes`, perhaps damaged."""
     if path.suffix.lower() != SUFFIX or not path.is_file():
         return False
     try:
@@ -376,23 +373,23 @@ def is_project(path: Path) -> bool:
 
 
 def open_project(model: str) -> Project | None:
-    """A project file, unpacked for as long as the program runs; None for any other MODEL. Raises PlanError."""
+    """A project file, unpacked until the program exits; None for any other MODEL. Raises PlanError."""
     if model.startswith(DEMO) or not is_project(Path(model)):
         return None
     _tidy()
     folder = TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True)
-    lock = lock_folder(Path(folder.name))  # for as long as the program runs
+    lock = lock_folder(Path(folder.name))  # until the program exits
     _unpacked.append((folder, model, lock))
     project = unpack(Path(model), Path(folder.name))
     if project.model is None:
         return project
-    named = Path(folder.name) / ".model" / Path(project.name).name  # messages and G-code say the name that the model had
+    named = Path(folder.name) / ".model" / Path(project.name).name  # messages and G-code show the model's original name
     named.parent.mkdir()
     return replace(project, model=project.model.rename(named))
 
 
 def _tidy() -> None:
-    """Remove the folders of programs that were killed while they had a project open."""
+    """Remove the folders of programs that were killed with a project open."""
     for folder in Path(gettempdir()).glob(f"{PREFIX}*"):
         with suppress(OSError):
             if time() - folder.stat().st_mtime > BEGUN_S and (lock := lock_folder(folder, surely=True)) is not None:
@@ -421,7 +418,7 @@ def unpack(path: Path, folder: Path) -> Project:
 
 
 def _extract(archive: zipfile.ZipFile, folder: Path) -> bool:
-    """Unpack a project's files; whether its model for other slicers has been changed. Raises PlanError."""
+    """Unpack a project's files; returns whether its model for other slicers was changed. Raises PlanError."""
     entries = [entry for entry in archive.infolist() if entry.filename.startswith(INSIDE)]
     names = {entry.filename for entry in archive.infolist()}
     for name in (MODEL_PART, INSIDE + MESH_DIGEST, INSIDE + RECORD):

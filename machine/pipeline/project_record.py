@@ -1,4 +1,4 @@
-"""Project record: what `work.json` of a project says, and its checks."""
+"""Project record: the content of a project's `work.json`, and its checks."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,11 +15,11 @@ from profiles.wording import LONGEST_VALUE, sentences
 
 VERSION = 1
 RECORD = "work.json"
-LONGEST_NAME = 255  # bytes of a file's name on any disk
+LONGEST_NAME = 255  # bytes of a file name on any disk
 
 
 class NewerError(PlanError):
-    """A record of a newer version of this program."""
+    """A record from a newer version of this program."""
 
 
 def _not_newer(value: object) -> object:
@@ -33,7 +33,7 @@ class _Table(BaseModel):
 
 
 class GivenRecord(_Table):
-    """Names of profiles, or files of the project, and KEY=VALUE settings over them."""
+    """Names of profiles or of the project's files, and KEY=VALUE settings over them."""
 
     machine: str
     material: str
@@ -42,7 +42,7 @@ class GivenRecord(_Table):
 
 
 class Record(_Table):
-    """A project's record, with the values of machine.pipeline.project.Project. model: a file of the project; "": it is a demo."""
+    """A project's record, with the values of machine.pipeline.project.Project. model: a file of the project; "": a demo."""
 
     version: Annotated[int, BeforeValidator(_not_newer), Field(ge=1)]
     program: str = ""
@@ -78,7 +78,7 @@ class Record(_Table):
 
     @property
     def stops(self) -> tuple[Stop, ...]:
-        """Where the print waits for a person. Raises ValueError."""
+        """Where the print waits for the user. Raises ValueError."""
         try:
             return parse_stops(self.pauses, self.changes)
         except SliceError as error:
@@ -86,7 +86,7 @@ class Record(_Table):
 
 
 def is_file_name_anywhere(name: str) -> bool:
-    """Whether a file on any disk could have this name."""
+    """Whether a name is valid for a file on any disk."""
     try:
         size = len(name.encode())
     except UnicodeEncodeError:
@@ -98,7 +98,7 @@ def is_file_name_anywhere(name: str) -> bool:
 def read_record(folder: Path) -> Record:
     """The record of a project in a folder.
 
-    Raises OSError, NewerError for one of a newer version, and PlanError with a sentence on what is wrong with it.
+    Raises OSError, NewerError for a newer version, and PlanError with a sentence about its first problem.
     """
     text = (folder / RECORD).read_bytes()
     try:
@@ -108,7 +108,7 @@ def read_record(folder: Path) -> Record:
 
 
 def checked_record(**values: Any) -> Record:
-    """The record of these values. Raises PlanError with a sentence on what is wrong with them."""
+    """The record of these values. Raises PlanError with a sentence about its first problem."""
     try:
         return Record(**values)
     except ValidationError as error:
@@ -116,7 +116,7 @@ def checked_record(**values: Any) -> Record:
 
 
 def _in_words(error: ValidationError) -> str:
-    """A sentence on the first problem of a record."""
+    """A sentence about the first problem of a record."""
     problem: Any = error.errors(include_url=False)[0]
     *_, last = path = problem["loc"] or ("",)
     if problem["type"] == "json_invalid":

@@ -1,4 +1,4 @@
-"""Raster: triangles to pixels without a display: z-buffer, smooth shading, one shadow, drawn edges, supersampling."""
+"""Raster: renders triangles without a display: z-buffer, smooth shading, one shadow, drawn edges, supersampling."""
 
 from collections.abc import Sequence
 from math import cos, radians, sin
@@ -15,15 +15,15 @@ Image = NDArray[np.uint8]
 Size = tuple[int, int]
 
 RED = np.array([214.0, 39.0, 40.0])
-RED_LIGHT = 0.88  # risky faces look down into the dark, so they get at least this share of light
+RED_LIGHT = 0.88  # minimum light of risky faces, which face downward into the dark
 SUPERSAMPLING = 2
-MARGIN = 0.06  # share of the picture kept free on every side
+MARGIN = 0.06  # fraction of the picture kept free on every side
 CREASE_COSINE = cos(radians(35.0))  # faces that meet at a sharper angle get an edge instead of a blended normal
 SHADOW_MAP_PIXELS = 1400
 
 
 def camera(toward: Floats, up: Floats = UP) -> Floats:
-    """Axes of an orthographic camera: (3, 3) rows right, up and toward the camera, unit and mutually square.
+    """Axes of an orthographic camera: (3, 3) rows right, up and toward the camera, orthonormal.
 
     toward: from the scene to the camera; up: upright in the picture.
     """
@@ -34,7 +34,7 @@ def camera(toward: Floats, up: Floats = UP) -> Floats:
 
 
 def seen_from(azimuth_deg: float, elevation_deg: float) -> Floats:
-    """The camera's axes at an azimuth (0: on +x, 90: on +y) and an elevation, z upright."""
+    """Camera axes for an azimuth (0: on +x, 90: on +y) and an elevation, with z upright."""
     a, e = radians(azimuth_deg), radians(elevation_deg)
     return camera(np.array([cos(e) * cos(a), cos(e) * sin(a), sin(e)]))
 
@@ -51,7 +51,7 @@ def draw(
     """A picture (h, w, 3), uint8, of meshes on white.
 
     colours: (n, 3), 0 to 255, one per mesh; axes: of the camera; reds: per mesh a mask (m,) of the faces painted red, or None;
-    size: width and height in pixels; span_mm: what the picture's shorter side shows (absent: the scene fills it).
+    size: width and height in pixels; span_mm: extent of the picture's shorter side (None: the scene fills it).
     """
     axes = seen_from(-60.0, 18.0) if axes is None else axes
     width, height = size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING
@@ -77,7 +77,7 @@ def draw(
 
 
 def corner_normals(mesh: Mesh) -> Floats:
-    """(m, 3, 3) unit normal at each corner of each face: the faces around its vertex blended up to the crease angle."""
+    """(m, 3, 3) unit normals at the corners of faces: averages over the faces around a vertex up to the crease angle."""
     order = np.argsort(mesh.faces, axis=None, kind="stable")
     first = np.searchsorted(mesh.faces.ravel()[order], np.arange(len(mesh.vertices) + 1))
     blended: Floats = _blend(mesh.faces, order // 3, first, mesh.normals, mesh.areas_mm2)
@@ -85,7 +85,7 @@ def corner_normals(mesh: Mesh) -> Floats:
 
 
 def _paint(mesh: Mesh, colour: Floats, red: NDArray[np.bool_] | None) -> Floats:
-    """(m, 4) red, green, blue and the least light of each face."""
+    """(m, 4) red, green, blue and the minimum light of each face."""
     paint = np.repeat(np.append(colour, 0.0)[None, :], len(mesh.faces), axis=0)
     if red is not None:
         paint[red] = np.append(RED, RED_LIGHT)
@@ -108,13 +108,13 @@ def _to_screen(seen: Floats, scale: float, size: Size) -> Floats:
 
 @helper
 def _dot(a: Any, b: Any) -> float:
-    """Written out: numba's own would need scipy."""
+    """Dot product, written out because numba's needs scipy."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @kernel
 def _blend(faces: Ints, around: NDArray[np.int64], first: NDArray[np.int64], normals: Floats, areas: Floats) -> Floats:
-    """As corner_normals; around: the faces of vertex v from first[v] on."""
+    """Kernel of corner_normals; around: faces of vertex v at first[v]:first[v + 1]."""
     out = np.zeros((len(faces), 3, 3))
     for f in range(len(faces)):
         for k in range(3):
@@ -129,7 +129,7 @@ def _blend(faces: Ints, around: NDArray[np.int64], first: NDArray[np.int64], nor
 
 @kernel
 def z_buffer(screen: Floats, width: int, height: int) -> tuple[Floats, Ints]:
-    """Depth (h, w), greatest is nearest, and face index (h, w), -1 where nothing is; screen as from _to_screen."""
+    """Depth (h, w), greatest is nearest, and face index (h, w), -1 for background; screen: result of _to_screen."""
     depth = np.full((height, width), -np.inf)
     face = np.full((height, width), -1, dtype=np.int32)
     for f in range(len(screen)):
@@ -155,7 +155,7 @@ def z_buffer(screen: Floats, width: int, height: int) -> tuple[Floats, Ints]:
 
 @no_nrt
 def _lit_share(shadow: Floats, x: float, y: float, d: float, bias: float) -> float:
-    """Share of the shadow map's texels around a point that see it: percentage-closer filtering over 5 x 5 texels."""
+    """Lit share around a point of the shadow map: percentage-closer filtering over 5 x 5 texels."""
     column, row = int(x), int(y)
     height, width = shadow.shape
     seen = 0
@@ -178,10 +178,10 @@ def _shade(
     to_light: Floats,
     axes: Floats,
 ) -> tuple[Floats, Floats]:
-    """Colour (h, w, 3) and the normal in camera axes (h, w, 3) of every pixel.
+    """Colour (h, w, 3) and normal in camera axes (h, w, 3) of every pixel.
 
-    screen, lit: (m, 3, 3) corners as the camera and as the light sees them; normals: (m, 3, 3); paint: (m, 4); face: (h, w) as
-    z_buffer gives it; shadow: depths as the light sees them; bias: how much farther still counts as lit.
+    screen, lit: (m, 3, 3) corners seen by the camera and by the light; normals: (m, 3, 3); paint: (m, 4); face: (h, w) of
+    z_buffer; shadow: depths seen by the light; bias: depth tolerance of lit points.
     """
     height, width = face.shape
     colour = np.full((height, width, 3), 255.0)
@@ -214,7 +214,7 @@ def _shade(
 
 @kernel
 def _draw_edges(colour: Floats, group: NDArray[np.int64], depth: Floats, bent: Floats, pixel_mm: float) -> None:
-    """Darken pixels at outlines, creases and borders between meshes. group: (h, w) the mesh that a pixel shows, -1: none."""
+    """Darken pixels at outlines, creases and borders between meshes. group: (h, w) mesh of each pixel, -1: none."""
     height, width = group.shape
     for row in range(height - 1):
         for column in range(width - 1):

@@ -1,4 +1,4 @@
-"""Requests: what a person asks a command for, as values: the command line makes them, the commands take them."""
+"""Requests: the user's orders to commands, as values made by the command line."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,28 +12,28 @@ if TYPE_CHECKING:
     from machine.planning.stops import Stop
     from profiles.profile import Profile
 
-STDOUT = Path("-")  # stands for standard output where a file is asked for
-PLACING = ("process.scale", "process.rotate_deg", "process.place_mm")  # how a model lies and stands
+STDOUT = Path("-")  # standard output as a file
+PLACING = ("process.scale", "process.rotate_deg", "process.place_mm")  # position and orientation of a model
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
-SIMULATED = "sim"  # the port that stands for the simulated printer
+SIMULATED = "sim"  # the port of the simulated printer
 BAUD = 115200
-UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
+UPLOAD_MIB = 256  # the largest upload from a page: five million facets of a binary STL
 MOST_COPIES = 1000  # of a model, and models on a plate
-FORCE_GOES_ON = phrase("force", "--force goes on")  # how a sentence says that its error is forcible
+FORCE_GOES_ON = phrase("force", "--force goes on")  # ending of a forcible error's message
 
 
 def check_copies(count: int, said: str) -> None:
-    """Raise PlanError for a number of copies, as it was said, that cannot be."""
+    """Raise PlanError for an invalid number of copies. said: its name in messages."""
     if not 1 <= count <= MOST_COPIES:
         raise PlanError(f"{said} is {count}: 1 to {MOST_COPIES} is allowed")
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files to write; None: not asked for. For gcode and json the path - stands for standard output.
+    """Files to write; None: not requested. For gcode and json the path - is standard output.
 
     folder: for parts, decomposition and plan; sheet: picture of the print order; front: picture of every number of parts; record:
-    what the search saw; plan: what a later run cuts without a search; layer: which one the svg shows, as PART:LAYER.
+    of the search; plan: for later runs without a search; layer: the one in the svg, as PART:LAYER.
     """
 
     folder: Path | None = None
@@ -56,16 +56,16 @@ class Outputs:
 
 @dataclass(frozen=True)
 class ModelRequest:
-    """A model or a G-code file and what is to be made of it.
+    """A model or a G-code file and what to make of it.
 
-    chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
-    model down in the cheapest orientation; None: where nothing says how it lies. plans: files whose planes are cut instead of a
-    search, one for each model that has one; parts: the most parts; planes: file of planes by hand that the search starts from.
-    compare: with the same model in one part. force: go on although the dry run found errors. profile_names, settings: machine,
-    material and process as the user has given them, names or files, and KEY=VALUE over them. project: the project file that the
-    model comes from; own_marks: the boxes that the model's own file marks count beside those of the plan, which has them else.
-    stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other models there.
-    plate: of each model's slicer file; None: the first that holds something.
+    chosen_sections: sections of the profile named by the user, which take precedence over a G-code file's own. orient: search for
+    the cheapest orientation; None: if nothing else gives one. plans: files whose planes are cut instead of a search, at most one
+    per model; parts: the most parts; planes: file of user-defined planes that the search starts from. compare: with the same
+    model in one part. force: continue although the dry run found errors. profile_names, settings: the user's machine, material
+    and process, names or files, and KEY=VALUE over them. project: the project file of the model; own_marks: the boxes marked in
+    the model's file count beside those of the plan, which otherwise includes them. stops: where the print waits for the user.
+    copies: of each model on the plate; beside: the other models there. plate: of each model's slicer file; None: the first that
+    is not empty.
     """
 
     model: str
@@ -90,12 +90,12 @@ class ModelRequest:
 
     @property
     def name(self) -> str:
-        """The name that files and messages carry: the file's name without its folder, of the first of several models."""
+        """Name of the (first) model for files and messages: the file's name without its folder."""
         return self.model if self.model.startswith("demo:") else Path(self.model).name
 
     @property
     def plan(self) -> Path | None:
-        """The plan of the only model; None: there is none."""
+        """The plan of a single model, or None."""
         return self.plans[0] if self.plans else None
 
     @property
@@ -106,7 +106,7 @@ class ModelRequest:
 
 @dataclass(frozen=True)
 class Given:
-    """What a profile is made of: the names of its machine, material and process, and KEY=VALUE settings over them."""
+    """Sources of a profile: names of machine, material and process, and KEY=VALUE settings over them."""
 
     machine: str = "generic_ac"
     material: str = "pla"
@@ -114,9 +114,9 @@ class Given:
     settings: tuple[str, ...] = ()
 
     def replaced(self, names: Sequence[str | None], settings: Sequence[str]) -> "Given":
-        """The same with other profiles, where a machine, a material or a process is named, and with further settings.
+        """Sources with other profiles and further settings.
 
-        A setting goes with the profile that is replaced; how the model lies and stands stays.
+        A replaced profile takes its settings with it, except position and orientation.
         """
         kinds = ("machine", "material", "process")
         changed = {kind: name for kind, name in zip(kinds, names, strict=True) if name is not None}
@@ -125,6 +125,6 @@ class Given:
 
 
 def _kind(setting: str) -> str:
-    """Which profile a KEY=VALUE setting belongs to; those of the search go with the process."""
+    """The kind of profile to which a KEY=VALUE setting belongs; search settings belong to the process."""
     section = setting.partition(".")[0].strip()
     return "process" if section == "search" else section
