@@ -1,1 +1,1 @@
-"""Setup: getting to know a machine: what its firmware says, where its axes are, how its joints hold."""
+"""Setup of a machine: detection from its firmware, calibration of its axes, and coupons that measure its joints."""

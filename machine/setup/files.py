@@ -1,7 +1,7 @@
-"""Files of setup: sheets that a person fills in, and profiles of the person's own.
+"""Files of setup: sheets that the user fills in, and profiles of the user.
 
-A sheet is a TOML file that the program writes with numbers left open, and reads again when they are filled in. What reads one
-raises ProfileError that names the file and what is wrong in it.
+A sheet is a TOML file written with numbers left open, and read again when they are filled in. The readers raise ProfileError
+naming the file and the fault.
 """
 
 import tomllib
@@ -17,12 +17,12 @@ from profiles.places import PARENT, merged, own, own_folder, parse, shipped
 
 
 def quoted(text: str) -> str:
-    """A text as a value of TOML, as it is typed where that is possible."""
+    """A text as a TOML value, literal if possible."""
     return tomlkit.string(text, literal=text.isprintable() and "'" not in text).as_string()
 
 
 def read_document(path: Path, keys: Sequence[str], of: str) -> Mapping[str, Any]:
-    """A sheet that has no keys but these; of: whose sheet it is, for the message."""
+    """A sheet with only these keys; of: its owner, for messages."""
     document = parse(path, "sheet")
     unknown = [key for key in document if key not in keys]
     if unknown:
@@ -39,7 +39,7 @@ def rows_of(path: Path, document: Mapping[str, Any], key: str) -> list[Mapping[s
 
 
 def check_row(path: Path, label: str, row: Mapping[str, Any], keys: Sequence[str]) -> None:
-    """Refuse a table that has other keys."""
+    """Raise ProfileError for a table with other keys."""
     unknown = [key for key in row if key not in keys]
     if unknown:
         allowed = f"{', '.join(keys[:-1])} and {keys[-1]}"
@@ -47,15 +47,14 @@ def check_row(path: Path, label: str, row: Mapping[str, Any], keys: Sequence[str
 
 
 def number(path: Path, key: str, value: object) -> float:
-    """A finite number."""
+    """A finite number. Raises ProfileError."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
         raise ProfileError(f"{path}: {key} is {value!r}: it must be a number")
     return float(value)
 
 
 def own_profile(kind: str, name: str, parent: str, tables: Mapping[str, Any]) -> tuple[Path, str]:
-    """The file in the user's folder for a kind of profile and its new text: what it holds already, comments too, the new tables
-    over it."""
+    """Path and new text of a user's profile: its present content, comments included, with the new tables over it."""
     file = own_folder(kind) / f"{name}.toml"
     if name not in own(kind):
         known = parent in (*shipped(kind), *own(kind))
@@ -64,12 +63,12 @@ def own_profile(kind: str, name: str, parent: str, tables: Mapping[str, Any]) ->
     document = tomlkit.parse(file.read_text(encoding="utf-8"))
     _overlay(document, tables)
     text = tomlkit.dumps(document)
-    # Beside dotted keys tomlkit puts a new table before the keys that follow: then the comments are given up.
+    # With dotted keys tomlkit puts a new table before the keys that follow: then the comments are lost.
     return file, text if tomllib.loads(text) == whole else tomlkit.dumps(whole)
 
 
 def _overlay(table: MutableMapping[str, Any], values: Mapping[str, Any]) -> None:
-    """Put values into a table, its other keys left as they are."""
+    """Put values into a table and keep its other keys."""
     for key, value in values.items():
         below = table.get(key)
         if isinstance(value, Mapping) and isinstance(below, MutableMapping):

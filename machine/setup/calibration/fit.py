@@ -1,9 +1,10 @@
-"""Fit: the signs, zeros and points of both rotary axes that put every touch onto one mark of the table, by least squares.
+"""Least-squares fit of the rotary axes: signs, zeros and points that map every touch to one mark on the table.
 
-The mark is a point fixed to the table at a known height over its surface. Where the tip touches it at several poses, the forward
-kinematics must give the same workpiece point each time. Unknown are the mark's place, the point at which the turn axis meets the
-table, the tilt axis's place across itself, the tilt at which the table is level, and both signs; where they are asked for, also
-the directions of the axes: two small angles of the tilt axis, and the turn axis's lean along it; about it is the tilt's zero.
+The mark is fixed to the table at a known height above its surface. Wherever the tip touches it, at any pose, the forward
+kinematics must give the same workpiece point. The unknowns are the mark's position, the point where the turn axis meets the
+table, the position of the tilt axis across itself, the tilt at which the table is level, and both signs. On request also the
+directions of the axes: two small angles of the tilt axis, and the lean of the turn axis along it; the lean about it is the tilt's
+zero.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,8 +23,8 @@ from profiles.machine import UPRIGHT, Machine
 
 TURN_POINT = tuple(f"turn.point_mm {letter}" for letter in "xyz")
 UNKNOWN = (*TURN_POINT, "tilt.point_mm", "tilt.point_mm", "tilt.zero_deg", "the mark's x", "the mark's y")
-DIRECTIONS = ("tilt.axis", "tilt.axis", "turn.axis")  # angles in degrees from where the profile has the axes
-DIGITS = {"axis": 6}  # a millionth of a unit vector is a tenth of a micrometre at 100 mm; of other numbers four digits are kept
+DIRECTIONS = ("tilt.axis", "tilt.axis", "turn.axis")  # angles in degrees from the profile's axes
+DIGITS = {"axis": 6}  # a millionth of a unit vector is a tenth of a micrometre at 100 mm; other numbers keep four digits
 KEYS = (*(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "point_mm")), "machine.tilt.zero_deg")
 TURN_ZERO, AXES = ("machine.turn.zero_deg",), ("machine.tilt.axis", "machine.turn.axis")
 SIGNS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
@@ -31,20 +32,20 @@ UPSIDE_DOWN_DEG = 90.0
 STARTS_DEG = (0.0, 25.0, -25.0)
 ROUNDS = 40
 STEP = 1e-4
-PULL = 0.01  # a touch is some hundredths of a mm off, a profile's numbers some mm
-LITTLE = 1e-7  # a squared sum that falls by a smaller share is the least
-HOPELESS = 400.0  # times the mean square of the best signs: such others are not worth another fit
-SETTLED = 1e-7  # mm and deg: numbers that change by less are found
-LEAST_SHARE = 1e-4  # a number that moves no touch by this share of its change is not determined by them
-APART = 4.0  # the next best signs must fit this much worse
+PULL = 0.01  # touches are some hundredths of a mm off, a profile's numbers some mm
+LITTLE = 1e-7  # a sum of squares that falls by a smaller fraction has converged
+HOPELESS = 400.0  # times the mean square of the best signs: no further fit for such signs
+SETTLED = 1e-7  # mm and deg: smaller changes mean convergence
+LEAST_SHARE = 1e-4  # a number that moves no touch by this fraction of its change is undetermined
+APART = 4.0  # ratio by which the next best signs must fit worse
 LEAST_MM = 1e-3
-MOST_LEAN_DEG = degrees(acos(UPRIGHT))  # of a turn axis that a profile may have
+MOST_LEAN_DEG = degrees(acos(UPRIGHT))  # greatest lean of a profile's turn axis
 GOOD_MM = 0.5  # a fit as good as this needs no other start
 
 
 @dataclass(frozen=True)
 class Touch:
-    """X Y Z at which the tip touched the mark (or, with on_plate, the table's surface anywhere) at a pose."""
+    """Position X Y Z of the tip on the mark (with on_plate: anywhere on the table's surface) at a pose."""
 
     pose: Pose
     at_mm: tuple[float, float, float]
@@ -53,7 +54,7 @@ class Touch:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A machine with the found numbers, how far the touches are from them, and how sure each number is (one sigma, mm or deg).
+    """A calibrated machine, the residuals of the touches, and the uncertainty of each number (one sigma, mm or deg).
 
     errors_mm: X Y Z of each residual, in the workpiece frame.
     """
@@ -65,32 +66,32 @@ class Calibration:
 
     @property
     def residuals_mm(self) -> tuple[float, ...]:
-        """How far each touch is from the mark."""
+        """Distance of each touch from the mark, mm."""
         return tuple(float(np.linalg.norm(error)) for error in self.errors_mm)
 
     @property
     def directions(self) -> bool:
-        """Whether the directions of the axes were sought, too."""
+        """Whether the directions of the axes were fitted too."""
         return DIRECTIONS[0] in self.sigma
 
     @property
     def rms_mm(self) -> float:
-        """Root mean square of how far the touches are from the mark."""
+        """Root mean square of the residuals, mm."""
         return float(np.sqrt(np.mean(np.square(self.residuals_mm))))
 
     @property
     def worst(self) -> int:
-        """Which touch, counted from 1, is farthest off."""
+        """Number of the touch with the largest residual, from 1."""
         return int(np.argmax(self.residuals_mm)) + 1
 
 
 def least_squares(
     residuals: Callable[[Floats], Floats], numbers: Floats, pull: float = 0.0, little: float = LITTLE
 ) -> tuple[Floats, Floats]:
-    """(k,) numbers near to given ones at which the sum of squares of (n,) residuals is least, and the residuals there.
+    """Minimise the sum of squares of (n,) residuals over (k,) numbers; returns the numbers and the residuals there.
 
-    By Levenberg's damped least squares. pull: how strongly the numbers are drawn to where they begin, as a share of a residual's
-    own weight: what the residuals do not determine stays there. little: the share of the sum that the next step must save.
+    Levenberg-Marquardt. pull: weight that draws the numbers to their start, as a fraction of a residual's weight, so that
+    undetermined numbers stay there. little: smallest relative decrease of the sum that calls for another step.
     """
     usual, damping, count = numbers, 1e-3, len(numbers)
     here = np.append(residuals(numbers), np.zeros(count))
@@ -112,20 +113,20 @@ def least_squares(
 
 
 def slope_of(function: Callable[[Floats], Floats], numbers: Floats) -> Floats:
-    """(n, k) derivative of a function's (n,) values by each number, from both sides."""
+    """(n, k) derivative of a function's (n,) values by each number, by central differences."""
     steps = STEP * np.eye(len(numbers))
     return np.column_stack([function(numbers + step) - function(numbers - step) for step in steps]) / (2.0 * STEP)
 
 
 def numbers_of(machine: Machine) -> Floats:
-    """(6,) those of UNKNOWN that are a machine's own. The point of the tilt axis is given across that axis."""
+    """(6,) values of the machine's numbers in UNKNOWN. The point of the tilt axis is given across that axis."""
     across = frame_across(unit(machine.tilt.axis))
     return np.array([*machine.turn.point_mm, *across @ np.array(machine.tilt.point_mm), machine.tilt.zero_deg])
 
 
 def machine_with(machine: Machine, numbers: Floats) -> Machine:
-    """The machine with these numbers, as in UNKNOWN and DIRECTIONS; directions that are not among them are its own, to the
-    digit, and so is the point of the tilt axis along that."""
+    """The machine with the numbers of UNKNOWN and, if given, DIRECTIONS. The tilt axis's point keeps its component along the
+    axis, and directions not given stay exactly as they are."""
     along = unit(machine.tilt.axis)
     across = frame_across(along)
     point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[3:5] @ across
@@ -133,7 +134,7 @@ def machine_with(machine: Machine, numbers: Floats) -> Machine:
     turn: dict[str, object] = {"point_mm": tuple(numbers[:3].tolist())}
     if len(numbers) > len(UNKNOWN):
         angles, upright = np.tan(np.radians(numbers[len(UNKNOWN) :])), unit(machine.turn.axis)
-        lean = unit(along - (along @ upright) * upright)  # about the tilt axis itself it is the tilt's zero
+        lean = unit(along - (along @ upright) * upright)  # lean about the tilt axis is the tilt's zero
         tilt["axis"] = tuple(unit(along + angles[:2] @ across).tolist())
         turn["axis"] = tuple(unit(upright + angles[2] * lean).tolist())
     changed = {"tilt": machine.tilt.model_copy(update=tilt), "turn": machine.turn.model_copy(update=turn)}
@@ -141,8 +142,8 @@ def machine_with(machine: Machine, numbers: Floats) -> Machine:
 
 
 def _residuals(machine: Machine, touches: Sequence[Touch], height_mm: float) -> Callable[[Floats], Floats]:
-    """Where touches lie from the mark, x y z each, by the numbers of the machine; of a touch on the plate the height over the
-    table alone."""
+    """Function of a machine's numbers for the offsets of touches from the mark, x y z each; for touches on the plate only the
+    height above the table."""
     here, measured = _positions(touches), _measured(touches)
     heights_mm = np.array([0.0 if touch.on_plate else height_mm for touch in touches])
 
@@ -161,11 +162,11 @@ def calibrate(
     mark_angle_deg: float | None = None,
     directions: bool = False,
 ) -> Calibration:
-    """The machine whose kinematics put all touches onto one mark mark_height_mm above the table.
+    """The machine whose kinematics map all touches to one mark mark_height_mm above the table.
 
-    mark_angle_deg: where the mark is seen from the turn axis, counted from the workpiece's +x: then turn.zero_deg is found
-    too, else it stays. directions: find those of the axes, too, up to a few degrees from the profile's. Raises ProfileError when
-    the touches cannot tell all numbers or both signs.
+    mark_angle_deg: direction of the mark from the turn axis, from the workpiece's +x: then turn.zero_deg is found too, otherwise
+    it stays. directions: also fit those of the axes, up to a few degrees from the profile's. Raises ProfileError when the touches
+    do not determine all numbers or both signs.
     """
     _check_count(touches, len(UNKNOWN) + (len(DIRECTIONS) if directions else 0))
     signed, numbers = _best(machine, touches, mark_height_mm, directions)
@@ -185,14 +186,14 @@ def calibrate(
 def estimate(
     machine: Machine, touches: Sequence[Touch], mark_mm: tuple[float, float, float]
 ) -> tuple[Machine, tuple[float, float, float]]:
-    """The machine and the mark as far as a few touches determine them: the rest, and both signs, stay as given."""
+    """The machine and the mark as far as a few touches determine them; other numbers, and both signs, stay."""
     begin = np.append(numbers_of(machine), [*mark_mm[:2], *np.zeros(len(DIRECTIONS))])
     numbers, _ = least_squares(_residuals(machine, touches, mark_mm[2]), begin, PULL)
     return machine_with(machine, numbers), (float(numbers[6]), float(numbers[7]), mark_mm[2])
 
 
 def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, directions: bool) -> tuple[Machine, Floats]:
-    """The machine with the signs that fit, and the numbers that fit best with them."""
+    """The machine with the best signs, and the best numbers for them."""
     signed = [_with_signs(machine, *signs) for signs in SIGNS]
     best = [(np.inf, np.zeros(0)) for _ in signed]
     for start_deg in STARTS_DEG:
@@ -225,14 +226,14 @@ def _with_signs(machine: Machine, tilt: int, turn: int) -> Machine:
 
 
 def _fit(machine: Machine, touches: Sequence[Touch], height_mm: float, numbers: Floats) -> tuple[float, Floats]:
-    """Mean square and numbers of the best fit near to some numbers; one that sees the table from below is none."""
+    """Mean square and numbers of the best fit near given numbers; inf if the table would be upside down."""
     numbers, off = least_squares(_residuals(machine, touches, height_mm), numbers)
     upside_down = abs(numbers[5] - machine.tilt.zero_deg) > UPSIDE_DOWN_DEG
     return np.inf if upside_down else float(off @ off) / len(off), numbers
 
 
 def _start(machine: Machine, touches: Sequence[Touch], zero_add_deg: float) -> Floats:
-    """The profile's own numbers, the tilt's zero so far from its own, the mark where the touches put it."""
+    """Start of a fit: the profile's numbers, the tilt's zero shifted, and the mean of the touches as mark."""
     numbers = np.append(numbers_of(machine), [0.0, 0.0])
     numbers[5] += zero_add_deg
     of_mark = [touch for touch in touches if not touch.on_plate] or touches
@@ -241,7 +242,7 @@ def _start(machine: Machine, touches: Sequence[Touch], zero_add_deg: float) -> F
 
 
 def _sigma(residuals: Callable[[Floats], Floats], numbers: Floats) -> dict[str, float]:
-    """How sure each number is; raises ProfileError for those that the touches do not determine."""
+    """Uncertainty of each number. Raises ProfileError for numbers that the touches do not determine."""
     sought = (*UNKNOWN, *DIRECTIONS)[: len(numbers)]
     _, sizes, directions = np.linalg.svd(slope_of(residuals, numbers), full_matrices=False)
     if len(sizes) < len(numbers) or sizes[-1] < LEAST_SHARE * sizes[0]:
@@ -259,7 +260,7 @@ def _sigma(residuals: Callable[[Floats], Floats], numbers: Floats) -> dict[str, 
 
 
 def _check_sound(machine: Machine, calibrated: Machine) -> None:
-    """Refuse numbers that no profile may have."""
+    """Raise ProfileError for numbers that a profile cannot have."""
     least, most = machine.tilt.limits_deg
     if not least <= calibrated.tilt.zero_deg <= most:
         raise ProfileError(
@@ -297,7 +298,7 @@ def _set_turn_zero(
 
 
 def _measured(touches: Sequence[Touch]) -> np.ndarray:
-    """(n, 3) which of x y z each touch measures."""
+    """(n, 3) mask of the coordinates that each touch measures."""
     return np.array([[not touch.on_plate, not touch.on_plate, True] for touch in touches])
 
 
@@ -307,9 +308,9 @@ def _positions(touches: Sequence[Touch]) -> Floats:
 
 
 def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) -> dict[str, Any]:
-    """The tables of the calibrated profile: numbers, sources, and what is left uncalibrated.
+    """Tables of the calibrated profile: numbers, sources, and the keys still uncalibrated.
 
-    zero_of_turn: the mark's direction is known, so that the turn's zero is found, too.
+    zero_of_turn: the mark's direction is known, so that the turn's zero is found too.
     """
     keys = (*KEYS, *(TURN_ZERO if zero_of_turn else ()), *(AXES if calibration.directions else ()))
     source = f"tiltprint calibrate, {len(calibration.residuals_mm)} touches, {calibration.rms_mm:.3f} mm off"
@@ -317,7 +318,7 @@ def fitted_tables(before: Machine, calibration: Calibration, zero_of_turn: bool)
 
 
 def found_tables(before: Machine, after: Machine, keys: Sequence[str], source: str) -> dict[str, Any]:
-    """The tables of a profile in which these keys of the rotary axes are found: numbers, sources, what is left uncalibrated."""
+    """Tables of a profile with these keys of the rotary axes: values, source, and the keys still uncalibrated."""
     axes: dict[str, dict[str, Any]] = {"tilt": {}, "turn": {}}
     for key in keys:
         _, axis, name = key.split(".")

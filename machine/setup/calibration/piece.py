@@ -1,12 +1,10 @@
-"""The calibration piece: what a print of `demo:calibration` shows of where the rotary axes are.
+"""Calibration piece: a print of `demo:calibration`, which shows where the rotary axes are.
 
-Its pads lie on its roofs, each laid there at a pose of its own. How a pad lies shows how far the axes are from where the program
-took them to be: it should be laid at a place of the workpiece, and was laid where the true machine had its tip then. The roof
-below it was laid at the level pose.
+Its pads are on its roofs, each printed at a pose of its own; the roof below was printed at the level pose. The offset of a pad
+shows the error of the axes: the program aims at a point of the workpiece, and the pad is where the true machine had its tip.
 
-Few readings do not determine all numbers equally well: what they do not determine stays where the profile has it. The numbers
-are those of the least sum of squares of readings and of changes, each as a share of how far it is usually off (a maximum a
-posteriori estimate with independent normal errors).
+A few readings do not determine all numbers equally well: undetermined ones stay at the profile's values. The estimate minimises
+the squares of readings and changes, each relative to its usual error (maximum a posteriori with independent normal errors).
 """
 
 import json
@@ -33,15 +31,15 @@ LEAST_LEAN_DEG = 10.0
 EVEN_DEG = 1.0
 WAYS = ("right", "up", "height")  # seen from outside, the pad's holes above
 MARK_MM = 0.1
-HEIGHT_MM = 1.2  # of a pad that lies where it should
+HEIGHT_MM = 1.2  # of a pad at its nominal place
 MOST_MARKS = 30.0
 MOST_HEIGHT_MM = 4.0
 NOT_READ = "-"
 EXPECTED = f"two marks and a height are expected, as 2,-1,1.25, {NOT_READ} for what was not read"
 UNKNOWN = ("turn.point_mm x", "turn.point_mm y", "tilt.point_mm", "tilt.point_mm", "tilt.zero_deg")
-USUAL = np.array([0.5, 0.5, 0.5, 0.5, 0.5])  # how far they are off before the first piece, mm and deg
-READ_MM = np.array([0.05, 0.05, 0.07])  # how well each way is read
-# All pads of a piece may seem to lie so much higher up their roofs and over them: a roof is steps, and plastic swells.
+USUAL = np.array([0.5, 0.5, 0.5, 0.5, 0.5])  # error before the first piece, mm and deg
+READ_MM = np.array([0.05, 0.05, 0.07])  # reading error in each direction
+# All pads of a piece may appear this much too far up and above their roofs, for a roof has steps and plastic swells.
 BIAS_MM = np.array([0.0, 0.05, 0.1])
 LEAST_READINGS = 4
 DOUBTFUL_MM = 0.2
@@ -50,8 +48,8 @@ TEMPLATE = Path(__file__).parent / "piece.html"
 
 @dataclass(frozen=True, eq=False)
 class Pad:
-    """A pad by its number (that of its holes), the pose at which it was laid, the middle of its underside, and what is right, up
-    and away from its roof: (3, 3) unit vectors, all in the workpiece frame."""
+    """A pad. number: of its holes; pose: in which it was printed; middle_mm: centre of its underside; ways: (3, 3) unit vectors
+    right, up and away from its roof; both in the workpiece frame."""
 
     number: int
     pose: Pose
@@ -61,19 +59,19 @@ class Pad:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A printed piece: the machine that its program was made for, the pose of its roofs, its pads in order."""
+    """A printed piece: the machine of its program, the pose of its roofs, its pads in order."""
 
     machine: Machine
     base: Pose
     pads: tuple[Pad, ...]
 
     def laid_aside_mm(self, true: Machine) -> Floats:
-        """(pads, 3) how far each pad lies from its place on its roof along its `ways`, where a machine is truly another one."""
+        """(pads, 3) offset of each pad from its nominal place, along its `ways`, if the machine is truly another one."""
         errors = [self._error_mm(true, pad, pad.pose) - self._error_mm(true, pad, self.base) for pad in self.pads]
         return np.array([pad.ways @ error for pad, error in zip(self.pads, errors, strict=True)])
 
     def slope(self) -> Floats:
-        """(pads x ways, UNKNOWN) by how much a reading changes where a number of the machine changes by 1."""
+        """(pads x ways, UNKNOWN) derivative of the readings by the machine's numbers."""
         return slope_of(lambda changes: _explained(self.machine, [self], changes), np.zeros(len(UNKNOWN)))
 
     def _error_mm(self, true: Machine, pad: Pad, pose: Pose) -> Floats:
@@ -83,7 +81,7 @@ class Piece:
 
 
 def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
-    """The piece of a program that was made for a machine. Raises ProfileError for a program of anything else."""
+    """The piece of a program made for a machine. Raises ProfileError for a program of another model."""
     poses, middles = _laid(program, machine)
     if sorted(poses) != list(range(1, PADS + 2)):
         raise ProfileError(f"{name} prints {len(poses)} parts: a program of demo:calibration has {PADS + 1}")
@@ -99,7 +97,7 @@ def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
 
 
 def _laid(program: ParsedProgram, machine: Machine) -> tuple[dict[int, Pose], dict[int, Floats]]:
-    """By part the pose of its beads, and the middle of the lowest of them."""
+    """Pose of each part's beads, and the centre of the lowest of them."""
     poses: dict[int, Pose] = {}
     middles: dict[int, Floats] = {}
     parts = program.part
@@ -121,9 +119,9 @@ def _pad(number: int, pose: Pose, middle_mm: Floats, machine: Machine) -> Pad:
 
 
 def parse_readings(text: str) -> Floats:
-    """(pads, 3) mm aside, up and too high, nan for what was not read, of a text as `2,-1,1.25 0,0.5,- -,-,- 1,0,1.2`.
+    """(pads, 3) mm aside, up and too high, nan if not read, from a text such as `2,-1,1.25 0,0.5,- -,-,- 1,0,1.2`.
 
-    Raises ProfileError for one that is no such text, or has numbers that nobody can have read.
+    Raises ProfileError for another format, or for impossible numbers.
 
     >>> parse_readings("2,-1,1.25 0,0.5,- -,-,- 1,0,1.2")[0].round(6).tolist()
     [0.2, -0.1, 0.05]
@@ -137,7 +135,7 @@ def parse_readings(text: str) -> Floats:
 
 
 def parse_pad(text: str, number: int) -> list[float]:
-    """The three readings of a pad in mm, nan for what was not read. Raises ProfileError naming the pad."""
+    """The three readings of a pad in mm, nan if not read. Raises ProfileError naming the pad."""
     try:
         values = [float("nan") if word == NOT_READ else float(word) for word in text.replace(",", " ").split()]
     except ValueError:
@@ -153,7 +151,7 @@ def parse_pad(text: str, number: int) -> list[float]:
 
 
 def readings_text(readings_mm: Floats) -> str:
-    """The text that `parse_readings` makes these of."""
+    """The text from which `parse_readings` makes these readings."""
     told = (readings_mm + np.array([0.0, 0.0, HEIGHT_MM])) / np.array([MARK_MM, MARK_MM, 1.0])
     words = [[NOT_READ if isnan(value) else f"{round(value, 3) + 0.0:g}" for value in pad] for pad in told.tolist()]
     return " ".join(map(",".join, words))
@@ -161,8 +159,8 @@ def readings_text(readings_mm: Floats) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """A machine with the found numbers, what each reading differs from them (pieces x pads, 3; nan: not read), and how sure each
-    number is: one sigma, mm or deg, in the order of UNKNOWN."""
+    """A corrected machine. left_mm: residual of each reading (pieces x pads, 3; nan: not read); sigma: uncertainty of each
+    number, one sigma, mm or deg, in the order of UNKNOWN; changes: of the numbers, in that order."""
 
     machine: Machine
     left_mm: Floats
@@ -176,7 +174,7 @@ class Correction:
 
     @property
     def doubtful(self) -> tuple[int, int, str] | None:
-        """Piece, pad and way of the reading that fits least, each counted from 1; None where all fit."""
+        """Piece, pad and direction of the reading that fits worst, each from 1; None if all fit."""
         off = np.nan_to_num(np.abs(self.left_mm))
         worst = np.unravel_index(int(off.argmax()), off.shape)
         if off[worst] <= DOUBTFUL_MM:
@@ -186,17 +184,14 @@ class Correction:
 
 
 def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> Correction:
-    """The machine that explains (pieces, pads, 3) readings, nan where one was not taken.
-
-    Raises ProfileError for too few of them.
-    """
+    """The machine that explains (pieces, pads, 3) readings, nan for missing ones. Raises ProfileError for too few."""
     read = ~np.isnan(readings_mm).reshape(-1)
     if read.sum() < LEAST_READINGS:
         raise ProfileError(f"{read.sum()} readings of the pads are told: at least {LEAST_READINGS} are needed")
     target, weights = readings_mm.reshape(-1)[read], np.tile(1.0 / READ_MM, readings_mm.size // len(READ_MM))[read]
     places = np.kron(np.eye(len(pieces)), _biases(pieces[0]))[read]
 
-    def left(state: Floats) -> Floats:  # numbers, then biases, each as a share of what is usual
+    def left(state: Floats) -> Floats:  # numbers, then biases, each relative to its usual error
         explained = _explained(machine, pieces, USUAL * state[: len(UNKNOWN)])[read]
         return (explained + places @ state[len(UNKNOWN) :] - target) * weights
 
@@ -210,7 +205,7 @@ def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> C
 
 
 def _biases(piece: Piece) -> Floats:
-    """(pads x ways, biases) by how much each reading of a piece is off where a bias is as large as usual."""
+    """(pads x ways, biases) effect of each bias, at its usual size, on the readings of a piece."""
     return np.tile(np.diag(BIAS_MM)[:, BIAS_MM > 0.0], (len(piece.pads), 1))
 
 
@@ -220,14 +215,14 @@ def _explained(machine: Machine, pieces: Sequence[Piece], changes: Floats) -> Fl
 
 
 def _changed(machine: Machine, changes: Floats) -> Machine:
-    """The machine whose numbers differ so from its own, in the order of UNKNOWN; the tilt axis moves across itself."""
+    """The machine with changed numbers, in the order of UNKNOWN; the tilt axis moves across itself."""
     return machine_with(machine, numbers_of(machine) + np.insert(changes, 2, 0.0))
 
 
 def piece_page(piece: Piece, machine_name: str, file_name: str) -> bytes:
-    """The page of a printed piece; machine_name and file_name are those of the command that saves the corrections.
+    """The page of a printed piece; machine_name and file_name are used in its command that saves the corrections.
 
-    Its script adds reading after reading to the estimate of `correct`, with the slope at the profile's own numbers.
+    Its script adds one reading after another to the estimate of `correct`, with the slope at the profile's numbers.
     """
     machine = piece.machine
     values = {

@@ -1,7 +1,7 @@
-"""Probing: a machine that senses contact finds its own axes, from the centre of one ball on the plate at many poses.
+"""Probing: calibrates a machine that senses contact, from the centre of one ball on the plate at many poses.
 
-The centre follows from heights at which a tip that comes from above has met the ball, by least squares with the known radius.
-Pose after pose is planned with what is known so far, so that the head meets nothing else.
+A least-squares fit with the known radius gives the centre from the heights at which the tip meets the ball from above. Each pose
+is planned with the current estimate, so that the head meets nothing else.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,18 +26,18 @@ from profiles.messages import option
 
 ROUNDS = 30
 SETTLED_MM = 1e-9
-UNSURE_MM = 2.0  # by which a place may be lower than is expected
-BESIDE_MM = 0.3  # between the ball and what of the head is not to touch it
-FAR_MM = 6.0  # a contact so far from where it is expected is of something else
-LIFT_MM = 2.0  # over the last contact, from where the next one is sought
-AT_ONCE_MM = 0.05  # a contact so near to where it was sought from is none
-AGREE_MM, MOST_TIMES = 0.03, 4  # how well two contacts at one place must agree, and the most contacts
-NEAR, WIDE = 0.2, 0.5  # of the ball's radius: how far around its middle it is sought, and measured
-DROP = 1.0 - (1.0 - WIDE**2) ** 0.5  # by which the ball is lower there than at its top
-CENTRED = 0.1  # of the radius: a centre so near to where it was expected is measured well
-STEP = 0.3  # of the radius: how far the ball may be moved while a sign is unknown
+UNSURE_MM = 2.0  # possible depth of a place below its expected height
+BESIDE_MM = 0.3  # between the ball and parts of the head that must not touch it
+FAR_MM = 6.0  # a contact this far from its expected height is with something else
+LIFT_MM = 2.0  # above the last contact, to seek the next one
+AT_ONCE_MM = 0.05  # a contact this near to the start is false
+AGREE_MM, MOST_TIMES = 0.03, 4  # agreement of two contacts at one place, and the most contacts
+NEAR, WIDE = 0.2, 0.5  # of the ball's radius: distance from the expected centre for seeking and for measuring
+DROP = 1.0 - (1.0 - WIDE**2) ** 0.5  # depth below the ball's top at that distance, of the radius
+CENTRED = 0.1  # of the radius: a centre this near to its expected place is measured well
+STEP = 0.3  # of the radius: greatest movement of the ball while a sign is unknown
 SMALL = 0.2  # sine of the greatest such tilt
-ROUGHLY = 3  # touches, with which others are not yet expected well
+ROUGHLY = 3  # touches, with which positions are not yet predicted well
 TELLING_MM = 0.5  # by which the better sign must be nearer
 AROUND = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 
@@ -52,9 +52,9 @@ class Ball:
 
 
 def contact_heights(centre_mm: Floats, radius_mm: float, flat_mm: float, places_mm: Floats) -> Floats:
-    """(n,) Z at which a flat tip of radius flat_mm, its middle over (n, 2) places, meets the ball; nan where it misses it.
+    """(n,) Z at which a flat tip of radius flat_mm, centred at (n, 2) places, meets the ball; nan where it misses it.
 
-    The edge of the flat that is nearest to the middle touches first: there the ball is as high as at the place less the flat.
+    The edge of the flat nearest to the ball's centre touches first.
     """
     aside = np.maximum(np.hypot(*(places_mm - centre_mm[:2]).T) - flat_mm, 0.0)
     with np.errstate(invalid="ignore"):
@@ -63,10 +63,10 @@ def contact_heights(centre_mm: Floats, radius_mm: float, flat_mm: float, places_
 
 
 def ball_centre(contacts_mm: Floats, radius_mm: float, flat_mm: float = 0.0, seek_flat: bool = False) -> Floats:
-    """(3,) centre of the ball that (n, 3) contacts from above belong to, n at least 3; flat_mm as in contact_heights.
+    """(3,) centre of the ball with (n, 3) contacts from above, n at least 3; flat_mm as in contact_heights.
 
-    seek_flat: the flat's radius is found, too, from flat_mm on; n at least 4, one of them near to the middle. Raises PrinterError
-    where the contacts are those of no such ball.
+    seek_flat: also fit the flat's radius, starting from flat_mm; n at least 4, one near the ball's centre. Raises PrinterError
+    when no such ball fits.
     """
     numbers = np.array([*contacts_mm[:, :2].mean(axis=0), contacts_mm[:, 2].max() - radius_mm, flat_mm])
     count = 4 if seek_flat else 3
@@ -88,9 +88,9 @@ def ball_centre(contacts_mm: Floats, radius_mm: float, flat_mm: float = 0.0, see
 
 
 def find_in_the_way(machine: Machine, pose: Pose, ball: Ball, tips_mm: Floats, touches_by_nozzle: bool) -> str | None:
-    """Why the tip cannot be at (n, 3) X Y Z, or between them, with the table at a pose; None: it can.
+    """Why the tip cannot be at (n, 3) X Y Z, or between them, with the table at a pose; None if it can.
 
-    touches_by_nozzle: the nozzle's own end is what meets the ball.
+    touches_by_nozzle: the nozzle itself touches the ball.
     """
     low = tips_mm - [0.0, 0.0, UNSURE_MM]
     clipped = clipped_head(machine, ball.centre_mm)
@@ -99,7 +99,7 @@ def find_in_the_way(machine: Machine, pose: Pose, ball: Ball, tips_mm: Floats, t
 
 
 def _find_ball(machine: Machine, pose: Pose, ball: Ball, tips_mm: Floats, touches_by_nozzle: bool) -> str | None:
-    """The body of the head that the ball or its post would meet, the tip at each of the places."""
+    """Sentence naming the body of the head that would meet the ball or its post at one of the places, or None."""
     tried = directions(rotation(machine, pose) @ UP)
     x, y, z = ball.centre_mm
     foot, centre = machine_points(machine, pose, np.array([[x, y, 0.0], [x, y, z]]))
@@ -115,37 +115,37 @@ def _find_ball(machine: Machine, pose: Pose, ball: Ball, tips_mm: Floats, touche
 
 
 class Prober(Protocol):
-    """A machine that moves, and senses what the tip, or the probe beside it, meets from above. Raises PrinterError."""
+    """A machine that moves and senses contact of its tip, or of a probe beside it, from above. Raises PrinterError."""
 
     def turn(self, pose: Pose) -> None:
-        """Turn the table, the head standing still."""
+        """Turn the table while the head stands still."""
 
     def rise(self, z_mm: float) -> None:
-        """Bring the tip to a height; also downwards, where nothing is."""
+        """Move the tip to a height, also downward through free space."""
 
     def cross(self, x_mm: float, y_mm: float) -> None:
-        """Bring the tip over a place, its height unchanged."""
+        """Move the tip over a place at constant height."""
 
     def seek(self, low_mm: float) -> float | None:
-        """Bring the tip down, slowly, until contact: the tip's Z then; None when there was none down to a height."""
+        """Lower the tip slowly until contact; returns its Z, None without contact down to low_mm."""
 
 
 @dataclass(frozen=True)
 class Probe:
-    """offset_mm: from the nozzle's tip to what touches, 0 where the nozzle senses itself; flat_mm: radius of its flat end."""
+    """A probe. offset_mm: from the nozzle's tip to the contact, 0 if the nozzle itself touches; flat_mm: radius of its flat end."""
 
     offset_mm: Vector = (0.0, 0.0, 0.0)
     flat_mm: float = 0.0
 
     @property
     def is_nozzle(self) -> bool:
-        """Whether the nozzle's own end touches."""
+        """Whether the nozzle itself touches."""
         return self.offset_mm[:2] == (0.0, 0.0)
 
 
 @dataclass
 class Measuring:
-    """One measurement. machine: as far as it is known; touches: of the ball's centre so far; tell: takes a line on each step."""
+    """A measurement. machine: current estimate; touches: of the ball's centre so far; tell: receives a line for each step."""
 
     machine: Machine
     ball: Ball
@@ -154,7 +154,7 @@ class Measuring:
     tell: Callable[[str], None] = lambda text: None
     touches: list[Touch] = field(default_factory=list)
     contacts: int = 0
-    _start: Machine = field(init=False)  # as the profile has it, with the signs that are known
+    _start: Machine = field(init=False)  # the profile's, with the signs known so far
     _mark: Vector = field(init=False)
     _above: float = field(init=False, default=0.0)  # height from which contact is sought
 
@@ -162,10 +162,10 @@ class Measuring:
         self._start, self._mark = self.machine, self.ball.centre_mm
 
     def run(self) -> list[Touch]:
-        """All touches. Raises MoveError where no pose can be measured, PrinterError where probing has failed."""
+        """Make all touches. Raises MoveError when no pose can be measured, PrinterError when probing fails."""
         home, turns = level(self.machine), turns_deg(self.machine)
         self._check(home, (self.machine,))
-        self._add(home, self._visit(home, self._expected(home), NEAR))  # where the ball really stands
+        self._add(home, self._visit(home, self._expected(home), NEAR))  # the ball's actual place
         self._tell_sign("turn", self._small_turn(home), np.array(self.touches[0].at_mm))
         across = Pose(home.tilt_deg, self._across_tilt(home))
         before = next((touch for touch in self.touches if touch.pose == across), None) or self._touch(across)
@@ -176,7 +176,7 @@ class Measuring:
                 self._touch(pose)
         for tilt_deg in self._tilts():
             for pose in (Pose(tilt_deg, turn_deg) for turn_deg in turns):
-                if obstacle := self._find_in_the_way(self.machine, pose):  # better known by now than when the tilt was chosen
+                if obstacle := self._find_in_the_way(self.machine, pose):  # the estimate is better than when the tilt was chosen
                     self.tell(f"{self._name(pose)} is left out: {obstacle}")
                 else:
                     self._touch(pose)
@@ -185,7 +185,7 @@ class Measuring:
         return self.touches
 
     def _tell_sign(self, axis: str, pose: Pose, before: Floats) -> None:
-        """A small step of one axis from where the ball was before, and the sign that explains it."""
+        """Find the sign of an axis by a small step from a measured pose."""
         given: Machine = self._start
         letter = getattr(given, axis).letter
         turned = [given.model_copy(update={axis: getattr(given, axis).model_copy(update={"sign": sign})}) for sign in (1, -1)]
@@ -203,7 +203,7 @@ class Measuring:
         self._add(pose, seen)
 
     def _small_turn(self, home: Pose) -> Pose:
-        """So far that the ball is still met where it was, whichever way it goes."""
+        """A turn so small that the ball is still met at its old place, in either direction."""
         step = degrees(STEP * self.ball.radius_mm / float(np.hypot(*self.ball.centre_mm[:2])))
         return Pose(home.tilt_deg, home.turn_deg + (step if home.turn_deg + step <= self.machine.turn.reach_deg[1] else -step))
 
@@ -214,13 +214,13 @@ class Measuring:
         return Pose(home.tilt_deg + (step if above else -step), home.turn_deg)
 
     def _across_tilt(self, home: Pose) -> float:
-        """The turn at which the ball stands farthest from the tilt axis, so that a tilt lifts or lowers it."""
+        """The turn at which the ball is farthest from the tilt axis, so that a tilt raises or lowers it."""
         along, point = np.array(self.machine.tilt.axis), np.array(self.machine.tilt.point_mm)
         arms = {turn: self._expected(Pose(home.tilt_deg, turn)) - point for turn in turns_deg(self.machine)}
         return max(arms, key=lambda turn: abs(float(np.cross(along, arms[turn])[2])))
 
     def _tilts(self) -> list[float]:
-        """The steepest tilts that can be measured, one to each side where that is possible, gentler ones before them."""
+        """The steepest tilts that can be measured, one to each side if possible, with gentler ones before them."""
         zero, turns = self.machine.tilt.zero_deg, turns_deg(self.machine)
         able = steepest_tilts(
             self.machine, lambda tilt: not any(self._find_in_the_way(self.machine, Pose(tilt, turn)) for turn in turns)
@@ -234,13 +234,13 @@ class Measuring:
         return [zero + share * (tilt - zero) for share in shares for tilt in able]
 
     def _obstacle(self, tilt_deg: float) -> str:
-        """Why a tilt cannot be measured, the nearest to level to either side."""
+        """Why the tilt nearest to level cannot be measured."""
         zero, turns = self.machine.tilt.zero_deg, turns_deg(self.machine)
         found = [self._find_in_the_way(self.machine, Pose(zero + s * tilt_deg, turn)) for s in (1.0, -1.0) for turn in turns]
         return next(obstacle for obstacle in found if obstacle)
 
     def _find_in_the_way(self, machine: Machine, pose: Pose) -> str | None:
-        """What keeps the ball from being measured at a pose by a machine; None: nothing does."""
+        """What keeps a machine from measuring the ball at a pose, or None."""
         least, most = machine.tilt.reach_deg
         if not least <= pose.tilt_deg <= most:
             return f"{machine.tilt.letter} goes from {least:g} to {most:g}"
@@ -252,13 +252,13 @@ class Measuring:
         return find_in_the_way(machine, pose, self.ball, np.vstack([tips, above]), self.probe.is_nozzle)
 
     def _check(self, pose: Pose, machines: Sequence[Machine]) -> None:
-        """Refuse a pose at which one of the machines that it may be would meet something."""
+        """Raise MoveError for a pose at which one of the possible machines would meet something."""
         for machine in machines:
             if obstacle := self._find_in_the_way(machine, pose):
                 raise MoveError(f"the ball cannot be measured at {self._name(pose)}: {obstacle}")
 
     def _touch(self, pose: Pose) -> Touch:
-        """The ball's centre at a pose where it is expected well enough."""
+        """Measure the ball's centre at a pose where its place is predicted well enough."""
         self._check(pose, (self.machine,))
         return self._add(pose, self._visit(pose, self._expected(pose), WIDE if len(self.touches) > ROUGHLY else NEAR))
 
@@ -274,12 +274,12 @@ class Measuring:
         return f"{self.machine.tilt.letter}{pose.tilt_deg:.4g} {self.machine.turn.letter}{pose.turn_deg:.4g}"
 
     def _expected(self, pose: Pose) -> Floats:
-        """(3,) X Y Z of the ball's centre."""
+        """(3,) predicted X Y Z of the ball's centre."""
         place: Floats = machine_points(self.machine, pose, np.array([self.ball.centre_mm]))[0]
         return place
 
     def _visit(self, pose: Pose, expected: Floats, share: float) -> Floats:
-        """(3,) the ball's centre at a pose, gone to by way of a height over everything that turns."""
+        """(3,) measured centre of the ball at a pose, approached above everything that turns."""
         self._rise(pose)
         self.prober.turn(pose)
         self.prober.cross(*(expected[:2] - self.probe.offset_mm[:2]))
@@ -289,7 +289,7 @@ class Measuring:
         self.prober.rise(self._safe_z(self._start, pose))
 
     def _safe_z(self, machine: Machine, pose: Pose) -> float:
-        """Tip's Z over all that turns, from where the table stands to a pose, whichever way the axes go."""
+        """Z of the tip above everything that turns on the way to a pose, whatever the directions of the axes."""
         x, y, z = self.ball.centre_mm
         mark = (float(np.hypot(x, y)) + self.ball.radius_mm, 0.0, z + self.ball.radius_mm)
         tilts = [pose.tilt_deg, *(touch.pose.tilt_deg for touch in self.touches[-1:])]
@@ -297,7 +297,7 @@ class Measuring:
         return safe_z_mm(machine, mark, tilt_deg) + max(0.0, -self.probe.offset_mm[2])
 
     def _centre(self, pose: Pose, expected: Floats, share: float) -> Floats:
-        """The ball's centre, sought around where it is expected, then measured around where it is."""
+        """The ball's centre, sought around its expected place, then measured around the result."""
         radius, flat = self.ball.radius_mm, self.probe.flat_mm
         centre, top = expected, expected[2] + radius + FAR_MM - LIFT_MM
         for _ in range(MOST_TIMES):
@@ -306,7 +306,7 @@ class Measuring:
             places = centre[:2] + share * radius * AROUND
             for place, height in zip(places, contact_heights(centre, radius, flat, places).tolist(), strict=True):
                 contacts.append(self._contact(pose, place, height, float(top) + LIFT_MM, exact))
-                if exact:  # the ball's top is no farther above a contact than this, wherever its middle is
+                if exact:  # the ball's top is at most this far above a contact
                     top = max(centre[2] + radius, max(z for _, _, z in contacts) + DROP * radius)
             before, centre = centre, ball_centre(np.array(contacts), radius, flat, seek_flat=exact)
             near = float(np.hypot(*(centre - before)[:2])) <= CENTRED * radius
@@ -316,7 +316,7 @@ class Measuring:
         raise PrinterError(f"at {self._name(pose)} the ball's centre is not found: it comes to lie elsewhere each time")
 
     def _contact(self, pose: Pose, place: Floats, expected: float, above_mm: float, exact: bool) -> Floats:
-        """(3,) where something is met at a place, expected at a height, from another above; exact: two contacts must agree."""
+        """(3,) contact at a place, expected at a height and approached from another; exact: two contacts must agree."""
         self._above = above_mm
         self.prober.rise(self._tip_z(self._above))
         self.prober.cross(*(place - self.probe.offset_mm[:2]))
@@ -337,7 +337,7 @@ class Measuring:
         )
 
     def _seek(self, pose: Pose, expected: float) -> float:
-        """Height of one contact; refuses what cannot be the ball."""
+        """Height of one contact. Raises PrinterError for one that cannot be the ball."""
         name, low = self._name(pose), self._tip_z(expected - FAR_MM)
         self.contacts += 1
         met = self.prober.seek(low)

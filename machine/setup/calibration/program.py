@@ -1,7 +1,4 @@
-"""Touches: the poses at which a mark is touched, and the G-code that takes the head there and waits until X Y Z are noted.
-
-At a port a person's keys take the tip there: what a key makes of its place, and which places are refused.
-"""
+"""Touch program: poses at which a mark is touched, G-code that moves there and waits for the readings, and keys that jog the tip."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -27,18 +24,18 @@ from profiles.profile import Profile
 TURNS_DEG = (0.0, 90.0, 180.0, 270.0)
 TILTS_DEG = (60.0, 45.0, 30.0, 20.0, 15.0, 10.0)
 MOST_MARK_RADIUS_MM = 45.0
-MARGIN_MM = 10.0  # how far the centres of a machine that is not calibrated yet may be from where the profile has them
+MARGIN_MM = 10.0  # possible error of the profile's centres before a calibration
 ABOVE_MM = 8.0
 WAYS = {"a": (0, -1), "d": (0, 1), "s": (1, -1), "w": (1, 1), "f": (2, -1), "r": (2, 1)}  # axis and direction of a key
 DOWN = "f"
 STEPS_MM = {"1": 10.0, "2": 1.0, "3": 0.1, "4": 0.02}
-BELOW_MM = 6.0  # the place at which the mark is expected: no step goes deeper, and by so much the head may be nearer than is sure
-NEAR_STEP_MM = 1.0  # downwards, where the mark may be
+BELOW_MM = 6.0  # below the expected mark: the lowest step, and the possible error of the head's clearance
+NEAR_STEP_MM = 1.0  # downward, near the mark
 
 
 @dataclass(frozen=True)
 class TouchPlan:
-    """The poses at which the mark is touched, where it is expected then, and how high the tip stands while the table turns."""
+    """Poses at which the mark is touched, its expected position at each, and the tip's height while the table turns."""
 
     poses: tuple[Pose, ...]
     expected_mm: tuple[tuple[float, float, float], ...]
@@ -47,9 +44,9 @@ class TouchPlan:
 
 
 def plan_touches(machine: Machine, mark_height_mm: float, mark_radius_mm: float | None = None) -> TouchPlan:
-    """Four turns at the level table and at two tilts, as steep as head, limits and the mark's height allow.
+    """Touches at four turns of the level table and of two tilts, as steep as head, limits and mark height allow.
 
-    Raises MoveError when no tilt of 10 degrees or more does.
+    Raises MoveError when no tilt of 10 degrees or more is possible.
     """
     if not machine.tilts:
         raise MoveError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
@@ -62,7 +59,7 @@ def plan_touches(machine: Machine, mark_height_mm: float, mark_radius_mm: float 
 
 
 def usual_radius_mm(machine: Machine, asked_mm: float | None = None) -> float:
-    """Distance of the mark from the middle, as asked for or as far out as is usual. Raises MoveError for one off the plate."""
+    """Distance of the mark from the centre: the requested one, or the usual. Raises MoveError for a mark off the plate."""
     least = machine.table.radius_mm if machine.table.size_mm is None else 0.5 * min(machine.table.size_mm)
     radius = asked_mm if asked_mm is not None else min(0.6 * least, MOST_MARK_RADIUS_MM)
     if not 5.0 <= radius <= least:
@@ -71,7 +68,7 @@ def usual_radius_mm(machine: Machine, asked_mm: float | None = None) -> float:
 
 
 def calibration_lines(profile: Profile, touches: TouchPlan) -> Iterator[str]:
-    """The lines of the program: homing as the start block does it but without heat, then every touch, then level again.
+    """Lines of the program: cold homing as in the start block, every touch, then level again.
 
     Raises ProfileError, before the first line, for a block of the profile that the firmware refuses.
     """
@@ -100,7 +97,7 @@ def calibration_lines(profile: Profile, touches: TouchPlan) -> Iterator[str]:
 
 
 def calibration_pen(profile: Profile) -> Pen:
-    """A pen for the axes' own coordinates, the table level. Raises ProfileError for a block that the firmware refuses."""
+    """A pen for the axes' coordinates with a level table. Raises ProfileError for a block that the firmware refuses."""
     check_blocks(profile)
     machine = profile.machine.model_copy(update={"coordinates": "table"})
     pen = Pen(dialect_of(machine), machine, "", level(machine))
@@ -109,12 +106,12 @@ def calibration_pen(profile: Profile) -> Pen:
 
 
 def cold_start(pen: Pen) -> Iterator[str]:
-    """Homing as the start block does it but without heat, and the modes of a program; a comment for what is left out because it
-    may heat. Raises MoveError where the machine is not homed without that."""
+    """Homing of the start block without heat, and a program's modes; heating lines become comments. Raises MoveError when the
+    machine is not homed without them."""
     dialect = pen.dialect
     lines, left_out = cold_block(_fill(pen.machine.gcode.start, pen), dialect)
     yield from (f"; left out, for it may heat: {line}" for line in left_out)
-    if any(command_in(line) is COMMANDS[TOOL] for line in lines):  # it goes to its active temperature when it is selected
+    if any(command_in(line) is COMMANDS[TOOL] for line in lines):  # selecting a tool heats it to its active temperature
         yield dialect.nozzle.format(number(0.0))
     for word in dialect.before_start:
         yield from _fill(word, pen)
@@ -127,7 +124,7 @@ def cold_start(pen: Pen) -> Iterator[str]:
 
 
 def turn_lines(pose: Pose, pen: Pen) -> Iterator[str]:
-    """The lines that turn the table from where it stands to a pose."""
+    """Lines that turn the table to a pose."""
     speed = turn_speed(pose.tilt_deg - pen.pose.tilt_deg, pose.turn_deg - pen.pose.turn_deg, pen.machine)
     yield from turn(pose, speed, pen)
 
@@ -137,24 +134,24 @@ def _fill(block: str, pen: Pen) -> list[str]:
 
 
 def unsure_signs(machine: Machine) -> tuple[str, ...]:
-    """The rotary axes of which nobody knows yet which way they turn."""
+    """The rotary axes whose sign is uncalibrated."""
     return tuple(axis for axis in ("tilt", "turn") if f"machine.{axis}.sign" in machine.uncalibrated)
 
 
 def hover_z_mm(machine: Machine, expected_z_mm: float, safe_z_mm: float) -> float:
-    """Over the mark where it is expected; at the safe height while a sign may be wrong and the mark on the other side."""
+    """Z above the expected mark; the safe height while a sign is unknown, for the mark may be on the other side."""
     return safe_z_mm if unsure_signs(machine) else min(safe_z_mm, expected_z_mm + ABOVE_MM)
 
 
 def steepest_tilts(machine: Machine, is_possible: Callable[[float], bool]) -> list[float]:
-    """The steepest tilts that are possible, deg: one to each side, or to one, or none."""
+    """The steepest possible tilts, deg: one to each side, or to one, or none."""
     angles = ([machine.tilt.zero_deg + side * tilt for tilt in TILTS_DEG] for side in (1.0, -1.0))
     steepest = (next(filter(is_possible, of_side), None) for of_side in angles)
     return [tilt for tilt in steepest if tilt is not None]
 
 
 def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, float]:
-    """The steepest tilts: one to each side where the limits allow it, else two to one side."""
+    """The steepest tilts: one to each side if the limits allow, else two to one side. Raises MoveError."""
     tilts = steepest_tilts(machine, lambda tilt_deg: _reachable(machine, mark, tilt_deg))
     if not tilts:
         raise MoveError(
@@ -165,7 +162,7 @@ def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, f
 
 
 def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> bool:
-    """Whether the tip can touch the mark at a tilt at every turn: A, X Y Z inside, head over the plate, room above to turn."""
+    """Whether the tip can touch the mark at a tilt at every turn: axes within limits, head above the plate, space to turn."""
     if not machine.tilt.reach_deg[0] <= tilt_deg <= machine.tilt.reach_deg[1]:
         return False
     if safe_z_mm(machine, mark, abs(tilt_deg - machine.tilt.zero_deg)) > machine.z.limits_mm[1]:
@@ -178,7 +175,7 @@ def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: flo
 
 
 def clipped_head(machine: Machine, mark: tuple[float, float, float]) -> Machine:
-    """The machine with its head's boxes cut where the plate cannot reach them."""
+    """The machine with the head's boxes clipped to the reach of the plate."""
     far = machine.table.radius_mm + mark[0] + MARGIN_MM
     boxes = []
     for box in machine.head.boxes:
@@ -190,7 +187,7 @@ def clipped_head(machine: Machine, mark: tuple[float, float, float]) -> Machine:
 
 
 def turns_deg(machine: Machine) -> list[float]:
-    """The four turns inside limits and cables, each as near to the zero as can be."""
+    """The four turns within limits and cable reach, each as near to zero as possible."""
     least, most = machine.turn.reach_deg
     zero = machine.turn.zero_deg
     inside = [next((zero + v for v in (t, t - 360.0) if least <= zero + v <= most), None) for t in TURNS_DEG]
@@ -204,7 +201,7 @@ def expected_mm(machine: Machine, pose: Pose, mark: tuple[float, float, float]) 
 
 
 def safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> float:
-    """Machine Z over everything that turns, to either side up to a tilt, whichever way the axes really go."""
+    """Machine Z above everything that turns, for tilts to either side, whatever the signs of the axes."""
     around = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
     ring = np.column_stack([np.cos(around), np.sin(around), np.zeros(24)])
     solid = [ring * machine.table.radius_mm, ring * mark[0] + np.array([0.0, 0.0, mark[2]])]
@@ -218,7 +215,7 @@ def safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: floa
 
 @dataclass(frozen=True)
 class Jog:
-    """Where the tip is, the step that a key makes, and the lowest place that is allowed, mm."""
+    """Position of the tip, step of a key, and lowest allowed position, mm."""
 
     at_mm: tuple[float, float, float]
     lowest_mm: float
@@ -226,14 +223,14 @@ class Jog:
 
 
 def begin_jog(machine: Machine, plan: TouchPlan, index: int, z_mm: float) -> Jog:
-    """Over the mark at a pose of the plan, the tip at a height."""
+    """A jog above the mark at a pose of the plan, with the tip at z_mm."""
     x, y, _ = plan.expected_mm[index]
     deepest = min(expected_mm(other, plan.poses[index], plan.mark_mm)[2] for other in _either_way(machine))
     return Jog((x, y, z_mm), max(machine.z.limits_mm[0], deepest - BELOW_MM))
 
 
 def pressed(jog: Jog, key: str, machine: Machine, pose: Pose) -> Jog:
-    """What a key makes of it; other keys nothing. Raises MoveError for a step that the machine must not make."""
+    """The jog after a key; unknown keys change nothing. Raises MoveError for a step that is not allowed."""
     if key in STEPS_MM:
         return replace(jog, step_mm=STEPS_MM[key])
     if key not in WAYS:
@@ -253,7 +250,7 @@ def pressed(jog: Jog, key: str, machine: Machine, pose: Pose) -> Jog:
 
 
 def _either_way(machine: Machine) -> list[Machine]:
-    """The machine with each choice of the signs that nobody knows yet."""
+    """The machine with every combination of the unknown signs."""
     unsure = unsure_signs(machine)
     machines = []
     for signs in product((-1, 1), repeat=len(unsure)):

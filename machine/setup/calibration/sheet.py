@@ -1,4 +1,4 @@
-"""Sheet: the small TOML or CSV file in which a person notes where the tip touched the mark."""
+"""Sheet: a small TOML or CSV file for the readings of a calibration."""
 
 import csv
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ WHERE = ("mark", "plate")
 
 @dataclass(frozen=True)
 class Sheet:
-    """The touches that have been filled in, how high the mark is, and its direction from the middle, if that is known."""
+    """The touches filled in, the mark's height, and its direction from the centre if known."""
 
     touches: tuple[Touch, ...]
     mark_height_mm: float
@@ -54,7 +54,7 @@ def sheet_text(name: str, machine: Machine, touches: TouchPlan) -> str:
 
 
 def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
-    """The sheet in a .toml or .csv file (columns tilt_deg, turn_deg, x_mm, y_mm, z_mm and, if wanted, on: mark or plate).
+    """The sheet in a .toml or .csv file (columns tilt_deg, turn_deg, x_mm, y_mm, z_mm and optionally on: mark or plate).
 
     mark_height_mm overrides the file. Raises ProfileError naming the file and the touch, or a missing height of the mark.
     """
@@ -73,7 +73,7 @@ def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
 
 
 def _touch(path: Path, label: str, row: Mapping[str, Any]) -> Touch | None:
-    """One touch; None when it has not been filled in."""
+    """A touch; None if it is not filled in."""
     check_row(path, label, row, ("tilt_deg", "turn_deg", "xyz_mm", "on"))
     where = row.get("on", "mark")
     if where not in WHERE:
@@ -89,7 +89,7 @@ def _touch(path: Path, label: str, row: Mapping[str, Any]) -> Touch | None:
 
 
 def _csv(path: Path) -> dict[str, Any]:
-    """A CSV file as the same document; an empty cell is a number not filled in."""
+    """A CSV file as a document; an empty cell is a number not filled in."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.DictReader(file))

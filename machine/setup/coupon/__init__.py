@@ -1,5 +1,5 @@
-"""Coupons: small bars, each with a joint made after a turn of the table, that tell what holds when they are broken.
+"""Coupons: small bars with joints made after a turn of the table, broken to measure their strength.
 
-`bars` is their outline and what a load says of their strength, `design` which settings each is printed with and the sheet that a
-person fills in, `plate` where they stand, `fit` what follows from the loads.
+`bars` is their geometry and the stress of a load, `design` their settings and the sheet for the loads, `plate` their arrangement,
+`fit` the evaluation.
 """

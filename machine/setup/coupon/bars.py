@@ -1,7 +1,7 @@
-"""Bars: plane outlines as thick as the bar, about a joint across their axis, and the stress that a load brings to the joint.
+"""Bars: outlines of uniform thickness with a joint across the axis, and the stress of a load in the joint.
 
-The bar's frame: origin in the middle of the joint, s along the axis, u across it in the outline's plane. `bend`: a beam of equal
-section, held below the joint by a screw or a vice, pulled across at a notch. `tensile`: ISO 527-2 type 5A in outline.
+The bar's frame: origin at the centre of the joint, s along the axis, u across it in the plane of the outline. `bend`: a beam of
+uniform section, clamped below the joint by a screw or a vice and pulled across at a notch. `tensile`: ISO 527-2 type 5A.
 """
 
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ import numpy as np
 from mdp.cut import Solid
 from mdp.mesh import Floats
 
-# ISO 527-2 type 5A, the same as ISO 37 type 2: width of the narrow part and of the ends, length of the narrow part and of all;
-# the larger radius joins the narrow part. Its thickness is 2 mm or more: four lie as well on a plate as they stand.
+# ISO 527-2 type 5A, the same as ISO 37 type 2: widths of the narrow section and the ends, lengths of the narrow section and
+# overall; the larger radius joins the narrow section. It must be 2 mm thick or more; at 4 mm it prints flat as well as upright.
 NARROW_MM, END_MM, NARROW_LENGTH_MM, LENGTH_MM, INNER_MM, OUTER_MM = 4.0, 12.5, 25.0, 75.0, 12.5, 8.0
 ARC_STEPS = 12
 NOTCH_MM = 1.5
 FOOT_MM, FOOT_HEIGHT_MM, SCREW_MM, SCREW_HEIGHT_MM = 10.0, 7.0, 4.3, 3.3
-SHALLOWER = 0.85  # the lower outline falls steeper than the bar leans, by this share of its tangent
+SHALLOWER = 0.85  # the lower outline is steeper than the bar's lean, by this fraction of its tangent
 BASE_MM, BASE_HEIGHT_MM, BASE_AROUND_MM = 12.5, 3.0, 3.0
 STROKE_MM, DIGIT_MM, ENGRAVED_MM = 0.8, (2.4, 4.0), 0.5
 SEGMENTS = ("abcdef", "bc", "abdeg", "abcdg", "bcfg", "acdfg", "acdefg", "abc", "abcdefg", "abcdfg")
@@ -27,8 +27,8 @@ SEGMENTS = ("abcdef", "bc", "abdeg", "abcdg", "bcfg", "acdfg", "acdefg", "abc", 
 
 @dataclass(frozen=True)
 class Shape:
-    """A bar's measures, mm: its thickness, its depth at the joint along the pull of a bending load, from the joint to where it
-    is pulled (0: along the axis), to the middle of its number, to its upper end."""
+    """Dimensions of a bar, mm: thickness, depth along the pull of a bending load at the joint, and distances from the joint to
+    the pull (0: along the axis), to the centre of its number and to its upper end."""
 
     name: str
     thickness_mm: float
@@ -65,7 +65,7 @@ def dumbbell() -> Floats:
 
 
 def upper(shape: Shape) -> m3.CrossSection:
-    """What lies above the joint, in the bar's frame."""
+    """Outline above the joint, in the bar's frame."""
     if shape.lever_mm == 0.0:
         return m3.CrossSection([dumbbell()]) ^ _box(-50.0, 0.0, 50.0, 50.0)
     half = 0.5 * shape.depth_mm
@@ -76,15 +76,15 @@ def upper(shape: Shape) -> m3.CrossSection:
 
 
 def least_height_mm(shape: Shape, lean_rad: float) -> float:
-    """The least height of the joint over the plate with room for all of the foot, or of a tensile bar's end, below it."""
+    """Least height of the joint above the plate that leaves space for the whole foot, or the end of a tensile bar."""
     if shape.lever_mm > 0.0:
         return FOOT_HEIGHT_MM + 3.0
     return 0.5 * LENGTH_MM * cos(lean_rad) + 0.5 * END_MM * sin(lean_rad)
 
 
 def lower(shape: Shape, lean_rad: float, height_mm: float) -> m3.CrossSection:
-    """What lies below the joint, in the upright plane of the outline: x away from the plate's middle, y up from the plate, the
-    joint's middle over x = 0 at a height; the bar leans outwards."""
+    """Outline below the joint in a vertical plane: x away from the plate's centre, y up from the plate. The joint's centre is at
+    x = 0 and a height; the bar leans outward."""
     if shape.lever_mm == 0.0:
         grip = _box(-0.5 * END_MM, -200.0, 0.5 * END_MM, -0.5 * LENGTH_MM + 1.0)
         bar = tilted(grip + m3.CrossSection([dumbbell()]) ^ _box(-50.0, -200.0, 50.0, 0.0), lean_rad, height_mm)
@@ -98,8 +98,8 @@ def lower(shape: Shape, lean_rad: float, height_mm: float) -> m3.CrossSection:
 
 
 def bar(shape: Shape, lean_rad: float, height_mm: float, number: int | None = None, lying: bool = False) -> Solid:
-    """A whole bar in the plane of `lower`, lying on its side, its number engraved into the upper one. A thin bar that is to stand
-    on its edge, y up, gets a broader base."""
+    """A whole bar in the plane of `lower`, on its side, with its number engraved in the upper face. A thin bar that will stand on
+    its edge, y up, gets a wider base."""
     outline = lower(shape, lean_rad, height_mm) + tilted(upper(shape), lean_rad, height_mm)
     solid = m3.Manifold.extrude(outline, shape.thickness_mm)
     if number is not None:
@@ -115,20 +115,20 @@ def _base(solid: Solid, shape: Shape) -> Solid:
 
 
 def stand(lying: Solid, shape: Shape, turn_rad: float, radius_mm: float) -> Solid:
-    """A bar that lay on its side stands (y up), its x = 0 at a radius from the plate's middle, x outwards at a turn."""
+    """A bar that was on its side, upright (y up), its x = 0 at a radius from the plate's centre, x outward at a turn."""
     out, aside = (cos(turn_rad), sin(turn_rad)), (sin(turn_rad), -cos(turn_rad))
     moved = lying.translate((radius_mm, 0.0, -0.5 * shape.thickness_mm))
     return moved.transform(np.array([[out[0], 0.0, aside[0], 0.0], [out[1], 0.0, aside[1], 0.0], [0.0, 1.0, 0.0, 0.0]]))
 
 
 def tilted(outline: m3.CrossSection, lean_rad: float, height_mm: float) -> m3.CrossSection:
-    """An outline of the bar's frame in the upright plane of `lower`."""
+    """An outline of the bar's frame in the vertical plane of `lower`."""
     lean, up = (cos(lean_rad), -sin(lean_rad)), (sin(lean_rad), cos(lean_rad))
     return outline.transform(np.array([[lean[0], up[0], 0.0], [lean[1], up[1], height_mm]]))
 
 
 def _digits(number: int) -> m3.CrossSection:
-    """A number in seven segments, about the origin, to be engraved."""
+    """A number in seven segments, about the origin, for engraving."""
     wide, high = DIGIT_MM
     half = 0.5 * STROKE_MM
     strokes = {

@@ -1,8 +1,8 @@
-"""Design: which settings each jointed bar is printed with, and the sheet in which a person notes at what loads the bars broke.
+"""Design: the settings of each jointed bar, and the sheet for the loads at which the bars broke.
 
 Two levels of each factor are balanced over eight bars, a fraction of the two-level factorial (Box, Hunter, Hunter, Statistics for
-Experimenters): three factors in all combinations, the fourth where the product of the three is, the fifth where that of the first
-two is. With four no effect of one factor is mixed with that of two together; a fifth one is mixed with that of the first two.
+Experimenters): three factors in all combinations, the fourth equal to their product, the fifth to the product of the first two.
+With four factors no main effect is confounded with an interaction of two; the fifth is confounded with that of the first two.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,9 +24,9 @@ from profiles.profile import Profile, with_part_settings
 from profiles.toml_text import read_value
 
 JOINTS = 8
-KINDS = ("joint",) * JOINTS + ("z", "z", "x", "x")  # of the bars 1, 2, ...: jointed, in one piece upright, in one piece lying
+KINDS = ("joint",) * JOINTS + ("z", "z", "x", "x")  # bars 1, 2, ...: jointed, in one piece upright, in one piece flat
 MOST_FACTORS = 5
-# Key of the process and the values that are tried beside its own, the first of them that is another.
+# Key of the process and its values to try: the first that differs from the process's own.
 USUAL: dict[str, tuple[Any, ...]] = {
     "interface_overlap": (0.75, 0.5),
     "interface_flow": (1.15, 1.05),
@@ -34,14 +34,14 @@ USUAL: dict[str, tuple[Any, ...]] = {
     "interface_bottom_layers": (2, 0),
 }
 KEYS = ("coupon", "machine", "material", "process", "bar", "factor")
-MOST_MPA = 300.0  # no filament bears more; a larger number is misread
+MOST_MPA = 300.0  # stronger than any filament: a larger number is misread
 IN_WORDS = {"joint": "jointed", "z": "in one piece, upright", "x": "in one piece, lying"}
 PULLED = {"bend": "across its axis, at the notch", "tensile": "along its axis"}
 
 
 @dataclass(frozen=True)
 class Factor:
-    """A key of the process, the process's own value of it, and the other one that half of the bars have."""
+    """A key of the process, its value there, and the other value, which half of the bars have."""
 
     key: str
     own: Any
@@ -49,7 +49,7 @@ class Factor:
 
 
 def factors(profile: Profile, given: Sequence[str] = ()) -> tuple[Factor, ...]:
-    """Those of USUAL, or of KEY=VALUE texts in their place. Raises ProfileError for what a bar cannot have of its own."""
+    """The factors of USUAL, or of KEY=VALUE texts instead. Raises ProfileError for keys that cannot differ between bars."""
     process = profile.process
     if not given:
         usual = {key: next(value for value in values if value != getattr(process, key)) for key, values in USUAL.items()}
@@ -100,8 +100,9 @@ def _check_heat(profile: Profile, hottest: Process) -> None:
 
 
 def signs(count: int) -> list[tuple[int, ...]]:
-    """(JOINTS) rows of levels, -1: the process's own, 1: the other one, of `count` factors; the first four rows and the last four
-    have each factor at both levels equally often, so that where a bar stands counts for nothing.
+    """(JOINTS) rows of levels of `count` factors, -1: the process's value, 1: the other one.
+
+    In the first four rows and in the last four each factor has both levels equally often, so that a bar's place cancels out.
 
     >>> [sum(column) for column in zip(*signs(5))]
     [0, 0, 0, 0, 0]
@@ -111,7 +112,7 @@ def signs(count: int) -> list[tuple[int, ...]]:
 
 
 def settings_of_bars(chosen: Sequence[Factor]) -> list[dict[str, Any]]:
-    """What each jointed bar has in place of the process's own values."""
+    """Settings of each jointed bar that differ from the process."""
     return [
         {factor.key: factor.other for factor, sign in zip(chosen, row, strict=True) if sign > 0} for row in signs(len(chosen))
     ]
@@ -119,9 +120,8 @@ def settings_of_bars(chosen: Sequence[Factor]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A coupon's shape, the profiles it was printed with, the factors of its jointed bars, and by number the loads in N at which
-    each bar broke: one for each time that the plate was printed, nan where it is not known.
-    """
+    """Results of a coupon: its shape, profiles and factors, and the loads in N at which the bars broke. loads_n: for each bar one
+    load per printed plate, nan if unknown."""
 
     shape: Shape
     machine: str
@@ -138,7 +138,7 @@ def empty_sheet(shape: Shape, names: Sequence[str], factors: Sequence[Factor]) -
 
 
 def settings_in_words(sheet: Sheet, bar: int) -> str:
-    """What a bar, counted from 1, is and which of its settings are not the process's own."""
+    """Kind of a bar, counted from 1, and its settings that differ from the process."""
     kind = IN_WORDS[KINDS[bar - 1]]
     if bar > JOINTS:
         return kind
@@ -148,7 +148,7 @@ def settings_in_words(sheet: Sheet, bar: int) -> str:
 
 
 def sheet_text(sheet: Sheet) -> str:
-    """The sheet as TOML, with what a person must know to fill it in."""
+    """The sheet as TOML, with instructions."""
     lines = [
         f"# Coupon of {sheet.shape.name} bars. Pull each bar {PULLED[sheet.shape.name]}, until it breaks.",
         "# In the place of nan comes the load in N: kg of a luggage scale times 9.81. A bar that is left at nan is not used.",
@@ -170,7 +170,7 @@ def _value(value: Any) -> str:
 
 
 def read_sheet(path: Path) -> Sheet:
-    """The sheet in a file. Raises ProfileError naming the file, and the bar at fault."""
+    """The sheet in a file. Raises ProfileError naming the file and the faulty bar."""
     document = read_document(path, KEYS, "a coupon's")
     shape = SHAPES.get(str(document.get("coupon")))
     if shape is None:
@@ -217,7 +217,7 @@ def _loads(path: Path, shape: Shape, row: Mapping[str, Any]) -> tuple[int, tuple
 
 
 def load_problem(shape: Shape, load_n: float) -> str:
-    """Why a number cannot be the load at which a bar broke; "": it can."""
+    """Why a number cannot be a load at which a bar broke; "" if it can."""
     most_n = MOST_MPA / shape.strength_mpa(1.0)
     if isfinite(load_n) and 0.0 < load_n <= most_n:
         return ""

@@ -1,9 +1,8 @@
-"""Fit: what the break loads of a coupon say: strengths, and which settings make joints stronger than their scatter can; in words,
-as a table that others can compare with, and as tables of profiles.
+"""Fit of break loads: strengths, and settings whose effect on joints exceeds the scatter; as text, tables and profiles.
 
-The logarithm of a bar's strength is a sum: of the plate it was printed on, its kind, and for a jointed bar half of each factor's
-effect, up or down. Least squares find them, what is left over is the scatter, the same in per cent for all bars. An effect counts
-where Student's t of it would come from scatter alone once in a hundred times.
+The logarithm of a bar's strength is the sum of terms for its plate, its kind and, for a jointed bar, plus or minus half of each
+factor's effect. Least squares find the terms; the residuals give the scatter, the same in per cent for all bars. An effect is
+significant if scatter alone would produce its Student's t once in a hundred times.
 """
 
 from collections.abc import Sequence
@@ -21,13 +20,13 @@ from profiles.errors import ProfileError
 from profiles.material import Material
 
 BY_CHANCE = 0.01
-LEAST_FREEDOM = 3  # loads beyond the numbers that are sought
+LEAST_FREEDOM = 3  # loads beyond the number of unknowns
 
 
 @dataclass(frozen=True)
 class Effect:
-    """How many times as much a joint holds with a factor's other value as with the process's own; how often scatter alone would
-    show as much; and how large an effect must be to be told from scatter."""
+    """Effect of a factor on joints. ratio: strength with the other value to that with the process's own; by_chance: probability
+    that scatter alone shows as much; least_ratio: smallest significant effect."""
 
     factor: Factor
     ratio: float
@@ -36,19 +35,19 @@ class Effect:
 
     @property
     def told(self) -> bool:
-        """Whether it is more than scatter."""
+        """Whether the effect is significant."""
         return self.by_chance < BY_CHANCE
 
     @property
     def wins(self) -> bool:
-        """Whether the other value is the better one."""
+        """Whether the other value is significantly better."""
         return self.told and self.ratio > 1.0
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Strengths in MPa, of the whole section: of joints as the process makes them and with what won, of bars in one piece upright
-    and lying (None: no load is known); scatter: standard deviation of a bar's strength, as a share of it; loads: their number."""
+    """Strengths in MPa of the whole section: of joints of the process and of the best joints, of bars in one piece upright and
+    flat (None: not loaded). scatter: relative standard deviation of a bar's strength; loads: their number."""
 
     effects: tuple[Effect, ...]
     joint_mpa: float
@@ -65,7 +64,7 @@ class Outcome:
 
 
 def evaluate(sheet: Sheet) -> Outcome:
-    """Strengths and effects from the loads of a sheet. Raises ProfileError where they are too few."""
+    """Strengths and effects from the loads of a sheet. Raises ProfileError for too few loads."""
     rows = [(bar, plate, load) for bar, loads in enumerate(sheet.loads_n, start=1) for plate, load in enumerate(loads)]
     rows = [row for row in rows if not isnan(row[2])]
     plates = sorted({plate for _, plate, _ in rows})
@@ -106,7 +105,7 @@ def _effect(factor: Factor, half: float, sigma: float, freedom: int) -> Effect:
 
 
 def student_beyond(t: float, freedom: int) -> float:
-    """How often |Student's t| with `freedom` degrees of freedom is greater: Abramowitz and Stegun, 26.7.3 and 26.7.4.
+    """Probability that |Student's t| with `freedom` degrees of freedom is greater: Abramowitz and Stegun, 26.7.3 and 26.7.4.
 
     >>> round(student_beyond(2.776, 4), 4), round(student_beyond(3.169, 10), 4), round(student_beyond(12.706, 1), 4)
     (0.05, 0.01, 0.05)
@@ -122,7 +121,7 @@ def student_beyond(t: float, freedom: int) -> float:
 
 
 def _t_of(beyond: float, freedom: int) -> float:
-    """The t beyond which that share lies, by halving."""
+    """The t that is exceeded with a given probability, by bisection."""
     low, high = 0.0, 1000.0
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -139,7 +138,7 @@ def outcome_text(outcome: Outcome) -> str:
 
 
 def report_lines(sheet: Sheet, outcome: Outcome, version: str) -> list[str]:
-    """The Markdown page: what was printed and broken how, strengths, effects, every bar."""
+    """Markdown report: what was printed and how it broke, strengths, effects, every bar."""
     how = {"machine": sheet.machine, "material": sheet.material, "process": sheet.process, "bars": bars_in_words(sheet.shape)}
     how |= {"loads": str(outcome.loads), "scatter": f"{100 * outcome.scatter:.1f} %", "tiltprint": version}
     strengths = [(name, f"{mpa:.1f}", share.strip(" ,")) for name, mpa, share in _strengths(outcome)]
@@ -160,7 +159,7 @@ def report_lines(sheet: Sheet, outcome: Outcome, version: str) -> list[str]:
 
 
 def bars_in_words(shape: Shape) -> str:
-    """The section and how it is stressed."""
+    """The section and its load case."""
     section = f"{shape.depth_mm:g} x {shape.thickness_mm:g} mm"
     if shape.lever_mm > 0.0:
         return f"bent, {section}, {shape.lever_mm:g} mm from the joint: 6 F L / (b d^2), d = {shape.depth_mm:g} mm"
@@ -202,8 +201,8 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def material_tables(outcome: Outcome, before: Material, day: date) -> dict[str, Any]:
-    """What the material bears across layers, by the bars in one piece, and which share of it a joint with what won does; a joint
-    that bears more counts as one piece. before: whose strength stays where no such bar was broken."""
+    """Tables of a material: its strength across layers, from bars in one piece, and the fraction that the best joints reach, at
+    most 1. before: material whose strength stays if no such bar was broken."""
     measured = outcome.upright_mpa is not None
     upright = round(outcome.upright_mpa, 2) if outcome.upright_mpa is not None else before.interlayer_strength_mpa
     factor = round(min(1.0, outcome.best_joint_mpa / upright), 3)
@@ -214,7 +213,7 @@ def material_tables(outcome: Outcome, before: Material, day: date) -> dict[str, 
 
 
 def process_tables(outcome: Outcome, day: date) -> dict[str, Any]:
-    """The settings that won; empty where none did."""
+    """Tables of a process with the settings that won; {} if none did."""
     return {"process": {key: _with_source(value, outcome, day) for key, value in outcome.won.items()}} if outcome.won else {}
 
 

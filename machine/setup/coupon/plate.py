@@ -1,8 +1,9 @@
-"""Plate: where the bars of a coupon stand, and the parts that they are printed in.
+"""Plate: the arrangement of a coupon's bars, and the parts in which they are printed.
 
-The jointed bars lean outwards on a ring, by turns low and high. Part 1 is what lies below all joints, with the bars in one piece,
-level. Then the table tilts by a bar's lean and turns it upright; the bar is printed on along its axis: one part a bar, the low
-ones first. Nothing may stand above the base plane of a part, which decides how much higher the high ones are.
+The jointed bars lean outward on a ring, alternately low and high. Part 1 is everything below the joints, and the bars in one
+piece, with the table level. Then the table tilts by a bar's lean and turns the bar upright, which is printed on along its axis:
+one part per bar, the low ones first. Nothing may stand above the base plane of a part, which decides how much higher the high
+ones are.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,18 +28,18 @@ from profiles.messages import key_name
 from profiles.profile import Profile
 
 LEANS_DEG = (45.0, 40.0, 35.0, 30.0, 25.0, 20.0)
-HEIGHTS_MM = (0.0, 4.0, 9.0, 14.0, 19.0)  # over the least at which the lower end of a bar is whole
+HEIGHTS_MM = (0.0, 4.0, 9.0, 14.0, 19.0)  # above the least at which the lower end of a bar is whole
 RISES_MM = tuple(float(rise) for rise in range(31))
 GAP_MM = 3.0  # between bars, and to the plate's edge
 PITCH = 2.0 * pi / JOINTS
-LOW_MM = 1.0  # what of a bar lies lower stands on the plate
+LOW_MM = 1.0  # a bar's section below this stands on the plate
 FLAT = (0.0, 0.0), (0.0, 0.0)
 Halves = tuple[Floats, Floats, m3.CrossSection]
 
 
 @dataclass(frozen=True)
 class Ring:
-    """How the jointed bars stand: their lean, the heights of the low and of the high joints, and their radii."""
+    """Arrangement of the jointed bars: their lean, and heights and radii of the low and the high joints."""
 
     lean_rad: float
     heights_mm: tuple[float, float]
@@ -50,14 +51,14 @@ class Ring:
         return PITCH * (2 * of_level + high + 0.5), self.radii_mm[high], self.heights_mm[high]
 
     def base(self, joint: int) -> Plane:
-        """The plane of a joint, its normal the bar's axis."""
+        """The plane of a joint, its normal along the bar's axis."""
         turn, radius, height = self.place(joint)
         out, up = sin(self.lean_rad), cos(self.lean_rad)
         return Plane(np.array([out * cos(turn), out * sin(turn), up]), out * radius + up * height)
 
 
 def coupon(shape: Shape, profile: Profile) -> Decomposition:
-    """The plate's bars in parts. Raises MoveError for a machine that cannot print them, saying what stands in the way."""
+    """The bars of the plate in parts. Raises MoveError for a machine that cannot print them, with the obstacle."""
     machine = profile.machine
     if not machine.tilts:
         raise MoveError(f"{machine.name} has three axes: the joints of a coupon are made on a table that tilts")
@@ -77,13 +78,13 @@ def coupon(shape: Shape, profile: Profile) -> Decomposition:
 
 
 def _jointed(shape: Shape, ring: Ring, joint: int) -> Solid:
-    """A jointed bar as a whole."""
+    """A whole jointed bar."""
     turn, radius, height = ring.place(joint)
     return stand(bar(shape, ring.lean_rad, height, joint + 1), shape, turn, radius)
 
 
 def _in_one_piece(shape: Shape) -> list[Solid]:
-    """Two bars upright beside the plate's middle, two lying along X before and behind them."""
+    """Two bars upright beside the plate's centre, two flat along X in front and behind."""
     height = least_height_mm(shape, 0.0)
     upright = [stand(bar(shape, 0.0, height, JOINTS + k), shape, 0.0, 0.0) for k in (1, 2)]
     lying = [bar(shape, 0.0, height, JOINTS + k, True).rotate((0.0, 0.0, -90.0)) for k in (3, 4)]
@@ -104,8 +105,8 @@ def _centred(solid: Solid) -> Solid:
 
 
 def _ring(shape: Shape, profile: Profile) -> Ring:
-    """The steepest lean, then the lowest joints, at which table, head and bars let each other be. Raises MoveError with what
-    stands in the way of the one that comes nearest to it."""
+    """The ring with the steepest lean, then the lowest joints, at which table, head and bars are clear of each other. Raises
+    MoveError with the obstacle of the ring that comes nearest to that."""
     machine = profile.machine
     leans = [lean for lean in LEANS_DEG if lean <= profile.process.self_supporting_angle_deg]
     if not leans:
@@ -125,12 +126,12 @@ def _ring(shape: Shape, profile: Profile) -> Ring:
             problem = _problem(shape, ring, whole, halves, machine)
             if problem is None:
                 return ring
-            nearest = max(problem, nearest, key=lambda told: told[0])  # of the last ones, which lean least
+            nearest = max(problem, nearest, key=lambda told: told[0])  # among the last ones, which lean least
     raise MoveError(f"no coupon of {shape.name} bars can be printed on {machine.name}: {nearest[1]}")
 
 
 def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
-    """Rings as far out as the plate and the level table's X and Y allow, low and narrow ones first."""
+    """Rings as wide as the plate and the level table's X and Y allow, low and narrow ones first."""
     table = machine.table
     edge = (table.radius_mm if table.size_mm is None else 0.5 * min(table.size_mm)) - GAP_MM
     middle = shift(machine, level(machine))
@@ -148,8 +149,8 @@ def _rings(shape: Shape, lean_rad: float, machine: Machine) -> Iterator[Ring]:
 
 
 def _halves(shape: Shape, lean_rad: float, height_mm: float) -> Halves:
-    """Both halves of a bar whose joint stands over the plate's middle and that leans along x: the corners (n, 3) above and below
-    the joint, and the outline of the lower half with a gap around it."""
+    """Corners (n, 3) above and below the joint of a bar that leans along x, its joint above the plate's centre, and the outline
+    of its lower half with a gap around it."""
     base = Plane(np.array([sin(lean_rad), 0.0, cos(lean_rad)]), height_mm * cos(lean_rad))
     top, stub = cut(stand(bar(shape, lean_rad, height_mm), shape, 0.0, 0.0), base)
     return mesh_of(top).vertices, mesh_of(stub).vertices, _around(stub)
@@ -162,7 +163,7 @@ def _around(solid: Solid) -> m3.CrossSection:
 def _problem(
     shape: Shape, ring: Ring, whole: Sequence[Solid], halves: Callable[[float, float], Halves], machine: Machine
 ) -> tuple[int, str] | None:
-    """What stands in the way of a ring, and how near it comes to being printed; None: nothing."""
+    """The obstacle of a ring, and how near the ring comes to being printable; None without one."""
     places = [ring.place(joint) for joint in range(JOINTS)]
     bars = [halves(ring.lean_rad, height) for _, _, height in places]
     tops, stubs, outlines = zip(*bars, strict=True)
@@ -187,6 +188,6 @@ def _problem(
 
 
 def _turned(corners: Floats, turn_rad: float, radius_mm: float) -> Floats:
-    """Corners (n, 3) moved out along x, then turned about z."""
+    """Corners (n, 3) moved outward along x, then turned about z."""
     x, y = corners[:, 0] + radius_mm, corners[:, 1]
     return np.column_stack([x * cos(turn_rad) - y * sin(turn_rad), x * sin(turn_rad) + y * cos(turn_rad), corners[:, 2]])

@@ -1,5 +1,5 @@
-"""Detection: what a firmware says of its machine, and the profile that follows from it.
+"""Detection: reads a firmware's settings and proposes a profile.
 
-A file for each firmware reads its texts into values with their sources (found); propose() puts them over the nearest shipped
-machine. No I/O: the caller has the text. What a text leaves open, as which axis tilts, is refused and not guessed.
+A module for each firmware reads its texts into values with their sources (found); propose() applies them to the nearest shipped
+machine. No I/O: the caller provides the text. What a text leaves open, such as which axis tilts, is refused, not guessed.
 """

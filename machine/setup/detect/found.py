@@ -1,6 +1,4 @@
-"""Found: the values that a firmware reports of its machine, each with the words it was read from; configurations of [name] and
-key = value, as Klipper and LinuxCNC write them.
-"""
+"""Found: the values that a firmware reports, each with its source; and the parser of INI-like files of Klipper and LinuxCNC."""
 
 import configparser
 import re
@@ -15,9 +13,9 @@ Value = float | str | bool | list[float]
 LIMITS, SPEED, ACCELERATION = "limits", "speed", "acceleration"
 PRINTING = "XYZ"
 ABC = "ABC"  # by ISO 841 rotary axes about X, Y and Z
-HALF_SQUARE = sin(radians(45.0))  # of half the angle between the two sides of a right-angled corner
+HALF_SQUARE = sin(radians(45.0))  # of half the angle of a right-angled corner
 EXTRUDER = {"extruder_speed_mm_s": SPEED, "extruder_acceleration_mm_s2": ACCELERATION}  # key below machine -> of the axis E
-FARTHEST = 1e7  # mm or deg; a limit beyond it is none (LinuxCNC's 1e99)
+FARTHEST = 1e7  # mm or deg; a limit beyond it means none (LinuxCNC's 1e99)
 BOX, ROUND = True, False
 KINEMATICS = {  # of Klipper, Kalico and RepRapFirmware: whether X, Y and Z each move between two limits
     **dict.fromkeys(("cartesian", "corexy", "corexz", "hybrid_corexy", "hybrid_corexz", "generic_cartesian", "markforged"), BOX),
@@ -25,13 +23,13 @@ KINEMATICS = {  # of Klipper, Kalico and RepRapFirmware: whether X, Y and Z each
     **dict.fromkeys(("delta", "deltesian", "lineardelta", "rotary_delta", "rotarydelta", "polar", "scara", "winch"), ROUND),
     "hangprinter": ROUND,
 }
-MOST_INCLUDED = 100  # files; more is one that includes itself
+MOST_INCLUDED = 100  # files; more means that one includes itself
 NOTHING = re.compile(r"(?!)")
-CONTINUED = re.compile(r"\\[ \t]*\n")  # a line goes on in the next one (LinuxCNC, docs/src/config/ini-config.adoc, 5c41560)
+CONTINUED = re.compile(r"\\[ \t]*\n")  # a line continues on the next one (LinuxCNC, docs/src/config/ini-config.adoc, 5c41560)
 
 
 class Reading(NamedTuple):
-    """A value in the profile's units, and the words of the firmware that it comes from."""
+    """A value in the profile's units, and its source in the firmware's words."""
 
     value: Value
     source: str
@@ -42,8 +40,8 @@ AxisReadings = dict[str, Reading]  # by LIMITS, SPEED, ACCELERATION; mm or deg, 
 
 @dataclass(frozen=True)
 class ConfigText:
-    """A text to read. name: its file or port, for messages; beside: finds the texts of files that it names by a pattern with
-    * and ?, empty where there is no such file; may raise ProfileError."""
+    """A text to read. name: its file or port, for messages; beside: finds the files that it includes by a pattern with * and ?,
+    empty for none; may raise ProfileError."""
 
     name: str
     text: str
@@ -52,11 +50,11 @@ class ConfigText:
 
 @dataclass(frozen=True)
 class Found:
-    """What a firmware says of its machine.
+    """The values that a firmware reports of its machine.
 
-    firmware: name and version, for people; dialect: for machine.dialect; axes: by letter, with rotary axes, E for the filament;
-    rotary: letters of axes that turn; doubtful: letter of an axis that may turn -> why that is not known; settings: by key below
-    machine; steppers: letter -> [manual_stepper] of Klipper; name: the machine's; probe: its kind; remarks: notes for the person.
+    firmware: name and version, for messages; dialect: for machine.dialect; axes: by letter, with rotary axes, E for the filament;
+    rotary: letters of rotary axes; doubtful: letter of a possibly rotary axis -> why it is uncertain; settings: by key below
+    machine; steppers: letter -> [manual_stepper] of Klipper; name: the machine's; probe: its kind; remarks: notes for the user.
     """
 
     firmware: str
@@ -72,7 +70,7 @@ class Found:
 
 
 def corner_speed(deviation_mm: float, acceleration_mm_s2: float) -> float:
-    """Speed at which a firmware with a junction deviation takes a right-angled corner, mm/s.
+    """Speed at which a firmware with junction deviation takes a right-angled corner, mm/s.
 
     v^2 = a d s / (1 - s) with s the sine of half the corner's angle (Marlin module/planner.cpp, grblHAL planner.c, Klipper
     toolhead.py, whose square_corner_velocity is this speed). At such a corner each of two axes changes its speed by v at once,
@@ -82,17 +80,15 @@ def corner_speed(deviation_mm: float, acceleration_mm_s2: float) -> float:
 
 
 def reading(value: float | None, source: str, unit: float = 1.0) -> Reading | None:
-    """A number in the profile's units; None where it is not known. unit: how many of those the firmware's has."""
+    """A number in the profile's units, None if unknown. unit: size of the firmware's unit."""
     return None if value is None else Reading(value * unit, source)
 
 
 def axis_readings(
     name: str, speed: Reading | None, acceleration: Reading | None, low: float | None, high: float | None, source: str
 ) -> AxisReadings:
-    """What is known of an axis. name: file and axis, for the message; low, high: its limits, source: the words they come from.
-
-    Raises ProfileError where the limits are reversed. One that is beyond FARTHEST bounds nothing.
-    """
+    """The known numbers of an axis. name: file and axis, for messages; low, high: its limits, source: their source. Limits beyond
+    FARTHEST are ignored. Raises ProfileError for reversed limits."""
     limits = None
     if low is not None and high is not None and abs(low) < FARTHEST and abs(high) < FARTHEST:
         if not low < high:
@@ -103,16 +99,16 @@ def axis_readings(
 
 
 def rounded(value: Value) -> Value:
-    """A value as a profile has it: numbers with four decimals."""
+    """A value rounded to four decimals, as in a profile."""
     if isinstance(value, list):
         return [round(number, 4) for number in value]
     return round(value, 4) if isinstance(value, float) else value
 
 
 def has_box(kinematics: str, source: str) -> bool:
-    """Whether X, Y and Z each move between two limits. source: file and setting, for the message.
+    """Whether X, Y and Z each move between two limits. source: file and setting, for messages.
 
-    Raises ProfileError for kinematics that are not known: their axes may be coupled, or follow the table by themselves.
+    Raises ProfileError for unknown kinematics: their axes may be coupled, or follow the table by themselves.
     """
     if kinematics not in KINEMATICS:
         raise ProfileError(
@@ -124,18 +120,18 @@ def has_box(kinematics: str, source: str) -> bool:
 
 @dataclass(frozen=True)
 class Sections:
-    """A configuration by section and key. name: its file, for messages; missing: included files that are not there."""
+    """A configuration by section and key. name: its file, for messages; missing: included files that do not exist."""
 
     name: str
     of: dict[str, dict[str, str]]
     missing: list[str] = field(default_factory=list)
 
     def __getitem__(self, title: str) -> Mapping[str, str]:
-        """The settings of a section; empty for one that is not there."""
+        """The settings of a section; empty for a missing one."""
         return self.of.get(title, {})
 
     def number(self, title: str, key: str) -> float | None:
-        """A number; None where it is not there. Raises ProfileError."""
+        """A number, None if missing. Raises ProfileError."""
         text = self[title].get(key)
         if text is None:
             return None
@@ -148,16 +144,17 @@ class Sections:
         return value
 
     def reading(self, title: str, key: str) -> Reading | None:
-        """A number with its source; None where it is not there. Raises ProfileError."""
+        """A number with its source, None if missing. Raises ProfileError."""
         value = self.number(title, key)
         return None if value is None else Reading(value, f"[{title}] {key}")
 
 
 def read_sections(config: ConfigText, include: re.Pattern[str] = NOTHING, indents: bool = True) -> Sections:
-    """The sections of a text, later ones over earlier ones; keys in lower case; comments begin with #, or with ; after a blank.
+    """The sections of a text, later ones overriding earlier ones; keys in lower case; comments begin with #, or with ; after a
+    blank.
 
-    include: matches a line that names other files by its first group: they are read in its place. indents: a line that begins
-    with a blank continues the value before it. Raises ProfileError.
+    include: matches a line that names other files in its first group: they are read in its place. indents: an indented line
+    continues the value before it. Raises ProfileError.
     """
     parser, missing = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#")), list[str]()
     for name, lines in _pieces(config, include, missing, [0]):
@@ -174,7 +171,7 @@ def read_sections(config: ConfigText, include: re.Pattern[str] = NOTHING, indent
 def _pieces(
     config: ConfigText, include: re.Pattern[str], missing: list[str], count: list[int]
 ) -> Iterator[tuple[str, list[str]]]:
-    """File names and lines in the order in which they are read. count: of files so far."""
+    """File names and lines in reading order. count: of files so far."""
     count[0] += 1
     if count[0] > MOST_INCLUDED:
         raise ProfileError(f"{config.name}: more than {MOST_INCLUDED} files are included: does one include itself?")

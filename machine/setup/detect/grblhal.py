@@ -1,9 +1,9 @@
 """grblHAL: a dump of $$, with the answer to $I before or after it.
 
-settings.h, settings.c, report.c, machine_limits.c and planner.c (f80fc34): $110 on are mm or deg per minute, $120 on per second
-squared, $130 on the travel, in the order of the axes, which [AXS:5:XYZAC] of $I names; $376 says which of A B C turn. An axis
-moves from -travel to 0 of the machine; with bit 3 of $22 from its home on, whose side $23 says; with hard limits ($21) the
-pull-off $27 is left free at both ends. A travel of 0 bounds nothing. $11 is the junction deviation. Neither $13 nor G20 turns a
+settings.h, settings.c, report.c, machine_limits.c and planner.c (f80fc34): from $110 mm or deg per minute, from $120 per second
+squared, from $130 the travel, in the order of the axes, which [AXS:5:XYZAC] of $I names; $376 says which of A B C are rotary. An
+axis moves from -travel to 0 of the machine; with bit 3 of $22 from its home, whose side $23 gives; with hard limits ($21) the
+pull-off $27 is kept free at both ends. A travel of 0 means no limit. $11 is the junction deviation. Neither $13 nor G20 turns a
 setting into inches.
 """
 
@@ -24,12 +24,12 @@ SPEEDS, ACCELERATIONS, TRAVELS = 110, 120, 130
 
 
 def recognise(text: str) -> bool:
-    """Whether a text is such a dump."""
+    """Whether a text is a dump of grblHAL."""
     return {"110", "120", "130"} <= {number for number, _ in SETTING.findall(text)}
 
 
 def read(config: ConfigText) -> Found:
-    """What a dump says. Raises ProfileError."""
+    """The values in a dump. Raises ProfileError."""
     values = {int(number): float(value) for number, value in SETTING.findall(config.text)}
     named = AXES.search(config.text)
     if named is None and SPEEDS + 3 in values:
@@ -61,7 +61,7 @@ def _axis(config: ConfigText, values: dict[int, float], index: int, letter: str)
 
 
 def _envelope(values: dict[int, float], index: int, travel: float) -> tuple[float, float]:
-    """limits_set_work_envelope of machine_limits.c."""
+    """Limits of an axis as in limits_set_work_envelope of machine_limits.c."""
     left = values.get(PULL_OFF, 0.0) if int(values.get(HARD_LIMITS, 0.0)) & 1 else 0.0
     if not int(values.get(HOMING, 0.0)) & AT_ORIGIN:
         return left - travel, 0.0 - left

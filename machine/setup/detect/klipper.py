@@ -1,9 +1,9 @@
-"""Klipper: printer.cfg with the files it includes, or the object configfile as Moonraker gives it (docs/Status_Reference.md).
+"""Klipper: printer.cfg with the files it includes, or the object configfile of Moonraker (docs/Status_Reference.md).
 
 docs/Config_Reference.md, klippy/configfile.py, toolhead.py, stepper.py, kinematics/extruder.py and extras/manual_stepper.py
-(f68e511e2): lengths in mm, speeds in mm/s. What SAVE_CONFIG has written stands behind #*# and counts where the rest is silent. A
-[manual_stepper] counts in the unit of its rotation_distance, degrees for an axis that turns; it has position_min and
-position_max only where they are written; velocity and accel are its defaults.
+(f68e511e2): lengths in mm, speeds in mm/s. SAVE_CONFIG writes after #*#, and applies to keys missing elsewhere. A
+[manual_stepper] counts in the unit of its rotation_distance, degrees for a rotary axis; it has position_min and position_max only
+if written; velocity and accel are its defaults.
 """
 
 import json
@@ -35,10 +35,10 @@ LETTER = re.compile(r"(?:^|_)([abcuvwijk])(?:_axis)?$", re.IGNORECASE)
 OF_Z = re.compile(r"(?:^|_)z(?:$|_|\d)", re.IGNORECASE)
 REGISTERED = re.compile(r"MANUAL_STEPPER\b([^\n]*\bGCODE_AXIS=[ \t]*([A-Z])\b[^\n]*)", re.IGNORECASE)
 STEPPER = re.compile(r"\bSTEPPER=\s*\"?([A-Za-z0-9_]+)", re.IGNORECASE)
-SCREW_MM = 10.0  # greatest lead of the usual screws; as degrees it would be a gear of 36 to 1
+SCREW_MM = 10.0  # greatest usual lead of a screw; in degrees it would be a gear of 36 to 1
 TURN_DEG = 360.0
 RATES = ("velocity", "accel")
-CORNER_MM_S = 5.0  # toolhead.py: square_corner_velocity where it is not set
+CORNER_MM_S = 5.0  # toolhead.py: default of square_corner_velocity
 PROBES = ("bltouch", "probe", "smart_effector", "probe_eddy_current", "load_cell_probe", "cartographer", "beacon")
 SETTINGS = {  # key below machine -> section and key
     "junction_speed_mm_s": ("printer", "square_corner_velocity"),
@@ -57,7 +57,7 @@ def recognise(text: str) -> bool:
 
 
 def read(config: ConfigText) -> Found:
-    """What a configuration says. Raises ProfileError."""
+    """The values in a configuration. Raises ProfileError."""
     told = config.text.lstrip().startswith("{")
     sections, version = _told_sections(config) if told else (_sections(config), "")
     if "printer" not in sections.of:
@@ -89,7 +89,7 @@ def read(config: ConfigText) -> Found:
 
 
 def _told_sections(config: ConfigText) -> tuple[Sections, str]:
-    """The sections in a query's answer (`config`: the file's words, `settings`: the values in use; titles in lower case), and the
+    """The sections in a query's answer (`config`: texts of the file, `settings`: values in use; titles in lower case), and the
     version."""
     try:
         document = json.loads(config.text)
@@ -109,7 +109,7 @@ def _told_sections(config: ConfigText) -> tuple[Sections, str]:
 
 def _texts(sections: Any) -> dict[str, dict[str, str]]:
     whole = {str(name): values for name, values in sections.items()} if isinstance(sections, Mapping) else {}
-    return {  # null stands for what is not set and has no default
+    return {  # null means unset without a default
         name: {str(key): str(value) for key, value in values.items() if value is not None}
         for name, values in whole.items()
         if isinstance(values, Mapping)
@@ -117,7 +117,7 @@ def _texts(sections: Any) -> dict[str, dict[str, str]]:
 
 
 def _sections(config: ConfigText) -> Sections:
-    """The sections of a file; what SAVE_CONFIG has written counts where the file says nothing."""
+    """The sections of a file; those of SAVE_CONFIG apply to keys missing in the file."""
     own, _, saved = config.text.partition(f"\n{SAVED}[")
     sections = read_sections(replace(config, text=own), INCLUDE)
     lines = f"[{saved}".split("\n") if saved else []
@@ -127,7 +127,7 @@ def _sections(config: ConfigText) -> Sections:
 
 
 def _linear(sections: Sections, remarks: list[str]) -> dict[str, AxisReadings]:
-    """X, Y and Z: one speed and one acceleration for all, where an axis may have less. Raises ProfileError."""
+    """X, Y and Z, which share speed and acceleration, though an axis may have lower ones. Raises ProfileError."""
     named = [sections["printer"][key] for key in ("kinematics", "kinematics_abc") if key in sections["printer"]]
     box = has_box(", ".join(named), f"{sections.name}: [printer] kinematics")
     if not box:
@@ -144,7 +144,7 @@ def _linear(sections: Sections, remarks: list[str]) -> dict[str, AxisReadings]:
 
 
 def _registered(sections: Sections) -> dict[str, tuple[str, str]]:
-    """Stepper -> the letter that a macro gives it for G1, and the rest of that command."""
+    """Stepper -> its letter for G1, assigned by a macro, and the rest of that command."""
     commands = (command for values in sections.of.values() for command in REGISTERED.findall(values.get("gcode", "")))
     return {named[1]: (letter.upper(), rest) for rest, letter in commands if (named := STEPPER.search(rest))}
 
@@ -152,7 +152,7 @@ def _registered(sections: Sections) -> dict[str, tuple[str, str]]:
 def _steppers(
     sections: Sections, registered: Mapping[str, tuple[str, str]], remarks: list[str]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Letter -> [manual_stepper], and letter -> why it may not turn."""
+    """Letter -> [manual_stepper], and letter -> why it may not be rotary."""
     steppers, doubtful, others = dict[str, str](), dict[str, str](), list[str]()
     for title in sections.of:
         if not title.startswith(MANUAL):
@@ -174,7 +174,7 @@ def _steppers(
 
 
 def _doubt(sections: Sections, title: str, letter: str) -> str:
-    """Why a stepper may not turn; "" where it does."""
+    """Why a stepper may not be rotary; "" if it is."""
     distance = sections.number(title, "rotation_distance")
     if OF_Z.search(title.removeprefix(MANUAL)):
         return "is named like a Z axis"
@@ -186,7 +186,7 @@ def _doubt(sections: Sections, title: str, letter: str) -> str:
 
 
 def _turning(sections: Sections, title: str, registration: str) -> AxisReadings:
-    """The numbers of a stepper; those with which it is registered as an axis go before its own."""
+    """The numbers of a stepper; those of its registration as an axis take precedence."""
     rates: list[Reading | None] = []
     for own in RATES:
         told = f"LIMIT_{own.upper()}"

@@ -1,9 +1,10 @@
 """LinuxCNC: its .ini, with the files it includes.
 
 docs/src/config/ini-config.adoc (0052c79): [TRAJ] COORDINATES names the axes, LINEAR_UNITS and ANGULAR_UNITS the units, all per
-second; [AXIS_X] has MIN_LIMIT, MAX_LIMIT, MAX_VELOCITY and MAX_ACCELERATION, before 2.8 [AXIS_0] by the joint's number; where the
-axis is silent its joint counts; with kinematics that follow the table (xyzac-trt-kins and the like, [KINS] KINEMATICS) the joints
-go first, because their places are the machine's; no velocity exceeds those of [TRAJ]. An axis without limits is endless.
+second; [AXIS_X] has MIN_LIMIT, MAX_LIMIT, MAX_VELOCITY and MAX_ACCELERATION, before 2.8 [AXIS_0] by the joint's number. Keys
+missing there are taken from the joint; with kinematics that follow the table (xyzac-trt-kins and the like, [KINS] KINEMATICS) the
+joints take precedence, for their positions are the machine's. No velocity exceeds those of [TRAJ]. An axis without limits is
+unlimited.
 """
 
 import re
@@ -22,12 +23,12 @@ PLAIN = ("trivkins", "corexykins")
 
 
 def recognise(text: str) -> bool:
-    """Whether a text is such a file."""
+    """Whether a text is a LinuxCNC configuration."""
     return SIGNS.search(text) is not None
 
 
 def read(config: ConfigText) -> Found:
-    """What a file says. Raises ProfileError."""
+    """The values in a file. Raises ProfileError."""
     sections = read_sections(config, INCLUDE, indents=False)
     module = sections["KINS"].get("kinematics", "")
     kinematics = (module.split() or [""])[0]
@@ -63,13 +64,13 @@ def _letters(text: str) -> str:
 
 
 def _titles(sections: Sections, letter: str, joint: int, follows: bool) -> list[str]:
-    """The sections of an axis, the one that counts first."""
+    """The sections of an axis in order of precedence."""
     titles = (f"JOINT_{joint}", f"AXIS_{letter}") if follows else (f"AXIS_{letter}", f"JOINT_{joint}")
     return [title for title in (*titles, f"AXIS_{joint}") if title in sections.of]
 
 
 def _unit(sections: Sections, key: str, units: Mapping[str, float], allowed: str) -> float:
-    """How many mm or deg a unit has; mm and degree where none is named. Raises ProfileError."""
+    """Size of a unit in mm or deg; mm and degree by default. Raises ProfileError."""
     text = sections["TRAJ"].get(key, "").strip().lower()
     if text and text not in units:
         raise ProfileError(f"{sections.name}: [TRAJ] {key.upper()} is {text[:40]!r}: {allowed} is expected")
@@ -89,7 +90,7 @@ def _axis(sections: Sections, letter: str, titles: list[str], unit: float) -> Ax
 
 
 def _first(sections: Sections, titles: list[str], key: str, unit: float) -> tuple[float, str] | None:
-    """The number of the first section that has it, in the profile's units, and where it stands."""
+    """The number of the first section that has it, in the profile's units, and its source."""
     for title in titles:
         if (value := sections.number(title, key.lower())) is not None:
             return unit * value, f"[{title}] {key}"

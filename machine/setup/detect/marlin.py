@@ -1,9 +1,9 @@
-"""Marlin: the answers to M115, M503 and M211, as a saved log has them or as they came.
+"""Marlin: the answers to M115, M503 and M211, direct or from a saved log.
 
 gcode/config/M200-M205.cpp, gcode/control/M211.cpp and module/settings.cpp of Marlin 2.1: M203 gives units/s, M201 and M204
 units/s2, under the letters of AXIS4_NAME and so on; in inches after G20. M205 gives jerk by axis, or J, the junction deviation.
-M211 gives the software end stops in mm. M115 has capabilities, and the reach of the axes in a build with M115_GEOMETRY_REPORT,
-the fourth axis and those after it as i, j, k (gcode/host/M115.cpp).
+M211 gives the software end stops in mm. M115 has capabilities, and in a build with M115_GEOMETRY_REPORT the reach of the axes,
+from the fourth as i, j, k (gcode/host/M115.cpp).
 """
 
 import re
@@ -25,7 +25,7 @@ from machine.setup.detect.found import (
 )
 from profiles.errors import ProfileError
 
-REPORT = re.compile(  # behind echo: and what a host's log adds; a command and nothing but its words, so no sentence about it
+REPORT = re.compile(  # after echo: and what a host's log adds; a command with only its words, not a sentence about it
     rf"(?:^|[:>])[ \t]*(M92|M20[0-5]|M211|M851|G20)((?:[ \t]+[A-Z]{NUMBER})*)[ \t]*(?:[;(#].*)?$", re.MULTILINE
 )
 WORD = re.compile(rf"([A-Z])({NUMBER})")
@@ -36,13 +36,13 @@ RATES = ("M203", "M201")  # speeds and accelerations
 
 
 def recognise(text: str) -> bool:
-    """Whether a text is such a log."""
+    """Whether a text is a log of Marlin."""
     reports = {command for command, words in REPORT.findall(text) if words}
     return {"M92", "M203"} <= reports and ("echo:" in text or "M205" in reports)
 
 
 def read(config: ConfigText) -> Found:
-    """What a log says. Raises ProfileError."""
+    """The values in a log. Raises ProfileError."""
     words = _words(config)
     axes = _axes(config, words)
     capabilities = set(CAPABILITY.findall(config.text))
@@ -63,7 +63,7 @@ def read(config: ConfigText) -> Found:
 
 
 def _words(config: ConfigText) -> dict[str, dict[str, float]]:
-    """Command -> its letters; of several extruders the first."""
+    """Command -> its letters; the first of several extruders."""
     words: dict[str, dict[str, float]] = {}
     for command, rest in REPORT.findall(config.text):
         if command == "G20":
@@ -90,7 +90,7 @@ def _axes(config: ConfigText, words: dict[str, dict[str, float]]) -> dict[str, A
 
 
 def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
-    """The answer to M211: `Min:  X0.00 Y0.00 Z0.00   Max:  X200.00 ...`."""
+    """Limits in the answer to M211: `Min:  X0.00 Y0.00 Z0.00   Max:  X200.00 ...`."""
     line = SOFT_LIMITS.search(text)
     if line is None:
         return {}
@@ -99,7 +99,7 @@ def _soft_limits(text: str) -> dict[str, tuple[float, float, str]]:
 
 
 def _area(text: str, letters: list[str]) -> dict[str, tuple[float, float, str]]:
-    """The answer to M115, whose axes are in the order of M203."""
+    """Limits in the answer to M115, whose axes are in the order of M203."""
     area = AREA.search(text)
     if area is None:
         return {}
@@ -109,7 +109,7 @@ def _area(text: str, letters: list[str]) -> dict[str, tuple[float, float, str]]:
 
 
 def _corner(words: dict[str, dict[str, float]]) -> dict[str, Reading]:
-    """The lesser jerk of X and Y, or the speed that a junction deviation gives at the acceleration of printing moves."""
+    """Corner speed: the smaller jerk of X and Y, or from the junction deviation at the acceleration of printing moves."""
     told = words.get("M205", {})
     jerks = [told[letter] for letter in "XY" if letter in told]
     if jerks:

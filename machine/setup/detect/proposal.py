@@ -1,6 +1,4 @@
-"""Proposal: the firmware that a text comes from is recognised and read; the nearest shipped machine gets what it says on top, and
-what is left is to be measured.
-"""
+"""Proposal: recognises and reads a firmware's text, applies its values to the nearest shipped machine, and lists what to measure."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +18,7 @@ LINEAR = {LIMITS: "limits_mm", SPEED: "speed_mm_s", ACCELERATION: "acceleration_
 ROTARY = {LIMITS: "limits_deg", SPEED: "speed_deg_s", ACCELERATION: "acceleration_deg_s2"}
 SETTINGS = ("junction_speed_mm_s", "extruder_speed_mm_s", "extruder_acceleration_mm_s2", "nozzle_limit_c", "bed_limit_c",
             "head.nozzle_mm", "arcs", "receive_bytes")  # fmt: skip
-CHOICES = ("machine.arcs", "machine.receive_bytes")  # with which a print differs, but does not fail
+CHOICES = ("machine.arcs", "machine.receive_bytes")  # a print differs with them, but does not fail
 CALIBRATED = tuple(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("point_mm", "sign", "zero_deg"))
 DRAWN = ("machine.tilt.axis", "machine.turn.budget_deg", "machine.table", "machine.head.silhouette_mm", "machine.head.boxes",
          "machine.cradle")  # fmt: skip
@@ -31,8 +29,8 @@ SOURCE = re.compile(r"^\s*(?://\s*)?#define\s+[A-Z]|^\[(?:platformio|env:|config
 
 @dataclass(frozen=True)
 class Proposal:
-    """base: the profile to inherit; values: key -> reading; absent: keys that this firmware does not give: the base's stay;
-    measured: keys that no firmware knows; remarks: notes for the person."""
+    """A profile to create. base: the profile to inherit; values: key -> reading; absent: keys that this firmware does not report:
+    the base's stay; measured: keys that no firmware knows; remarks: notes for the user."""
 
     base: str
     values: Mapping[str, Reading]
@@ -42,9 +40,9 @@ class Proposal:
 
 
 def propose(found: Found, base: str | None = None) -> Proposal:
-    """What a profile says differently from the base; base: the profile that the person names, None: the nearest shipped machine.
+    """The profile's differences from a base: the profile named by the user, or the nearest shipped machine.
 
-    Raises ProfileError where it is not known which axes tilt and turn the table.
+    Raises ProfileError when it is unknown which axes tilt and turn the table.
     """
     remarks = list(found.remarks)
     named = None if base is None else _machine(base)
@@ -56,7 +54,7 @@ def propose(found: Found, base: str | None = None) -> Proposal:
         values |= {f"machine.{letter.lower()}.{LINEAR[key]}": reading for key, reading in found.axes[letter].items()}
     if tilts:
         values |= _turning(found, pair, _machine(name))
-        if named is None:  # not the base's, which may be of another firmware
+        if named is None:  # the base's may belong to another firmware
             values["machine.coordinates"] = Reading("table", "its axes are plain unless a command makes it follow the table")
     else:
         values |= _bed(values)
@@ -68,7 +66,7 @@ def propose(found: Found, base: str | None = None) -> Proposal:
 
 
 def settings_of(proposal: Proposal, name: str, firmware: str) -> list[str]:
-    """KEY=VALUE settings over the base: the values, their sources, and what is left to measure."""
+    """KEY=VALUE settings over the base: the values, their sources, and the keys left to measure."""
     base = _machine(proposal.base)
     uncertain = [*proposal.measured, *(key for key in proposal.absent if key not in CHOICES)]
     left = [key for key in base.uncalibrated if key not in proposal.values]
@@ -91,8 +89,8 @@ def _machine(name: str) -> Machine:
 
 
 def _nearest(found: Found, pair: str) -> str:
-    """The shipped machine of the same firmware, then letters, then dialect, whose axes differ least; among equals the first by
-    name. pair: the letters of tilt and turn, empty for a fixed table."""
+    """The nearest shipped machine by firmware, letters, dialect and differing axis numbers; the first by name if several tie.
+    pair: the letters of tilt and turn, empty for a fixed table."""
 
     def differences(name: str) -> tuple[bool, bool, bool, int, str]:
         machine = _machine(name)
@@ -104,7 +102,7 @@ def _nearest(found: Found, pair: str) -> str:
 
 
 def _differing(found: Found, machine: Machine) -> int:
-    """How many numbers of the axes differ from a machine's."""
+    """Number of axis values that differ from a machine's."""
     linear = {"X": machine.x, "Y": machine.y, "Z": machine.z}
     values = [
         (getattr(linear[letter], LINEAR[key]), told.value) for letter in PRINTING for key, told in found.axes[letter].items()
@@ -134,9 +132,9 @@ def _turning(found: Found, pair: str, machine: Machine) -> dict[str, Reading]:
 
 
 def _pair(found: Found, named: Machine | None, remarks: list[str]) -> str:
-    """The letters of tilt and turn: those of the machine that the person names, else C turns and the one other tilts (ISO 841).
+    """The letters of tilt and turn: those of the machine named by the user, else C turns and the other one tilts (ISO 841).
 
-    Raises ProfileError where that leaves a choice: a wrong axis would tilt the table instead of turning it, or move Z.
+    Raises ProfileError for an ambiguity: a wrong axis would tilt the table instead of turning it, or move Z.
     """
     if named is not None and {named.tilt.letter, named.turn.letter} <= {*found.rotary, *found.doubtful}:
         return named.tilt.letter + named.turn.letter
@@ -157,7 +155,7 @@ def _pair(found: Found, named: Machine | None, remarks: list[str]) -> str:
 
 
 def _bed(values: Mapping[str, Reading]) -> dict[str, Reading]:
-    """A bed as large as X and Y reach, the model on its middle."""
+    """A bed as large as X and Y reach, with the model at its centre."""
     reach = [values.get(f"machine.{axis}.limits_mm") for axis in "xy"]
     spans = [reading.value for reading in reach if reading is not None and isinstance(reading.value, list)]
     if len(spans) < 2:
@@ -181,7 +179,7 @@ def _sought(tilts: bool) -> list[str]:
     return [*linear, *(rotary if tilts else ()), *(f"machine.{key}" for key in SETTINGS)]
 
 
-# Whether a text is of a firmware, what it says (raises ProfileError), and what kind of text that is, for people.
+# For each firmware whether a text is its own, the reader (raises ProfileError), and the kind of text for messages.
 READERS: tuple[tuple[Callable[[str], bool], Callable[[ConfigText], Found], str], ...] = (
     (linuxcnc.recognise, linuxcnc.read, "LinuxCNC's .ini"),
     (klipper.recognise, klipper.read, "Klipper's printer.cfg"),
@@ -192,10 +190,9 @@ READERS: tuple[tuple[Callable[[str], bool], Callable[[ConfigText], Found], str],
 
 
 def read(config: ConfigText) -> Found:
-    """What a text says of its machine, numbers as a profile has them.
+    """The values in a text of any known firmware, rounded as in a profile.
 
-    Raises ProfileError for a text of no firmware known here, and for one without speed or acceleration of X, Y or Z, which every
-    firmware has: half a file.
+    Raises ProfileError for other texts, and for one without speed or acceleration of X, Y or Z, which is incomplete.
     """
     found = _reader(config)(config)
     lacking = [

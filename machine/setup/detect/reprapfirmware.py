@@ -1,12 +1,12 @@
-"""RepRapFirmware 3: config.g, or its object model as M409 and rr_model answer it, a line of JSON for each key.
+"""RepRapFirmware 3: config.g, or its object model as answered by M409 and rr_model, a line of JSON for each key.
 
 Platform/Platform.cpp, Heating/Heat.cpp and Heater.cpp (fc1cd16c): speed and jerk of an axis are per minute, acceleration per
 second squared; heat.bedHeaters and a tool's heaters are indices into heat.heaters, whose max is the greatest temperature.
 
 config.g has the settings as commands, with the macros it calls. GCodes/GCodes2.cpp, GCodes3.cpp (DoDriveMapping): M203 and M566
-are in mm or deg per minute, M203 S1 and M205 per second, M201 per second squared; M208 has both limits with a colon between, or
+are in mm or deg per minute, M203 S1 and M205 per second, M201 per second squared; M208 has both limits separated by a colon, or
 one with S1 for the least and S0 for the greatest; M584 makes axes, R1 and R2 rotary ones; M669 K or M665 sets the kinematics;
-M143 limits heater 1 where it names none; M563 H names the heater of a tool, M140 H that of the bed, -1 none.
+M143 limits heater 1 by default; M563 H names the heater of a tool, M140 H that of the bed, -1 none.
 """
 
 import json
@@ -41,7 +41,7 @@ Table = Mapping[str, Any]
 COMMENT = re.compile(r'"[^"]*"|;.*')
 COMMAND = re.compile(r"\s*([GM]\d+(?:\.\d+)?)\b(.*)")
 NUMBERS = r"-?(?:\d+\.?\d*|\.\d+)"
-PARAMETER = re.compile(rf"(?<!')([A-Za-z])\s*({NUMBERS}(?::{NUMBERS})*)")  # 'a is an axis beside A, which no profile has
+PARAMETER = re.compile(rf"(?<!')([A-Za-z])\s*({NUMBERS}(?::{NUMBERS})*)")  # 'a is an axis distinct from A, which no profile has
 EXPRESSION = re.compile(r"'?[A-Za-z]\s*\{")
 BLOCKS = ("if", "elif", "else", "while")
 MACRO = re.compile(r'M98\s+P\s*"([^"]+)"')
@@ -51,14 +51,14 @@ KINEMATICS = dict(  # Movement/Kinematics/Kinematics.h, KinematicsType
 ) | {10: "rotarydelta", 11: "markforged"}
 
 MINUTE_S = 60.0
-# Command -> what it tells of each axis, the seconds of its unit, and letters that are no axes; S1 among these: per second.
+# Command -> key of each axis, the seconds of its unit, and letters that are not axes; S1 among these: per second.
 RATES = {"M201": (ACCELERATION, 1.0, ""), "M203": (SPEED, MINUTE_S, "SI")}
 JERKS = {"M205": 1.0, "M566": MINUTE_S}  # command -> the seconds of its unit
-HEATERS = {"M140": "bed", "M563": "nozzle"}  # command -> the field that H of the bed, of the first tool, sets
+HEATERS = {"M140": "bed", "M563": "nozzle"}  # command -> the field set by H of the bed, of the first tool
 
-Parameters = dict[str, list[float]]  # letter -> its numbers, several with colons between
+Parameters = dict[str, list[float]]  # letter -> its numbers, separated by colons
 Ends = dict[str, list[float | None]]  # letter -> least and greatest
-TURNING = "ABCD"  # GCodes3.cpp, DoDriveMapping: of these letters an axis turns unless R0 says otherwise
+TURNING = "ABCD"  # GCodes3.cpp, DoDriveMapping: axes with these letters are rotary unless R0 says otherwise
 PROBES = {  # Endstops/EndstopDefs.h, ZProbeType
     1: "an analogue probe",
     5: "a switch as its probe",
@@ -71,11 +71,11 @@ PROBES = {  # Endstops/EndstopDefs.h, ZProbeType
 
 @dataclass
 class DuetBoard:
-    """What is read so far.
+    """The values read so far.
 
     axes: by letter, E for the filament; jerks_mm_s: by letter; heaters_c: greatest temperature by heater; nozzle, bed: their
-    heaters, bed below 0: none; turns: the axes that M584 makes -> whether it says that they turn, None where it is silent;
-    kinematics: by its name in found.KINEMATICS; probe: its type.
+    heaters, bed below 0: none; turns: the axes of M584 -> whether they are rotary, None if not stated; kinematics: by its name in
+    found.KINEMATICS; probe: its type.
     """
 
     firmware: str = "RepRapFirmware"
@@ -91,7 +91,7 @@ class DuetBoard:
     remarks: list[str] = field(default_factory=list)
 
     def found(self, file: str, kinematics_source: str, jerk_source: str, heat_source: str) -> Found:
-        """The values of a profile; file: for messages. Raises ProfileError for kinematics that are not known."""
+        """The values as found in a file. Raises ProfileError for unknown kinematics."""
         if not has_box(self.kinematics, f"{file}: {kinematics_source}"):
             self.remarks.append(f"its kinematics are {self.kinematics}: how far X, Y and Z reach stands in no axis of them")
             for letter in PRINTING:
@@ -128,7 +128,7 @@ def recognise(text: str) -> bool:
 
 
 def read(config: ConfigText) -> Found:
-    """What either says. Raises ProfileError."""
+    """The values in a config.g or in answers to M409. Raises ProfileError."""
     return _read_model(config) if MODEL.search(config.text) else _read_commands(config)
 
 
@@ -190,7 +190,7 @@ def _first(values: Any, otherwise: int) -> int:
 
 
 def _read_commands(config: ConfigText) -> Found:
-    """What a config.g says. Raises ProfileError."""
+    """The values in a config.g. Raises ProfileError."""
     board, ends, missing, unread = DuetBoard(), Ends(), list[str](), 0
     for command, parameters, expressions in _commands(config, missing, [0]):
         unread += expressions
@@ -214,7 +214,7 @@ def _read_commands(config: ConfigText) -> Found:
 
 
 def _take(board: DuetBoard, ends: Ends, command: str, parameters: Parameters) -> None:
-    """Take in one command."""
+    """Apply one command."""
     first = {letter: numbers[0] for letter, numbers in parameters.items()}
     if command in RATES:
         key, unit_s, others = RATES[command]
@@ -231,7 +231,7 @@ def _take(board: DuetBoard, ends: Ends, command: str, parameters: Parameters) ->
 
 
 def _take_other(board: DuetBoard, ends: Ends, command: str, parameters: Parameters, first: Mapping[str, float]) -> None:
-    """Take in a command that has a rule of its own."""
+    """Apply a command that has a rule of its own."""
     match command:
         case "M208":
             for letter, numbers in parameters.items():
@@ -255,10 +255,10 @@ def _take_other(board: DuetBoard, ends: Ends, command: str, parameters: Paramete
 
 
 def _commands(config: ConfigText, missing: list[str], count: list[int]) -> Iterator[tuple[str, Parameters, int]]:
-    """Every command with the numbers of its letters, and how many letters have an expression.
+    """Each command with the numbers of its letters, and its number of letters with an expression.
 
-    Lines under a condition are skipped; a macro that lies beside the file is read where it is called. missing: takes up the names
-    of macros that do not; count: of files so far.
+    Lines under a condition are skipped; a macro beside the file is read where it is called. missing: collects names of macros
+    that do not exist; count: of files so far.
     """
     count[0] += 1
     if count[0] > MOST_INCLUDED:
