@@ -1,7 +1,7 @@
-"""The dry run: any G-code read back through the machine's kinematics: timeline, findings, deposited plastic.
+"""Dry run: plays any G-code through the machine's kinematics: timeline, findings, deposited plastic.
 
-`dry_run` plays the lines, `summary` has its figures for `--json`; `agreement.agreement` holds the plastic against the model,
-`starvation.find_starvation` a slow line against the moves, `dryrun.Timeline` tells where any line of the program is.
+`dry_run` plays the lines, `summary` gives the figures for `--json`; `agreement.agreement` compares the plastic with the model,
+`starvation.find_starvation` checks a slow line, `dryrun.Timeline` gives the position at any line.
 """
 
 from machine.dryrun.dryrun import DryRun, dry_run, summary

@@ -1,4 +1,4 @@
-"""Clearance: every move of the head against the table and its cradle, every turn of them against the head."""
+"""Clearance: checks every move of the head against table and cradle, and every turn of these against the head."""
 
 from collections.abc import Iterator
 from math import ceil
@@ -17,7 +17,7 @@ from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
 from slicer.paths import Kind
 
-FIRST_MM = 20.0  # of way between the poses tried first
+FIRST_MM = 20.0  # path length between the first poses tried
 MOST_LEFT_MM = 0.05
 MOST_POSES = 2000
 AT_ONCE = 20_000  # moves times directions fill memory
@@ -28,14 +28,14 @@ Solid = tuple[str, Reach]
 
 
 def findings(program: ParsedProgram, deposited: Beads, machine: Machine) -> list[Finding]:
-    """Collisions of straight moves and turns."""
+    """Collisions of straight moves and of turns."""
     if not len(program.line):
         return []
     return [*_straight(program, machine), *_turns(program, deposited, machine)]
 
 
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    """Moves with the table at rest, one group for every pose between turns: two directions settle almost every move."""
+    """Collisions of moves with the table at rest, one group per pose: two directions settle almost every move."""
     problems: list[Finding] = []
     tried = ~_rises_from_home(program) & (program.kind != MoveKind.ROTATE)
     for run, pose in pose_runs(program):
@@ -47,8 +47,8 @@ def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
 
 
 def _rises_from_home(program: ParsedProgram) -> NDArray[np.bool_]:
-    """(n,) moves straight up from where the firmware has homed: there the tip stands on the plate or above it, although a
-    calibrated plate may lie higher than the 0 that it is read as standing at."""
+    """(n,) moves straight up from a homed position. There the tip is on the plate or above it, although a calibrated plate may be
+    above the assumed 0."""
     up = np.flatnonzero(program.end[:, 2] > program.start[:, 2])
     start, end, before = program.start[up], program.end[up], program.end[np.maximum(up - 1, 0)]
     from_home = (up == 0) | (start[:, :3] != before[:, :3]).any(axis=1)
@@ -61,7 +61,7 @@ def _rises_from_home(program: ParsedProgram) -> NDArray[np.bool_]:
 def _close(
     program: ParsedProgram, run: slice, is_tried: NDArray[np.bool_], pose: Pose, machine: Machine
 ) -> Iterator[tuple[Body, Solid, Indices]]:
-    """The bodies and the solids that two directions do not part in one pose, and during which moves of those that are tried."""
+    """Pairs of body and solid that two directions do not separate in one pose, with the moves concerned."""
     tried = np.array([rotation(machine, pose) @ UP, UP])
     meetings = [(body, solid, body.least(tried) - solid[1](tried)) for solid in solids(machine, pose) for body in bodies(machine)]
     close: list[list[NDArray[np.int64]]] = [[] for _ in meetings]
@@ -70,7 +70,7 @@ def _close(
         least = swept(program.start[rows, :3], program.end[rows, :3], tried)
         nearest = least.min(axis=1, initial=np.inf)[:, None]
         for (body, _, margin), own in zip(meetings, close, strict=True):
-            if gaps_of(nearest, margin)[0] < body.need_mm:  # else one direction alone parts all of them
+            if gaps_of(nearest, margin)[0] < body.need_mm:  # else one direction separates all of them
                 own.append(rows[gaps_of(least, margin) < body.need_mm - ROUNDING_MM])
     for (body, solid, _), own in zip(meetings, close, strict=True):
         if any(map(len, own)):
@@ -78,7 +78,7 @@ def _close(
 
 
 def _body(program: ParsedProgram, rows: Indices, pose: Pose, body: Body, solid: Solid, machine: Machine) -> list[Finding]:
-    """One body and one solid in one pose: the moves that two directions left open, by all directions and a search."""
+    """Collisions of one body with one solid in one pose, among the moves left open, by all directions and a search."""
     start, end = program.start[rows, :3], program.end[rows, :3]
     need = body.need_mm - ROUNDING_MM
     normal = rotation(machine, pose) @ UP
@@ -105,10 +105,10 @@ def _body(program: ParsedProgram, rows: Indices, pose: Pose, body: Body, solid: 
 
 
 def _turns(program: ParsedProgram, deposited: Beads, machine: Machine) -> list[Finding]:
-    """Every turn of the table; of a program that turns all the time (curved layers) an even choice, which is said.
+    """Collisions of every turn of the table; for continuous turning (curved layers) an even selection, which is reported.
 
-    What is printed is taken as one convex body. A purge line at the plate's edge would make that far too large; lower than the
-    distance that is kept from the plate, it is part of that.
+    The print is treated as one convex body. Purge lines below the clearance of the plate are left out: at the plate's edge they
+    would make it far too large.
     """
     problems = []
     purge = np.flatnonzero(program.rows_of_types(Kind.PURGE.value)[deposited.rows])
@@ -135,10 +135,11 @@ def _turns(program: ParsedProgram, deposited: Beads, machine: Machine) -> list[F
 
 
 def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> Iterator[Finding]:
-    """One turn of the table, swept: poses are tried so densely that the gaps at two neighbours cover the poses between them.
+    """Findings of one turn of the table, with poses so dense that the gaps at two neighbours cover all poses between them.
 
-    Between two poses every point of what turns moves, against the tip, by at most `_way_mm`; where the gaps at both ends do not
-    leave half of that, the pose between them is tried too, until the way is MOST_LEFT_MM. What MOST_POSES leave open is said.
+    Between two poses every point of the turning bodies moves by at most `_way_mm` relative to the tip; when the gaps at both ends
+    leave less than half of that, the pose between them is tried too, down to a path of MOST_LEFT_MM. Whatever remains open after
+    MOST_POSES is reported.
     """
     start, end = _limit_turn(program.start[row], program.end[row], machine)
     way = _way_mm(start, end, printed, machine)
@@ -149,7 +150,7 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
         return Pose(float(tilt), float(turn))
 
     def room(share: float, most: float) -> float:
-        """Spare gap at a share of the turn, at most `most`; bodies that come too near are noted."""
+        """Spare gap at a fraction of the turn, at most `most`; bodies that come too near are noted."""
         pose = pose_at(share)
         left, met = _room(machine, printed, pose, start[:3] + share * (end[:3] - start[:3]), most)
         for meeting, gap in met.items():
@@ -181,9 +182,8 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
 
 
 def _limit_turn(start: Floats, end: Floats, machine: Machine) -> tuple[Floats, Floats]:
-    """Where a turn begins and ends: beyond its limits no axis goes (another finding says so), and a second turn about the turn
-    axis alone meets nothing new.
-    """
+    """Ends of a turn clipped to the axis limits (another finding reports those), and to one revolution if only the turn axis
+    moves."""
     least, most = np.transpose(list(axis_limits(machine).values())[3:])
     start, end = (np.concatenate([side[:3], np.clip(side[3:], least, most)]) for side in (start, end))
     turned = end[4] - start[4]
@@ -193,7 +193,7 @@ def _limit_turn(start: Floats, end: Floats, machine: Machine) -> tuple[Floats, F
 
 
 def _way_mm(start: Floats, end: Floats, printed: Printed, machine: Machine) -> float:
-    """A bound on the way of any point of table, cradle and print against the tip during a turn."""
+    """Upper bound of the path of any point of table, cradle and print relative to the tip during a turn."""
     turned = np.abs(np.radians(end[3:] - start[3:])).sum()
     return float(np.linalg.norm(end[:3] - start[:3]) + turned * swing_mm(machine, printed))
 

@@ -1,4 +1,4 @@
-"""Dryrun: a G-code text played through the machine's kinematics, without a machine."""
+"""Dry run of a G-code text: plays it through the machine's kinematics."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -23,17 +23,16 @@ from profiles.errors import GcodeError
 from profiles.profile import Profile
 from slicer.paths import Kind
 
-MOST_MM = 10_000.0  # five times what the largest printers reach
+MOST_MM = 10_000.0  # five times the reach of the largest printers
 
 
 @dataclass(frozen=True, eq=False)
 class DryRun:
-    """The result of a dry run: the program, its times, plastic and findings.
+    """Result of a dry run: the program, its times, plastic and findings.
 
     times_s: (n,) seconds of each row of program; waits: line and seconds of each G4 and of heating during the print (heating
-    before it and homing are not counted).
-    deposited: its plastic. contacts: what lay under each row; None where it was known before what there is to find. interfaces:
-    where parts stand on others; none where contacts are not known.
+    before it and homing are not counted). deposited: its plastic. contacts: what was below each row; None if the findings were
+    known in advance. interfaces: where parts stand on others; empty without contacts.
     """
 
     program: ParsedProgram
@@ -53,12 +52,12 @@ class DryRun:
 
     @property
     def time_s(self) -> float:
-        """Seconds of all moves and dwells."""
+        """Seconds of all moves and waits."""
         return float(self.times_s.sum()) + self.dwell_s
 
     @property
     def segment_row(self) -> NDArray[np.int64]:
-        """(m,) the rows of the segments in program, which hold line, part, layer and type."""
+        """(m,) rows of the segments in program, which hold line, part, layer and type."""
         return self.deposited.rows
 
     @property
@@ -73,14 +72,14 @@ class DryRun:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """The findings for which a print is refused."""
+        """The findings that refuse a print."""
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
 def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | None = None) -> DryRun:
-    """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for what is not G-code.
+    """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for text that is not G-code.
 
-    known: the findings of an earlier dry run of these very lines with this very profile, which are not looked for again.
+    known: the findings of an earlier dry run of the same lines with the same profile, which are then reused.
     """
     machine, text = profile.machine, Lines.of(lines)
     program = parse_gcode(text, machine)
@@ -89,7 +88,7 @@ def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | N
     contacts = None
     balances: tuple[InterfaceBalance, ...] = ()
     if known is None:
-        touching = ahead(_touching, program, deposited, profile)  # half of all work, on a core of its own
+        touching = ahead(_touching, program, deposited, profile)  # half of all work, on a separate core
         balances = tuple(map(balance_of, interfaces.interfaces(program, deposited, profile)))
         moving, of_program = _findings(text, program, deposited, balances, profile)
         times_s = motion.times_s(program, machine)
@@ -136,7 +135,7 @@ def _findings(
 
 
 def _refuse_far_places(program: ParsedProgram) -> None:
-    """Refuse a damaged coordinate: checks sample along a move, and one so long would take days."""
+    """Raise GcodeError for a damaged coordinate: checks sample along a move, which would take days."""
     if len(program.line) and np.abs(program.bounds[:, :3]).max() > MOST_MM:
         far = np.abs(program.end[:, :3])
         row = int(np.flatnonzero((far > MOST_MM).any(axis=1))[0])
@@ -146,42 +145,42 @@ def _refuse_far_places(program: ParsedProgram) -> None:
 
 
 class Timeline:
-    """Where the axes stand after any line of a program, how long the rest takes, how many layers a part has."""
+    """Axis positions after any line of a program, the remaining time, and the number of layers of each part."""
 
     def __init__(self, run: DryRun) -> None:
         program, self._letters, self._waits = run.program, run.letters, run.waits
         self._line, self._ends = program.line, program.end
         self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
-        laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
+        laying = program.kind == MoveKind.EXTRUDE  # the travel to a part still belongs to the layer before it
         self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
 
     def at(self, file_line: int) -> dict[str, float]:
-        """Where the axes stand after a line of the program, by their letters, mm and deg; {} before the first move."""
+        """Axis positions after a line of the program, by letter, mm and deg; {} before the first move."""
         row = self._rows(file_line) - 1
         return {} if row < 0 else dict(zip(self._letters, self._ends[row].tolist(), strict=False))
 
     def remaining_s(self, file_line: int) -> float:
-        """How long moves and waits after a line of the program take; heating before the print and homing are not counted."""
+        """Seconds of moves and waits after a line of the program, without heating before the print and homing."""
         waits_s = sum(wait_s for line, wait_s in self._waits if line > file_line)
         return float(self._done_s[-1] - self._done_s[self._rows(file_line)]) + waits_s
 
     def layers(self, part: int | None) -> int | None:
-        """Layers of a part."""
+        """Number of layers of a part."""
         return None if part is None else self._layers.get(part)
 
     def _rows(self, file_line: int) -> int:
-        """How many moves there are up to a line."""
+        """Number of moves up to a line."""
         return int(np.searchsorted(self._line, file_line, side="right"))
 
 
 def retractions(program: ParsedProgram) -> int:
-    """How often filament is pulled back; pulled in several moves that follow each other counts once."""
+    """Number of retractions; several consecutive moves count as one."""
     pulled = program.e_mm[np.abs(program.e_mm) > 1e-9] < 0
     return int((pulled & ~np.concatenate([[False], pulled[:-1]])).sum()) if len(pulled) else 0
 
 
 def _box(deposited: Beads, counted: NDArray[np.bool_]) -> list[list[float]]:
-    """Least and greatest X Y Z of the beads that count; empty where none does."""
+    """Least and greatest X Y Z of the counted beads; [] without any."""
     if not counted.any():
         return []
     least, most = np.full(3, np.inf), np.full(3, -np.inf)
@@ -197,7 +196,7 @@ def _box(deposited: Beads, counted: NDArray[np.bool_]) -> list[list[float]]:
 def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
-    travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0)  # a wipe, which pulls back, is none
+    travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0)  # a wipe retracts and does not count
     box = _box(run.deposited, ~program.rows_of_types(Kind.PURGE.value)[run.segment_row])
     return {
         "time_s": run.time_s,

@@ -1,7 +1,7 @@
-"""Extrusion: findings about beads that get more or less plastic than their width and height need, and about travels that extrude.
+"""Extrusion: findings about beads with more or less plastic than their width and height need, and about extruding travels.
 
-A bead's cross-section is that of its width and height as the file tells them (PrusaSlicer's ;WIDTH and ;HEIGHT, which give
-its own files' filament within 0.3 %); where a file tells none, that of other beads of its kind.
+A bead's cross-section follows from the width and height in the file (PrusaSlicer's ;WIDTH and ;HEIGHT, which give its own files'
+filament within 0.3 %); without these, from other beads of its kind.
 """
 
 from collections.abc import Iterator
@@ -18,11 +18,11 @@ from mdp.mesh import Floats, Indices
 from profiles.profile import Profile
 from slicer.paths import Kind
 
-UNEVEN = (Kind.GAP.value, Kind.IRONING.value, Kind.PURGE.value, Kind.BRIDGE.value)  # wider or thinner than told on purpose
-LAYER_MOST, UNTOLD_MOST = 1.15, 1.5  # a layer's plastic over that of other layers, or the other way round
-FILE_LEAST, FILE_MOST = 0.7, 1.4  # the file's plastic over what its own widths and heights need
+UNEVEN = (Kind.GAP.value, Kind.IRONING.value, Kind.PURGE.value, Kind.BRIDGE.value)  # deliberately wider or thinner than stated
+LAYER_MOST, UNTOLD_MOST = 1.15, 1.5  # ratio of a layer's plastic to that of other layers
+FILE_LEAST, FILE_MOST = 0.7, 1.4  # the file's plastic over that of its own widths and heights
 ROW_LEAST, ROW_MOST, ROW_MM = 0.4, 2.0, 1.0
-ODD_MM = 8.0  # so much length of odd beads in a part is told
+ODD_MM = 8.0  # length of odd beads in a part that is reported
 LAYER_MM = 20.0
 CLIMBING = 0.3  # of a layer's height
 SPARE_MM3 = 0.5
@@ -55,9 +55,9 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iter
 
 
 class Counted(NamedTuple):
-    """Beads whose plastic is compared with what their remarks ask for: (m,) rows, lengths, and which of them count.
+    """Beads whose plastic is compared with their remarks: (m,) rows, lengths, and a mask of those that count.
 
-    area_mm2: (k,) cross-section that each remark asks for; diameter_mm: of the filament.
+    area_mm2: (k,) cross-section of each remark; diameter_mm: of the filament.
     """
 
     program: ParsedProgram
@@ -68,7 +68,7 @@ class Counted(NamedTuple):
     diameter_mm: float
 
     def plastic(self, which: Indices) -> tuple[Floats, Floats]:
-        """Plastic that (j,) of the m beads push and that they need, mm3."""
+        """Plastic that (j,) of the m beads push and that they need, mm³."""
         rows = self.rows[which]
         pushed = self.program.e_mm[rows]
         pushed *= pi
@@ -79,14 +79,14 @@ class Counted(NamedTuple):
         return pushed, needed
 
     def some(self) -> Iterator[tuple[Indices, Floats, Floats]]:
-        """The counted beads in pieces: which of the m, and their plastic, pushed and needed."""
+        """The counted beads in pieces: their indices among the m, and their plastic, pushed and needed."""
         for some in pieces(len(self.mine)):
             which = some.start + np.flatnonzero(self.mine[some])
             yield which, *self.plastic(which)
 
 
 def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
-    """(m,) which beads are of a layer that climbs, as a vase does: its first and last turns get less and less plastic."""
+    """(m,) mask of beads in rising layers, as of a vase, whose first and last turns get less and less plastic."""
     rows = deposited.rows
     low, high = np.full((2, program.layer_key_count), [[np.inf], [-np.inf]])
     for some in pieces(len(rows)):
@@ -101,7 +101,7 @@ def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
 
 
 def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> NDArray[np.bool_]:
-    """(m,) which beads are of a first layer on grooves, fuller by what these hold: the balance holds it against its room."""
+    """(m,) mask of beads in a first layer on grooves, which they fill too: the interface balance checks them instead."""
     fills = np.zeros(len(rows), np.bool_)
     for part in np.unique(program.part[rows[program.part[rows] > 1]]):
         if profile.of_part(int(part)).process.interlock == "grooves":
@@ -110,9 +110,8 @@ def _fills_grooves(program: ParsedProgram, rows: NDArray[np.int64], profile: Pro
 
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], begin: list[int], profile: Profile) -> Floats:
-    """(k,) cross-section that the stated width and height of each remark need, with the factors of the profile and of its parts;
-    rows: of beads, the lowest layer of which lies on the plate; begin: further parts whose first layer does, too.
-    """
+    """(k,) cross-section for the stated width and height of each remark, with the flow factors of the profile and of its parts.
+    rows: of beads, the lowest layer of which is on the plate; begin: further parts whose first layer is on the plate."""
     remarks = program.remarks
     width, height = remarks.width_mm, remarks.height_mm
     area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
@@ -127,7 +126,7 @@ def _area(program: ParsedProgram, rows: NDArray[np.int64], begin: list[int], pro
 
 
 def _whole_file(beads: Counted, profile: Profile) -> list[Finding]:
-    """A file that pushes far more or less everywhere."""
+    """Finding for a file with far too much or too little plastic everywhere."""
     pushed, needed = np.sum([(pushed.sum(), needed.sum()) for _, pushed, needed in beads.some()], axis=0)
     share = float(pushed / max(needed, 1e-9))
     if FILE_LEAST <= share <= FILE_MOST:
@@ -140,7 +139,7 @@ def _whole_file(beads: Counted, profile: Profile) -> list[Finding]:
 
 
 def _odd(beads: Counted) -> Iterator[Finding]:
-    """Single moves far from their stated cross-section, in every part that has at least ODD_MM of them."""
+    """Findings for single moves far from their stated cross-section, in parts with at least ODD_MM of them."""
     places, shares = [], []
     for which, pushed, needed in beads.some():
         share = pushed / needed
@@ -160,10 +159,9 @@ def _odd(beads: Counted) -> Iterator[Finding]:
 
 
 def _layers(beads: Counted, spare: float, most: float) -> Iterator[Finding]:
-    """In every part the first layer that gets more or less than the file's layers do, kind by kind.
+    """In every part the first layer that gets more or less plastic than the file's layers do, by kind.
 
-    spare: mm3 that a layer may get beyond its own, which come out anyway after the table has turned. A warning where the file
-    tells no widths.
+    spare: mm³ that a layer may get in addition, which ooze after a turn of the table. A warning if the file states no widths.
     """
     program = beads.program
     severity: Severity = "error" if most == LAYER_MOST else "warning"
@@ -205,7 +203,7 @@ def _weighted_median(values: Floats, weights: Floats) -> float:
 
 
 def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> Iterator[Finding]:
-    """Strokes as fast as travels, in a file whose other strokes are slower; purges may be as fast on a slow machine."""
+    """Strokes as fast as travels, if other strokes are slower; purges may be as fast on a slow machine."""
     travels = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm == 0.0))
     across = np.hypot(*(program.end[travels] - program.start[travels])[:, :2].T)
     if not (across > ROW_MM).any():

@@ -1,4 +1,4 @@
-"""Findings: errors and warnings about a program, and helpers that make them."""
+"""Findings: errors and warnings about a program, and functions that make them."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ MOST = 20
 
 @dataclass(frozen=True)
 class Finding:
-    """An error or a warning; line, part and layer: its first place (0: the file as a whole, before the first part)."""
+    """An error or a warning; line, part and layer: its first occurrence (0: the whole file, before the first part)."""
 
     severity: Severity
     code: str
@@ -30,14 +30,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class KnownFindings:
-    """The findings of a dry run, with the digest of its lines and its profile."""
+    """The findings of a dry run, with a digest of its lines and its profile."""
 
     digest: str
     profile: Profile
     findings: tuple[Finding, ...]
 
     def of(self, lines: Sequence[str], profile: Profile) -> tuple[Finding, ...] | None:
-        """The findings for these lines and this profile if they are the same as recorded, else None."""
+        """The findings, if lines and profile are the recorded ones, else None."""
         return self.findings if profile == self.profile and _digest(lines) == self.digest else None
 
 
@@ -47,7 +47,7 @@ def known_findings(lines: Sequence[str], profile: Profile, findings: Iterable[Fi
 
 
 def _digest(lines: Sequence[str]) -> str:
-    """A digest of lines and of their number: a line that held a line's end would be two when the text is read again."""
+    """Digest of lines and their number: a line that contained a line end would become two when the text is read again."""
     return sha256("\n".join((str(len(lines)), *lines)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -75,9 +75,9 @@ def by_part(
 def per_part(
     program: ParsedProgram, rows: NDArray[np.int64], badness: Floats, message: str, *, code: str, severity: Severity = "error"
 ) -> Iterator[Finding]:
-    """One finding for every part that some rows are of, at its first one; badness: (m,) of each.
+    """One finding for every part with some of the rows, at its first one; badness: (m,) of each row.
 
-    message takes {value} (the badness of the worst row of that part, as %.3f) and {count}.
+    message contains {value} (badness of the part's worst row, as %.3f) and {count}.
     """
     for mine in by_part(program, np.arange(len(rows)), rows):
         worst = f"{float(badness[mine].max()):.3f}".rstrip("0").rstrip(".")
@@ -85,13 +85,11 @@ def per_part(
 
 
 def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:
-    """Said when a test stops at row `row`, because MOST findings of its kind are enough to refuse a program."""
+    """Warning that a check stops at row `row`, because MOST findings of its kind are enough to refuse a program."""
     return at_row(program, row, "warning", "not-tested", f"after {MOST} findings the other {what} were not tested")
 
 
 def unless_own(program: ParsedProgram, first: int, last: int) -> tuple[Severity, str]:
-    """Severity of a missing command, and the words to add: a macro of the machine's own before rows first to last may have done
-    it unseen.
-    """
+    """Severity of a missing command, and words to add: a machine's own macro before rows first to last may have done it unseen."""
     names = [event.letters for event in program.events if event.code == OWN and first <= event.row <= last]
     return ("warning", f", unless {names[0]} does that") if names else ("error", "")

@@ -1,4 +1,4 @@
-"""Heat: findings about temperatures, fans and flow, and about numbers nobody has measured."""
+"""Heat: findings about temperatures, fans, flow and unmeasured numbers of the profile."""
 
 from collections.abc import Iterable, Iterator
 from math import inf, pi
@@ -17,10 +17,10 @@ from slicer.paths import Kind
 
 MELTING_C = 150.0
 SLACK = 1.005
-FAR_C = 35.0  # from a file's usual temperature: towers of test temperatures stay within
-SETTLED, FEWEST_STILL = 5, 2  # layers of a part without fan at first, and those that are told of
+FAR_C = 35.0  # from a file's usual temperature: temperature towers stay within
+SETTLED, FEWEST_STILL = 5, 2  # first layers of a part without fan, and fewest layers to report
 QUICKER = 0.7
-ROUNDING_MM = 3e-3  # both ends are written to a thousandth, and a point dropped for that gives its filament to the next
+ROUNDING_MM = 3e-3  # both ends are rounded to a thousandth, and a dropped point gives its filament to the next
 
 
 def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
@@ -39,9 +39,9 @@ def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Findin
 
 
 def waits(program: ParsedProgram, times_s: Floats, machine: Machine) -> list[tuple[int, float]]:
-    """(line, seconds) of every wait for a hotter nozzle in the midst of the print; times_s: (n,) of the rows.
+    """(line, seconds) of every wait for a hotter nozzle during the print; times_s: (n,) of the rows.
 
-    The length of the first one is unknown, for it depends on how cold the machine was.
+    The first one is left out: its length depends on how cold the machine was.
     """
     first = int(np.argmax(program.kind == MoveKind.EXTRUDE)) if len(program.kind) else 0
     waited, target_c, from_c, asked = [], 0.0, 0.0, 0
@@ -56,7 +56,7 @@ def waits(program: ParsedProgram, times_s: Floats, machine: Machine) -> list[tup
 
 
 def _cold(program: ParsedProgram) -> Iterable[Finding]:
-    """Filament pushed while the nozzle has not been waited for, or its heater is off."""
+    """Errors for filament pushed before the nozzle is heated, or with its heater off."""
     hot = np.zeros(len(program.line), dtype=np.bool_)
     heating = [e for e in program.events if e.code in NOZZLE]
     warm = False
@@ -76,7 +76,7 @@ def _cold(program: ParsedProgram) -> Iterable[Finding]:
 
 def _left_on(program: ParsedProgram) -> Iterator[Finding]:
     extruding = np.flatnonzero(program.e_mm > 1e-9)
-    last = int(extruding[-1]) if len(extruding) else -1  # a macro in the midst of the print ends nothing
+    last = int(extruding[-1]) if len(extruding) else -1  # a macro in the middle of the print ends nothing
     for codes, name, off in ((NOZZLE, "nozzle", "M104 S0"), (BED, "bed", "M140 S0")):
         events = [e for e in program.events if e.code in codes]
         if events and events[-1].value > 0:
@@ -110,7 +110,7 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
 
 
 def _bed_off(program: ParsedProgram) -> list[Finding]:
-    """The bed switched off before the last bead: the print would come off the plate."""
+    """Warning for a bed switched off before the last bead: the print could come off the plate."""
     beads = np.flatnonzero(
         (program.kind == MoveKind.EXTRUDE) & (program.remarks.part + program.remarks.layer > 0)[program.remark]
     )
@@ -126,10 +126,10 @@ def _bed_off(program: ParsedProgram) -> list[Finding]:
 
 
 def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Finding]:
-    """In every part layers without any fan where the file has one in layers like them.
+    """Warnings, one per part, for layers without fan in a file with fan in comparable layers.
 
-    In a file of ours no layer is without, but for the first ones. Other slicers switch the fan with the time that a layer takes,
-    and the quicker a layer the harder it blows: only where it is off once, in layers quicker than most, it is missed.
+    In tiltprint's files only the first layers have none. Other slicers set the fan by the duration of a layer, faster for quicker
+    layers: there a layer is reported only if the fan is off once, in a layer quicker than most.
     """
     beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
     if not beads.any():
@@ -177,7 +177,7 @@ def _without_fan(part: int, profile: Profile) -> int:
 
 
 def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
-    """Plastic per second at the asked speed, against what the hot end melts."""
+    """Warnings for moves whose flow at the programmed speed exceeds the hot end's limit."""
     material = profile.material
     area, flow = pi * material.diameter_mm**2 / 4.0, np.empty(len(program.line))
     for some in pieces(len(flow)):
@@ -210,7 +210,7 @@ def _unknown_commands(program: ParsedProgram) -> list[Finding]:
 
 
 def _replaced_texts(program: ParsedProgram) -> Iterator[Finding]:
-    """Texts for the display with characters that a serial line does not carry; one finding for all."""
+    """Warning for display texts with characters that a serial line does not carry; one finding for all."""
     if program.replaced:
         line, command = program.replaced[0]
         message = f"{quote(command)} is sent as {quote(to_ascii(command))}: a serial line carries ASCII only"

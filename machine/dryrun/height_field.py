@@ -1,6 +1,6 @@
-"""Height field: the heights of what lies under the head at one pose of the table, on a lattice over X and Y of the machine.
+"""Height field: heights of everything below the head at one pose of the table, on a lattice over X and Y of the machine.
 
-A coarse lattice of the greatest heights settles most moves; near the head every cell is tried at its distance from the move.
+A coarse lattice of maxima settles most moves; near the head every cell is tested at its distance from the move.
 """
 
 from typing import NamedTuple
@@ -15,21 +15,21 @@ from slicer.geometry.polyline import Segment, squared_distance
 
 NOTHING = -1e9
 SHIFT = 4
-BLOCK = 1 << SHIFT  # cells of the fine lattice to a side of a coarse one
+BLOCK = 1 << SHIFT  # cells of the fine lattice along a side of a coarse one
 CELL_MM, MOST_CELLS = 0.15, 6_000_000
 PIECE_MM = 0.25
 
 Point = tuple[float, float, float]
-# Height of the plastic, its height below this layer, and 1 + the row that laid it, 0 where there is no plastic. Kept together,
-# because a bead that crosses rows of cells touches another page of memory in each row.
+# Height of the plastic, its height below this layer, and 1 + the row that laid it, 0 without plastic. Stored together, because a
+# bead that crosses rows of cells touches another page of memory in each row.
 CELL = np.dtype([("top", np.float32), ("below", np.float32), ("owner", np.int32)])
 
 
 class Field(NamedTuple):
-    """cells: (n,) CELL, row by row, n = shape[0] shape[1].
+    """A height field. cells: (n,) CELL, row by row, n = shape[0] shape[1].
 
-    coarse: (b,) greatest height of each block; order: blocks, the highest first, as they were once; highest: (2,) of all, and of
-    what was laid since then.
+    coarse: (b,) greatest height of each block; order: blocks, highest first at the time of sorting; highest: (2,) of all, and of
+    cells laid since sorting.
     """
 
     origin: Floats
@@ -42,7 +42,7 @@ class Field(NamedTuple):
 
 
 def empty_field(low: Floats, high: Floats) -> Field:
-    """A field over a rectangle with nothing in it; its cells grow with the rectangle."""
+    """An empty field over a rectangle; its cells grow with the rectangle."""
     size = np.maximum(high - low, 1.0)
     cell = max(CELL_MM, float(np.sqrt(size.prod() / MOST_CELLS)))
     shape = np.ceil(size / cell).astype(np.int64) + 1
@@ -52,7 +52,7 @@ def empty_field(low: Floats, high: Floats) -> Field:
 
 
 def highest_first(field: Field) -> Field:
-    """The same field, of which a move meets the highest blocks first: most moves are above all of them."""
+    """The field with its blocks sorted highest first: most moves are above all of them."""
     field.highest[1] = NOTHING
     return field._replace(order=np.argsort(-field.coarse, kind="stable"))
 
@@ -65,8 +65,8 @@ def _blocks(cells: int) -> int:
 
 @no_nrt
 def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
-    """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along. A cell that it raises
-    keeps in `below` what it was before."""
+    """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along. Raised cells keep their
+    earlier height in `below`."""
     along = 0 if abs(b[0] - a[0]) >= abs(b[1] - a[1]) else 1
     if a[along] > b[along]:
         a, b = b, a
@@ -100,13 +100,13 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
 
 @no_nrt
 def _distance_across(px: float, py: float, a: Point, b: Point) -> float:
-    """Distance across, in X and Y alone, of a point from a move."""
+    """Distance in X and Y of a point from a move."""
     return float(np.sqrt(squared_distance(Segment(a[0], a[1], b[0], b[1]), px, py)))
 
 
 @no_nrt
 def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
-    """True when a box that goes with the tip from a to b comes over a square; square: its middle and half of its side."""
+    """Whether a box that moves with the tip from a to b passes over a square; square: its centre and half of its side."""
     px, py, half = square
     low, high = 0.0, 1.0
     for k in range(2):
@@ -123,9 +123,9 @@ def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
 
 @no_nrt
 def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point, b: Point, head: Head) -> float:
-    """How deep the head goes into a column during a level move; 0 up to `slack`.
+    """Depth of the head in a column during a level move; 0 up to `slack`.
 
-    column: x, y, half of its side, and by how much its top stands above the tip.
+    column: x, y, half of its side, and height of its top above the tip.
     """
     px, py, half, rise = column
     deepest = 0.0
@@ -140,13 +140,13 @@ def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point,
 
 @no_nrt
 def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> float:
-    """How deep the head goes into the field at most during a level move; 0 up to `slack`."""
+    """Greatest depth of the head in the field during a level move; 0 up to `slack`."""
     deepest, size, cell = 0.0, BLOCK * field.cell, field.cell
     wide = _blocks(field.shape[1])
     sorted_blocks = field.highest[1] - a[2] <= slack
     for c in field.order:
         if field.coarse[c] - a[2] <= slack:
-            if sorted_blocks:  # neither are those after it
+            if sorted_blocks:  # neither do those after it
                 break
             continue
         i, j = c // wide, c % wide
@@ -165,7 +165,7 @@ def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> 
 
 @no_nrt
 def depth_of(a: Floats, b: Floats, slack: float, field: Field, head: Head) -> float:
-    """How deep the head goes into the field at most during a move; a slanting one in pieces, each at its lowest place."""
+    """Greatest depth of the head in the field during a move; a sloped one in pieces, each at its lowest height."""
     if min(a[2], b[2]) + slack >= field.highest[0]:
         return 0.0
     across = max(abs(b[0] - a[0]), abs(b[1] - a[1]))

@@ -1,8 +1,8 @@
-"""Interfaces: where a part stands on others: how much of its section is in contact, and the plastic over the room for it.
+"""Interfaces: how much of a part's section touches earlier parts, and the ratio of its plastic to the space for it.
 
-The room of a column reaches from the tip of that first layer down to the top of earlier parts, in the part's own frame: bars as
-high as their layers and as wide as their plastic makes them, at the slant at which they were laid. This shares no code with what
-gave each bead its volume.
+The space of a column reaches from the tip at that first layer down to the top of earlier parts, in the part's frame: bars as high
+as their layers and as wide as their plastic makes them, at the slant at which they were printed. This shares no code with the
+slicer's computation of bead volumes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,9 +26,9 @@ from slicer.paths import Kind
 CELL_MM = 0.05
 AT_THE_EDGE = (Kind.OUTER_WALL.value, Kind.OVERHANG.value)
 NO_PART = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value, Kind.IRONING.value)
-NEAR = 1.5  # heights of a bead: what lies farther below its tip it does not touch
-LEAST_TOLD, MOST_TOLD, LEAST_TOLD_MM2 = 0.75, 1.4, 10.0  # of all of it: steps of slanted layers leave a tenth open or taken
-LEAN, RICH = 0.1, 1.1  # the leanest tenth of a layer's beads; what has so much more makes up for what oozed
+NEAR = 1.5  # heights of a bead: it does not touch plastic farther below its tip
+LEAST_TOLD, MOST_TOLD, LEAST_TOLD_MM2 = 0.75, 1.4, 10.0  # of the whole: steps of sloped layers leave a tenth open or taken
+LEAN, RICH = 0.1, 1.1  # the leanest tenth of a layer's beads; an excess by this factor replaces what oozed
 REACH_MM = 2.0  # from the plane of the tip, of plastic that can matter
 NOTHING = -1e9
 ROUNDING_MM = 1e-6
@@ -38,7 +38,7 @@ Mask = NDArray[np.bool_]
 
 
 class Lattice(NamedTuple):
-    """shape: (2,) columns along X and Y, squares of side cell; origin: (2,) mm, the least corner."""
+    """A lattice. shape: (2,) columns along X and Y, squares of side cell; origin: (2,) mm, the least corner."""
 
     origin: Floats
     cell: float
@@ -46,12 +46,12 @@ class Lattice(NamedTuple):
 
     @property
     def column_mm2(self) -> float:
-        """Area of a column."""
+        """Area of a column, mm²."""
         return self.cell * self.cell
 
 
 class Bars(NamedTuple):
-    """Straight pieces of plastic: (m, 3) middles of the ends of their tops, (m, 3) up, (m,) half widths and heights."""
+    """Straight pieces of plastic: (m, 3) centres of the ends of their tops, (m, 3) up, (m,) half widths and heights."""
 
     begin: Floats
     end: Floats
@@ -62,10 +62,10 @@ class Bars(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """What lies below a part's first layer; row: of its first stroke. Arrays are (nx, ny), one entry a column of the lattice.
+    """Surroundings of a part's first layer; row: of its first stroke. Arrays are (nx, ny), one entry per column of the lattice.
 
-    section: what the layer's walls enclose and its beads cover; touching: where earlier parts reach up to its beads; bead:
-    where one of those lies; room, plastic: mm3 under the tip, and laid. walls: the beads that may lie at the section's edge.
+    section: enclosed by the layer's walls or covered by its beads; touching: where earlier parts reach its beads; bead: where its
+    beads are; room, plastic: mm³ of space under the tip, and of plastic. walls: the beads that may be at the section's edge.
     """
 
     part: int
@@ -81,9 +81,11 @@ class Interface:
 
 @dataclass(frozen=True)
 class InterfaceBalance:
-    """The sums over an interface. area_mm2: of its section; contact: share of the section where a bead lies on an earlier part;
-    over_room: plastic over room of all of the section that has something below it; beads_over_room: of the beads alone that lie
-    on something; touching_mm2: area of the section that earlier parts reach up to."""
+    """Sums over an interface. area_mm2: of its section; contact: fraction of the section with a bead on an earlier part.
+
+    over_room: plastic over space in the section above earlier parts; beads_over_room: only under beads; touching_mm2: area of the
+    section that earlier parts reach.
+    """
 
     part: int
     row: int
@@ -95,7 +97,7 @@ class InterfaceBalance:
 
 
 def balance_of(face: Interface) -> InterfaceBalance:
-    """The sums over an interface."""
+    """Sums over an interface."""
     section, beads, column_mm2 = face.touching & face.section, face.touching & face.bead, face.lattice.column_mm2
     return InterfaceBalance(
         part=face.part,
@@ -109,12 +111,12 @@ def balance_of(face: Interface) -> InterfaceBalance:
 
 
 def _over_room(face: Interface, there: Mask) -> float:
-    """Plastic over room of some columns."""
+    """Plastic over space of some columns."""
     return float(face.plastic[there].sum() / max(float(face.room[there].sum()), 1e-9))
 
 
 def findings(program: ParsedProgram, balances: Sequence[InterfaceBalance], profile: Profile) -> Iterator[Finding]:
-    """A warning of code room for every part whose first layer has far more or less plastic than its flow puts into its room."""
+    """Warnings of code room for parts whose first layer has far more or less plastic than its flow should put into its space."""
     for face in balances:
         share = face.beads_over_room / (profile.of_part(face.part).process.interface_flow * profile.material.flow)
         if face.touching_mm2 >= LEAST_TOLD_MM2 and not LEAST_TOLD <= share <= MOST_TOLD:
@@ -143,7 +145,7 @@ def interfaces(program: ParsedProgram, deposited: Beads, profile: Profile) -> It
 def _interface(
     program: ParsedProgram, deposited: Beads, which: tuple[Indices, Mask], turn: Floats, profile: Profile
 ) -> Interface:
-    """which: beads of the first layer, and which of the beads before it belong to earlier parts; turn: into the part's frame."""
+    """An interface. which: beads of the first layer, and a mask of earlier parts' beads; turn: rotation into the part's frame."""
     first, near = which
     layer = _bars(program, deposited, first, turn, profile)
     mm3 = program.e_mm[deposited.rows[first]] * _filament_mm2(profile)
@@ -178,9 +180,8 @@ def _interface(
 
 
 def _run_in(deposited: Beads, first: Indices, mm3: Floats, spare_mm3: float) -> Floats:
-    """(m,) what the first strokes of a layer have beyond its leanest ones, up to what oozed while the table turned: that is
-    missing in the nozzle and fills no room.
-    """
+    """(m,) excess of the first strokes of a layer over its leanest ones, up to the amount that oozed during the turn. It refills
+    the nozzle and takes no space in the layer."""
     width_mm, height_mm = deposited.sizes[deposited.size[first]].T
     nominal_mm3 = width_mm * height_mm * deposited.length_mm[first]
     lean = float(np.quantile(mm3 / np.maximum(nominal_mm3, 1e-9), LEAN))
@@ -193,7 +194,7 @@ def _filament_mm2(profile: Profile) -> float:
 
 
 def _bars(program: ParsedProgram, deposited: Beads, which: Indices, turn: Floats, profile: Profile) -> Bars:
-    """Some beads as bars in a turned frame, as wide as their plastic makes them at their height."""
+    """Beads as bars in a rotated frame, as wide as their plastic makes them at their height."""
     segments, rows = deposited.segments(which), deposited.rows[which]
     begin, end = (segments[:, side] @ turn.T for side in (0, 1))
     height, length = deposited.sizes[deposited.size[which], 1], np.maximum(deposited.length_mm[which], 1e-9)
@@ -202,7 +203,7 @@ def _bars(program: ParsedProgram, deposited: Beads, which: Indices, turn: Floats
 
 
 def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
-    """(n, 4) sides of the closed ways that outer walls take, pieces of them that hang over included."""
+    """(n, 4) sides of the closed loops of outer walls, including their overhanging pieces."""
     outer, sides = program.rows_of_types(Kind.OUTER_WALL.value)[rows], []
     at = np.flatnonzero(program.rows_of_types(*AT_THE_EDGE)[rows])
     if not len(at):
@@ -217,7 +218,7 @@ def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
 
 
 def lattice_over(points: Floats, cell_mm: float, margin_mm: float = 1.5) -> Lattice:
-    """A lattice over (n, 2) points and a margin; its columns grow where there would be too many."""
+    """A lattice over (n, 2) points and a margin; its columns grow to limit their number."""
     low, high = points.min(axis=0) - margin_mm, points.max(axis=0) + margin_mm
     cell = max(cell_mm, float(np.sqrt((high - low).prod() / MOST_COLUMNS)))
     return Lattice(low, cell, np.ceil((high - low) / cell).astype(np.int64))
@@ -225,9 +226,9 @@ def lattice_over(points: Floats, cell_mm: float, margin_mm: float = 1.5) -> Latt
 
 @kernel
 def laid(bars: Bars, mm3: Floats, lattice: Lattice) -> Floats:
-    """Plastic, mm3, in each column: that of every level bar spread evenly over the columns whose middles it covers.
+    """Plastic in each column, mm³: each level bar spread evenly over the columns whose centres it covers.
 
-    A bar that covers none gives all it has to the column at its middle, so that nothing over the lattice is lost.
+    A bar that covers none counts in the column at its centre, so that nothing over the lattice is lost.
     """
     plastic = table(lattice.shape[0], lattice.shape[1])
     for k in range(len(mm3)):
@@ -245,7 +246,7 @@ def laid(bars: Bars, mm3: Floats, lattice: Lattice) -> Floats:
 
 @helper
 def _spread(a: Floats, b: Floats, half: float, mm3: float, lattice: Lattice, plastic: Floats) -> int:
-    """Add mm3 to every column whose middle lies within half of the line from a to b; returns their number."""
+    """Add mm3 to every column whose centre is within half of the line from a to b; returns their number."""
     dx, dy, count = b[0] - a[0], b[1] - a[1], 0
     length = np.sqrt(dx * dx + dy * dy)
     if length <= 0.0:
@@ -266,7 +267,7 @@ def _spread(a: Floats, b: Floats, half: float, mm3: float, lattice: Lattice, pla
 
 @helper
 def _columns(middle: float, reach: float, axis: int, lattice: Lattice) -> tuple[int, int]:
-    """The first and the last column whose middle lies within reach of a place along an axis."""
+    """First and last column whose centre is within reach of a position along an axis."""
     first = int(np.ceil((middle - reach - lattice.origin[axis]) / lattice.cell - 0.5))
     last = int(np.floor((middle + reach - lattice.origin[axis]) / lattice.cell - 0.5))
     return max(first, 0), min(last, lattice.shape[axis] - 1)
@@ -274,14 +275,13 @@ def _columns(middle: float, reach: float, axis: int, lattice: Lattice) -> tuple[
 
 @kernel
 def tops(bars: Bars, lattice: Lattice, least: float) -> Floats:
-    """Height at which each column leaves the uppermost of some bars, which may lie at any slant and end round, as beads turn at
-    corners; NOTHING where there is none. A height below `least` may be returned as any lower one, or as NOTHING.
-    """
+    """Height of the top of the uppermost bar in each column, NOTHING for none. Bars may have any slant; their ends are round,
+    like beads at corners. Heights below `least` may be returned as any lower height, or as NOTHING."""
     top = table(lattice.shape[0], lattice.shape[1])
     for i in range(lattice.shape[0]):
         for j in range(lattice.shape[1]):
             top[i, j] = NOTHING
-    for k in range(len(bars.half) - 1, -1, -1):  # from the last one down: what lies under those before it is not looked at
+    for k in range(len(bars.half) - 1, -1, -1):  # from the last one down, to skip bars below
         a, b, up, half, height = bars.begin[k], bars.end[k], bars.up[k], bars.half[k], bars.height[k]
         length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
         if length <= 0.0:
@@ -293,7 +293,7 @@ def tops(bars: Bars, lattice: Lattice, least: float) -> Floats:
         reach = [0.5 * (length * abs(d[n]) + height * abs(up[n])) + half * sines[n] for n in range(2)]
         ceiling = max(a[2], b[2]) + half * sines[2] + height * max(0.0, -up[2]) + ROUNDING_MM
         if abs(d[0] * up[0] + d[1] * up[1] + d[2] * up[2]) > ROUNDING_MM:
-            ceiling = -NOTHING  # its sides are no rectangle
+            ceiling = -NOTHING  # its sides are not a rectangle
         if ceiling < least:
             continue
         i0, i1 = _columns(0.5 * (a[0] + b[0] - height * up[0]), reach[0], 0, lattice)
@@ -316,9 +316,9 @@ def tops(bars: Bars, lattice: Lattice, least: float) -> Floats:
 
 @no_nrt
 def _leaves_end(x: float, y: float, up: Floats, half: float, height: float) -> float:
-    """Height at which an upright line leaves the round end of a bar: a cylinder below the end of its top, seen from there.
+    """Height at which a vertical line leaves the round end of a bar: a cylinder below the end of its top, relative to that end.
 
-    Of the places p = (x, y, z) on it those with |p|^2 - (p . up)^2 <= half^2, a quadratic in z, and -height <= p . up <= 0.
+    The points p = (x, y, z) on the line satisfy |p|^2 - (p . up)^2 <= half^2, a quadratic in z, and -height <= p . up <= 0.
     """
     along, free = x * up[0] + y * up[1], 1.0 - up[2] * up[2]
     rest = x * x + y * y - along * along - half * half
@@ -340,7 +340,7 @@ def _leaves_end(x: float, y: float, up: Floats, half: float, height: float) -> f
 
 @helper
 def _leaves(x: float, y: float, slabs: tuple[tuple[float, float, float, float, float], ...]) -> float:
-    """Height at which an upright line leaves the intersection of slabs, each the places p with least <= n . p <= most."""
+    """Height at which a vertical line leaves the intersection of slabs, each the points p with least <= n . p <= most."""
     low, high = NOTHING, -NOTHING
     for nx, ny, nz, least, most in slabs:
         across = x * nx + y * ny
@@ -353,7 +353,7 @@ def _leaves(x: float, y: float, slabs: tuple[tuple[float, float, float, float, f
 
 
 def inside_loops(sides: Floats, lattice: Lattice) -> Mask:
-    """Columns whose middle an odd number of loops enclose; sides: (n, 4) x y of the begin and end of each side."""
+    """Columns whose centre an odd number of loops enclose; sides: (n, 4) x y of the beginning and end of each side."""
     count = _crossings(sides, lattice)
     np.cumsum(count[:, ::-1], axis=1, out=count[:, ::-1])
     within: Mask = np.mod(count, 2.0, out=count) > 0.5
@@ -362,7 +362,7 @@ def inside_loops(sides: Floats, lattice: Lattice) -> Mask:
 
 @kernel
 def _crossings(sides: Floats, lattice: Lattice) -> Floats:
-    """How many sides pass above each column's middle and not above that of the next one."""
+    """Number of sides that pass above each column's centre and not above that of the next one."""
     crossings = table(lattice.shape[0], lattice.shape[1])
     for k in range(len(sides)):
         x0, y0, x1, y1 = sides[k, 0], sides[k, 1], sides[k, 2], sides[k, 3]

@@ -1,7 +1,7 @@
-"""Layering: findings about layers that do not lie on each other: one is missing, or part of one is printed too high.
+"""Layering: findings about layers that are not on each other: one is missing, or part of one is printed too high.
 
-Two signs: a bead that begins above all that its part has laid before, by the heights that the file tells; and a layer most of
-whose beads have nothing under them, by the plastic that lies there.
+Two signs: a bead that begins above everything its part has printed before, by the file's heights; and a layer most of whose beads
+have no plastic below them.
 """
 
 from collections.abc import Iterator
@@ -20,13 +20,13 @@ from slicer.paths import ON_PLATE_MM, Kind
 
 LOOSE = (Kind.OVERHANG.value, Kind.BRIDGE.value, Kind.IRONING.value, Kind.PURGE.value, Kind.SKIRT.value, *SUPPORT)
 SLACK_MM, SLACK_SHARE = 0.02, 0.1  # of a layer's height
-STAND_OFF_MM = 0.5  # at most between a part and the support below it
-FARTHEST_SUPPORT_MM = 2.0  # from a bridge that stands on it, the most that process.support_gap_mm allows
-NEW_OBJECT_MM = 1.0  # a fall of more begins another object beside the first one
+STAND_OFF_MM = 0.5  # greatest distance between a part and the support below it
+FARTHEST_SUPPORT_MM = 2.0  # from a bridge above it, the most that process.support_gap_mm allows
+NEW_OBJECT_MM = 1.0  # a larger fall begins another object beside the first one
 FLOATING_SHARE = 0.5  # of a layer's length
 LEAST_MM = 10.0
-SEEN_SHARE = 0.6  # of a layer's height: what begins so much too high hangs in the air of the replay
-CRUMB_MM = 1.0  # so little laid in a layer is the tip of something too fine to print, whatever lies below it
+SEEN_SHARE = 0.6  # of a layer's height: the replay sees a larger gap as air
+CRUMB_MM = 1.0  # a shorter layer is the tip of something too fine to print
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
@@ -39,9 +39,9 @@ def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> li
 
 
 def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
-    """In every part the first bead whose underside lies above all earlier beads, by the heights in comments.
+    """In every part the first bead whose underside is above all earlier beads, by the heights in comments.
 
-    A gap of most of a layer may be above support that ends as high as the part does there: the replay knows.
+    A gap of most of a layer may be above support that ends at the part's height: the replay decides.
     """
     sized = (program.remarks.height_mm > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
     rows = deposited.rows[sized[deposited.rows]]
@@ -64,7 +64,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             continue
         remark, gap = program.remark[high], gap[gap > 0.0]
         in_air = ((contacts.air_mm[high] + contacts.beside_mm[high]) > 0.0) & ~loose[high]
-        # Whatever carries the ends of a bridge lies below it, or is support with its gap, rounded up to a layer.
+        # Whatever carries the ends of a bridge is below it, or is support with its gap, rounded up to a layer.
         in_air |= spanning[high] & (gap > FARTHEST_SUPPORT_MM + program.remarks.height_mm[remark])
         layer, lengths_mm = program.remarks.layer, deposited.length_mm[np.searchsorted(deposited.rows, mine)]
         laid_mm = np.bincount(layer[program.remark[mine]], weights=lengths_mm)
@@ -83,10 +83,9 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
 
 @kernel
 def _gaps(ends: tuple[Floats, Floats], rows: Indices, remarks: Indices32, told: Remarks, support: NDArray[np.bool_]) -> Floats:
-    """(m,) by how much the underside of each bead of a part lies above all of the layers before, where it is too much, else 0;
-    support keeps its distance.
+    """(m,) excessive height of the underside of each bead of a part above all earlier layers, else 0; support keeps its distance.
 
-    What its own layer has laid does not count: support laid first would hide a layer that is raised with it.
+    Its own layer does not count: support printed first would hide a layer that is raised with it.
     """
     gaps, last_mm, layer = np.empty(len(rows)), np.inf, -1
     highest = of_part = before = part_before = -np.inf
@@ -109,7 +108,7 @@ def _gaps(ends: tuple[Floats, Floats], rows: Indices, remarks: Indices32, told: 
 
 
 def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(k,) which remarks are of the first layer of their part with beads, which another finding covers."""
+    """(k,) mask of remarks of each part's first layer with beads, which another finding covers."""
     (part, layer), laid = program.remarks[:2], np.zeros(len(program.remarks.part), dtype=np.bool_)
     laid[program.remark[rows]] = True
     first = np.full(int(part.max(initial=0)) + 1, np.iinfo(np.int64).max)
@@ -119,9 +118,9 @@ def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_
 
 
 def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> Iterator[Finding]:
-    """In every part the first layer of which more than half has nothing under it, though it is no bridge and no overhang.
+    """In every part the first layer more than half of which has nothing below it, except bridges and overhangs.
 
-    What spans the cells of sparse infill is a bridge, however much of a layer that is (machine.dryrun.replay).
+    Anything that spans the cells of sparse infill is a bridge, however large (machine.dryrun.replay).
     """
     counted = ~program.rows_of_types(*LOOSE)[deposited.rows] & ~_begins(program, deposited.rows)[program.remark[deposited.rows]]
     (loose, air, whole), tallest_mm = np.zeros((3, program.layer_key_count)), deposited.sizes[:, 1].max(initial=0.0)

@@ -1,4 +1,4 @@
-"""Motion: findings about axes: limits, speeds, homing, turning while plastic flows or while the firmware begins to follow."""
+"""Motion: findings about axes: limits, speeds, homing, and turning during extrusion or when the firmware starts to follow."""
 
 from collections.abc import Iterable, Iterator
 
@@ -17,8 +17,8 @@ from slicer.estimate.timing import axis_speeds, lengths, move_times
 STANDSTILLS = frozenset(name for name, command in EVERY.items() if command.waits or command.homes)
 SLACK = 1.001
 ROUNDING_MM_S = 1.0 / 60.0  # F is written as a whole number
-STILL = 3  # the measure of what does not move
-WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
+STILL = 3  # measure of a row without motion
+WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # possible error of a step from the rounding of its ends
 LEVEL_DEG = 0.01
 TURNED_DEG = 1e-3
 
@@ -48,7 +48,7 @@ def _outside(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
 
 
 def times_s(program: ParsedProgram, machine: Machine) -> Floats:
-    """(n,) seconds of each row, some at a time: where the machine stands still in between neither knows of the other."""
+    """(n,) seconds of each row, computed in pieces that end at standstills and thus are independent."""
     stop, seconds, begin = standstills(program), np.empty(len(program.line)), 0
     while begin < len(seconds):
         some = _until_standstill(program, begin)
@@ -59,7 +59,7 @@ def times_s(program: ParsedProgram, machine: Machine) -> Floats:
 
 
 def _until_standstill(program: ParsedProgram, begin: int) -> slice:
-    """Many rows, with the last of which a run of moves ends that F measures alike; such runs begin and end at a standstill."""
+    """Rows from `begin`, about AT_ONCE, up to the end of a run of moves that F measures alike; such runs end at a standstill."""
     count, last = AT_ONCE, len(program.line)
     while begin + count < last:
         _, measure = lengths(program.changes(slice(begin, begin + count)))
@@ -72,14 +72,14 @@ def _until_standstill(program: ParsedProgram, begin: int) -> slice:
 
 
 def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
-    """(n,) rows before which the machine always stops."""
+    """(n,) mask of rows before which the machine always stops."""
     stop = np.zeros(len(program.line), dtype=np.bool_)
     stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
     return stop
 
 
 def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
-    """In every part the axes that are asked for more than they can do: the firmware slows such moves down."""
+    """In every part the axes whose programmed speed is beyond their limit: the firmware slows such moves down."""
     most = axis_speeds(machine)
     allowed, fast, asked = most * SLACK + ROUNDING_MM_S, [np.zeros(0, np.int64)], [np.zeros((0, 6))]
     for some in pieces(len(program.line)):
@@ -135,7 +135,7 @@ def _turning_strokes(program: ParsedProgram, machine: Machine) -> Iterable[Findi
 
 
 def _following_switches(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
-    """Switching that keeps the coordinates takes another place for the present one: beyond A0 C0 it is a wrong one."""
+    """Errors for switching that keeps the coordinates in a pose other than A0 C0, where it changes the position."""
     dialect = dialect_of(machine)
     if not dialect.follow_keeps_coordinates:
         return

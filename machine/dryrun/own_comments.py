@@ -1,6 +1,6 @@
-"""Own comments: the comments of a file written by this program, compared with its moves and with the profile.
+"""Own comments: compares the comments of a tiltprint file with its moves and with the profile.
 
-Its configuration and poses show whether it was made for this machine, its parts' totals whether it was changed since.
+Configuration and poses show whether it was made for this machine, the parts' totals whether it was changed since.
 """
 
 import re
@@ -20,7 +20,7 @@ CENTRE = ("machine.tilt.point_mm", "machine.turn.point_mm", "machine.tool_mm")
 SIGN = tuple(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "axis", "letter", "zero_deg"))
 POSE = re.compile(r";POSE:([A-Z])(-?[0-9.]+) ([A-Z])(-?[0-9.]+)")
 LEVEL_DEG = 1e-3
-PLACE_MM = 0.02  # rounded coordinates, arcs read as chords, followed places taken back to axis positions
+PLACE_MM = 0.02  # rounded coordinates, arcs read as chords, followed positions converted back to axis positions
 FILAMENT_SHARE, FILAMENT_MM = 2e-3, 0.05
 
 
@@ -30,14 +30,14 @@ def findings(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> 
 
 
 def has_material(lines: Sequence[str], profile: Profile) -> bool:
-    """Whether the file's own configuration has the profile's material."""
+    """Whether the file's configuration has the profile's material."""
     recorded = _configuration(lines)
     material = [(f"material.{key}", value) for key, value in flat(profile.material.model_dump(), "")]
     return bool(recorded) and all(recorded[key][1] == comment(f"{key} = {value}") for key, value in material if key in recorded)
 
 
 def _geometry(lines: Sequence[str], profile: Profile) -> Iterator[Finding]:
-    """Keys of the chain of axes that the file's configuration has otherwise than the profile."""
+    """Errors for keys of the kinematic chain that differ between the file's configuration and the profile."""
     recorded = _configuration(lines)
     now = {key: (comment(f"{key} = {value}"), value) for key, value in flat(profile.model_dump(), "")}
     for code, keys, what in (("centre", CENTRE, "rotation centre"), ("sign", SIGN, "sense of the axes")):
@@ -50,7 +50,7 @@ def _geometry(lines: Sequence[str], profile: Profile) -> Iterator[Finding]:
 
 
 def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
-    """Key -> (line number, the whole comment) of the block at a file's foot; empty without one."""
+    """Key -> (line number, whole comment) of the block at a file's foot; {} without one."""
     recorded: dict[str, tuple[int, str]] = {}
     inside = False
     for number in range(len(lines), 0, -1):
@@ -65,7 +65,7 @@ def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
 
 
 def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
-    """Parts whose beads are laid at another pose than that of their ;POSE: comment."""
+    """Errors for parts whose beads have another pose than their ;POSE: comment."""
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
     beads = (program.kind == MoveKind.EXTRUDE) & (program.remarks.part > 0)[program.remark]
     for place in Lines.of(lines).beginning_with(";POSE:"):
@@ -86,7 +86,7 @@ def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> It
 
 
 def _part_totals(program: ParsedProgram) -> Iterator[Finding]:
-    """Parts whose beads differ from their ;CONTENTS: comment, and parts that are missing."""
+    """Errors for parts whose beads differ from their ;CONTENTS: comment, and for missing parts."""
     part, layer = program.remarks[:2]
     beads = (program.kind == MoveKind.EXTRUDE) & (part > 0)[program.remark] & ~program.rows_of_types(Kind.PURGE.value)
     laid = np.zeros(len(part), np.bool_)
@@ -99,7 +99,7 @@ def _part_totals(program: ParsedProgram) -> Iterator[Finding]:
 
 
 def _missing(program: ParsedProgram, printed: set[int]) -> list[Finding]:
-    """The parts announced by `;PART:1 of 3` of which nothing is printed."""
+    """Error for parts that `;PART:1 of 3` announces but that have no beads."""
     absent = [index for index in range(1, program.announced + 1) if index not in printed]
     if not absent:
         return []
@@ -110,7 +110,7 @@ def _missing(program: ParsedProgram, printed: set[int]) -> list[Finding]:
 
 
 def _of_part(program: ParsedProgram, rows: NDArray[np.int64], layers: int, totals: PartTotals) -> Iterator[Finding]:
-    """Differences of a part: its layers, its filament, its place."""
+    """Differences of a part in layers, filament and position."""
     if layers != totals.layers:
         message = f"beads are laid in {layers} layers of part {totals.part}, the file tells of {totals.layers}"
         yield at_row(program, int(rows[-1]), "error", "contents", message)
@@ -125,7 +125,7 @@ def _of_part(program: ParsedProgram, rows: NDArray[np.int64], layers: int, total
     side, axis = (int(v) for v in np.unravel_index(np.abs(apart).argmax(), apart.shape))
     ends = np.stack([program.start[rows, axis], program.end[rows, axis]])
     extreme = np.abs(ends - bounds[side, axis]).min(axis=0).argmin()
-    shifted = bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)  # both sides are moved alike
+    shifted = bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)  # both sides are shifted alike
     moved = f"lies {abs(apart[side, axis]):.2f} mm aside" if shifted else "reaches"
     laid, recorded = (f"{'XYZ'[axis]}{corners[side, axis]:.3f}" for corners in (bounds, totals.bounds_mm))
     message = f"part {totals.part} {moved} to {laid}, the file tells of {recorded} ({PLACE_MM:g} mm are allowed)"
@@ -133,7 +133,7 @@ def _of_part(program: ParsedProgram, rows: NDArray[np.int64], layers: int, total
 
 
 def _extent(program: ParsedProgram, rows: NDArray[np.int64], axis: int) -> tuple[float, float]:
-    """The least and the greatest position of an axis at the ends of some rows."""
+    """Least and greatest position of an axis at the ends of some rows."""
     sides = [side[:, axis] for side in (program.start, program.end)]
     ends = [(side[rows[some]].min(), side[rows[some]].max()) for side in sides for some in pieces(len(rows))]
     return float(np.min(ends)), float(np.max(ends))

@@ -1,4 +1,4 @@
-"""Placement: findings about where beads are laid (off the plate, in air, overlapping) and the head in earlier plastic."""
+"""Placement: findings about the places of beads (off the plate, in air, overlapping) and about the head in earlier plastic."""
 
 from collections.abc import Iterator
 
@@ -14,20 +14,20 @@ from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind
 
-HANGING = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # the slicer itself says that these hang
-IRONING = Kind.IRONING.value  # goes over what has been laid
-PURGE = Kind.PURGE.value  # what a start block pushes out beside the plate is meant to fall
+HANGING = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # declared as hanging by the slicer
+IRONING = Kind.IRONING.value  # passes over existing plastic
+PURGE = Kind.PURGE.value  # a start block's purge beside the plate is meant to fall
 ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air
-LOST_SHARE = 0.5  # of a part's first layer without anything under it
+LOST_SHARE = 0.5  # of a part's first layer without anything below it
 OVERLAPPING_SHARE = 0.4  # of a layer's length
 LEAST_MM = 10.0
-STRETCH_MM = 30.0  # of beads in air that follow each other
+STRETCH_MM = 30.0  # of consecutive beads in air
 HANGING_SHARE = 0.8  # of a move's length
 ROUNDING_MM = 0.02
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> Iterator[Finding]:
-    """Errors and warnings of code air, filled, contact and low-travel, one a part; not-tested where the table turns too often."""
+    """Errors and warnings of code air, filled, contact and low-travel, one per part; not-tested if the table turns too often."""
     length = np.zeros(len(program.line))
     length[deposited.rows] = deposited.length_mm
     deep = "the head runs {value} mm deep into earlier plastic (moves: {count})"
@@ -42,7 +42,7 @@ def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> It
 
 
 def _too_low(program: ParsedProgram, contacts: Contacts) -> Iterator[Finding]:
-    """In every part the first way to or from a turn of the table that does not lead above the print."""
+    """In every part the first move to or from a turn of the table that does not pass above the print."""
     for rows in by_part(program, np.flatnonzero(contacts.close_mm > 0.0)):
         left = max(CROSSING_MM - float(contacts.close_mm[rows].max()), 0.0)
         message = (
@@ -53,7 +53,7 @@ def _too_low(program: ParsedProgram, contacts: Contacts) -> Iterator[Finding]:
 
 
 def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> Iterator[Finding]:
-    """Parts with too much that hangs where the slicer has not said so, and parts that begin in air."""
+    """Parts with too much undeclared overhang, and parts that begin in air."""
     own = ~program.rows_of_types(PURGE)
     hanging = np.where(own & ~program.rows_of_types(*HANGING), contacts.air_mm, 0.0)
     support = program.rows_of_types(*SUPPORT)
@@ -80,7 +80,7 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> Itera
 
 
 def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> tuple[float, int]:
-    """The longest stretch of moves that follow each other and hang in air, and its first row."""
+    """Length of the longest stretch of consecutive moves in air, and its first row."""
     rows = np.flatnonzero(mine & (hanging > 0.0))
     rows = rows[(hanging[rows] > HANGING_SHARE * length[rows]) & (length[rows] > 0)]
     group = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)
@@ -90,7 +90,7 @@ def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> tup
 
 
 def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> Iterator[Finding]:
-    """The first layer of every part in which a great share of the beads finds its room taken."""
+    """In every part the first layer in which a large fraction of the beads overlaps earlier plastic."""
     counted = ~program.rows_of_types(PURGE, IRONING) & (length > 0)
     overlapping, whole = np.zeros((2, program.layer_key_count))
     for some in pieces(len(counted)):
@@ -106,7 +106,7 @@ def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> I
 
 
 def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> tuple[float, float, float]:
-    """Lengths, mm: extruded, in air where the slicer has not said so, in air where it has."""
+    """Lengths, mm: extruded, in air without the slicer's declaration, and in air with it."""
     own = ~program.rows_of_types(PURGE)
     reported = program.rows_of_types(*HANGING)
     length = deposited.length_mm[own[deposited.rows]]
@@ -114,7 +114,7 @@ def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts)
 
 
 def off_plate(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
-    """Strokes of the layer on the plate that lie beyond its edge: an error a part, with the farthest."""
+    """Errors, one per part, for strokes of the layer on the plate that lie beyond its edge, with the farthest."""
     remark_mm = program.remarks.height_mm
     heights = np.where(remark_mm > 0, remark_mm, profile.process.first_layer_height_mm)
     purge, beyond, over_mm, edge = program.rows_of_types(PURGE), [np.zeros(0, np.int64)], [np.zeros(0)], ""
@@ -133,7 +133,7 @@ def off_plate(program: ParsedProgram, deposited: Beads, profile: Profile) -> Ite
 
 
 def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
-    """A purge on the plate where beads of the first layer come to lie: they would stand on it, the tip would run through it."""
+    """Error for a purge on the plate in the way of first-layer beads, which would stand on it while the tip runs through it."""
     purge = program.rows_of_types(PURGE)[deposited.rows]
     if not purge.any():
         return []
@@ -147,7 +147,7 @@ def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
         return []
     half_mm = 0.5 * deposited.width_mm
     reach_mm = float(half_mm[purged].max() + half_mm[laid].max()) - ROUNDING_MM
-    import shapely  # takes 30 ms to load; needed only by programs with a purge
+    import shapely  # takes 30 ms to load; only programs with a purge need it
 
     lines, beads = (shapely.linestrings(deposited.segments(which)[:, :, :2]) for which in (purged, laid))
     line, bead = shapely.STRtree(beads).query(lines, "dwithin", reach_mm)

@@ -1,8 +1,8 @@
-"""Replay: every move in order against the plastic laid before it: does the head run into it, does a bead lie on it or in it.
+"""Replay: plays every move against the plastic before it: collisions of the head, beads in air and overlapping beads.
 
-For each run of moves at one pose the earlier plastic is turned into the machine frame and laid into a field of heights; then
-the run's own moves follow one by one. A bead is carried by what lies under it or beside it along the direction of that
-moment; it overlaps when plastic already reaches its top along its middle and to one side at least.
+For each run of moves at one pose the earlier plastic is rotated into the machine frame and put into a height field; then the
+moves of the run follow one by one. Plastic below a bead or beside it, along its direction, carries it; a bead overlaps if plastic
+already reaches its top along its centre and on at least one side.
 """
 
 from typing import NamedTuple
@@ -24,25 +24,22 @@ from profiles.profile import Profile
 
 STEP_MM = 0.5
 EVEN = 1e-6
-ROUGH = 0.5  # of half a bead: by how much earlier plastic, seen from another side, may seem to stand higher than it does
-INNER = 0.35  # of the bead's width: where what lies under it is looked for
+ROUGH = 0.5  # of half a bead: height by which earlier plastic may appear too high from another direction
+INNER = 0.35  # of the bead's width: where support below it is sought
 OWN = 3.0  # widths back along its path within which plastic is the bead's own beginning
-FEW_TURNS = 16  # of the table; segments of a program with more are held in memory, 48 bytes a bead
-FARTHEST = 3.0  # heights below a bead, besides half its width and a gap, plastic does not carry it (_under), with some to spare
+FEW_TURNS = 16  # of the table; with more, segments are kept in memory, 48 bytes per bead
+FARTHEST = 3.0  # heights below a bead, besides half its width and a gap, beyond which plastic surely does not carry it (_under)
 ROTATE = int(MoveKind.ROTATE)
-MOST_TURNED = 100_000_000  # segments turned into the frames of all runs together
-FREE_END = 0.5  # of a span: so far a bead that is held at one end only may reach
+MOST_TURNED = 100_000_000  # segments rotated into the frames of all runs together
+FREE_END = 0.5  # of a span: reach of a bead that is held at one end only
 
 
 class Contacts(NamedTuple):
     """(n,) for the rows of a program: depth of the head in earlier plastic, lengths in air and of overlapping extrusion, mm.
 
-    beside_mm: lengths that only what lies beside them carries. Neither counts what spans from line to line of the sparse infill
-    or support below, which is bridged.
-
-    close_mm: by how much less than CROSSING_MM the tip stays above the plastic on a way to or from a turn of the table.
-
-    untested_row: the first row that was not tried, where the table turns too often; -1: all were.
+    beside_mm: lengths carried only from the side. Neither includes spans between lines of sparse infill or support below, which
+    are bridges. close_mm: missing part of the distance CROSSING_MM between tip and plastic in moves to or from a turn of the
+    table. untested_row: the first row that was not tested, because the table turns too often; -1: none.
     """
 
     depth_mm: Floats
@@ -54,9 +51,8 @@ class Contacts(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """The surroundings of the moves at one pose: rows from `first` on belong to it, and beads from `first_bead` on; support keeps
-    `gap` away, the plate is a x + b y + c; head: the bodies that may collide with them.
-    """
+    """Surroundings of the moves at one pose: its rows begin at `first` and its beads at `first_bead`. gap: distance kept by
+    support; plate: (3,) of a x + b y + c; head: the bodies that may collide."""
 
     field: Field
     head: Head
@@ -67,7 +63,7 @@ class Surroundings(NamedTuple):
 
 
 def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contacts:
-    """Go through all moves of a program in order."""
+    """Replay all moves of a program in order."""
     machine, count = profile.machine, len(program.line)
     contacts = Contacts(*np.zeros((5, count)))
     if not len(deposited.rows):
@@ -80,7 +76,7 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     raft_gap_mm = process.raft_contact_distance_mm if process.raft_layers else 0.0
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm, raft_gap_mm)
     width_mm, height_mm = deposited.sizes.max(axis=0)
-    below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # lower plastic does not matter to the moves of a run
+    below_mm = CROSSING_MM + 0.5 * width_mm + FARTHEST * height_mm + gap  # lower plastic does not affect the moves of a run
     for run, pose in pose_runs(program):
         before, after = (int(at) for at in np.searchsorted(deposited.rows, (run.start, run.stop)))
         turned += before
@@ -91,16 +87,17 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
             field = _field(deposited, segments, (before, after), (pose, least_mm), machine)
             about = Surroundings(field, head, run.start, before, gap, _plate(machine, pose))
             _replay_run(moves, strokes, about, contacts, np.zeros((run.stop - run.start, 2)))
-            del field, about  # before there is another one
+            del field, about  # before the next one is made
     return contacts
 
 
 def _field(
     deposited: Beads, segments: Floats | None, laid: tuple[int, int], place: tuple[Pose, float], machine: Machine
 ) -> Field:
-    """The field of a run at one pose with all earlier plastic in it that the run may meet. segments: of all beads, None where
-    they are computed here. laid: the number of beads before the run and after it. place: its pose, and the height up to which
-    plastic is left out.
+    """The height field of a run at one pose with all earlier plastic that the run may meet.
+
+    segments: of all beads, None: computed here. laid: numbers of beads before the run and after it. place: its pose, and the
+    height below which plastic is omitted.
     """
     (before, after), (pose, least_mm) = laid, place
     turn = np.column_stack([rotation(machine, pose), shift(machine, pose)])
@@ -123,7 +120,7 @@ def _field(
 
 @kernel
 def _widen(extent: Floats, segments: Floats, turn: Floats) -> None:
-    """Widens (2, 2) least and greatest X Y to the ends of segments, turned and moved by (3, 4)."""
+    """Widen (2, 2) least and greatest X Y to the ends of segments transformed by (3, 4)."""
     for i in range(len(segments)):
         for side in range(2):
             x, y, z = segments[i, side, 0], segments[i, side, 1], segments[i, side, 2]
@@ -134,7 +131,7 @@ def _widen(extent: Floats, segments: Floats, turn: Floats) -> None:
 
 
 def _plate(machine: Machine, pose: Pose) -> Floats:
-    """(3,) a, b, c of the table's surface z = a x + b y + c in the machine frame; far below where it stands too steep."""
+    """(3,) a, b, c of the table's surface z = a x + b y + c in the machine frame; far below if it is too steep."""
     normal = rotation(machine, pose) @ UP
     if normal[2] < 0.5:
         return np.array([0.0, 0.0, NOTHING])
@@ -153,9 +150,7 @@ def _lay_turned(
     least_mm: float,
     field: Field,
 ) -> None:
-    """Lay (m,) beads into a field, turned and moved by (3, 4), but for those that stay below a height; ups: (m, 3) directions in
-    which they were printed.
-    """
+    """Put (m,) beads into a field, transformed by (3, 4), except those below a height; ups: (m, 3) printing directions."""
     ends, middle = table(2, 3), floats(3, 0.0)
     for i in range(len(rows)):
         up = (ups[i, 0], ups[i, 1], ups[i, 2])
@@ -187,10 +182,10 @@ def _under(
     strokes: Strokes,
     about: Surroundings,
 ) -> int:
-    """Under a place of a bead: 0 nothing, 1 plastic that carries it, 2 plastic where the bead itself should lie.
+    """Test below a position of a bead: 0 nothing, 1 plastic that carries it, 2 plastic in the bead's own place.
 
-    place: x, y, z of the bead's top, and how far along all moves it is. size: half its width, and its height. strict: only what
-    reaches into the bead's own layer carries it (what lies beside it).
+    place: x, y, z of the bead's top, and length of all moves up to it. size: half its width, and its height. strict: only plastic
+    in the bead's own layer counts (beside it).
     """
     x, y, z, at = place
     field, (half, height) = about.field, size
@@ -214,7 +209,7 @@ def _under(
     if not strict and owner < about.first:
         reach += half
     if not strict and (strokes.stands_off[row] or strokes.stands_off[owner]):
-        reach += height * np.ceil(about.gap / height - EVEN)  # support ends with a layer: its gap is rounded up to whole ones
+        reach += height * np.ceil(about.gap / height - EVEN)  # support ends with a layer: its gap is rounded up to whole layers
     return 1 if top > z - reach else 0
 
 
@@ -227,11 +222,11 @@ def _classify_support(
     strokes: Strokes,
     about: Surroundings,
 ) -> int:
-    """0: a bead hangs in air, 1: lies on something, 2: overlaps others, 3: only has a neighbour; side: unit vector across."""
+    """Classify a bead: 0 in air, 1 carried, 2 overlapping, 3 with only a neighbour; side: unit vector across."""
     x, y, z, at = place
     (half, height), plate = size, about.plate
     middle = _under(place, size, row, False, strokes, about)
-    if middle == 1:  # nearly everywhere: what lies beside does not matter then
+    if middle == 1:  # nearly everywhere: the sides do not matter then
         return 1
     overlapping, bearing = (1 if middle == 2 else 0), 0
     for k in range(-1, 2, 2):
@@ -254,20 +249,19 @@ def _classify_support(
 
 @no_nrt
 def _free_mm(most: float, held: float) -> float:
-    """How long the last stretch of a path may be; a path that lies on nothing anywhere spans nothing."""
+    """Allowed length of the last stretch of a path; 0 for a path that is carried nowhere."""
     return FREE_END * most if held == 1.0 else 0.0
 
 
 @no_nrt
 def _settle(stretch: tuple[int, int, float], begin: int, pending: Floats, contacts: Contacts) -> None:
-    """Ends a stretch of beads with nothing under them; stretch: its first and last row, and how much longer it is than it may
-    span. pending: (n, 2) of each row from `begin` on what hangs in air there, and what only has a neighbour.
-    """
+    """End a stretch of beads with nothing below them. stretch: its first and last row, and the excess of its length over the
+    allowed span. pending: (n, 2) for each row from `begin` its length in air, and with only a neighbour."""
     first, last, over_mm = stretch
     for row in range(first, last + 1):
         for k in range(2):
             mm = pending[row - begin, k]
-            if mm == 0.0:  # what is not written takes no memory
+            if mm == 0.0:  # memory that is not written is not used
                 continue
             pending[row - begin, k] = 0.0
             if over_mm > 0.0:
@@ -279,7 +273,7 @@ def _settle(stretch: tuple[int, int, float], begin: int, pending: Floats, contac
 
 @kernel
 def _replay_run(moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats) -> None:
-    """Try each row of a run against the field, then lay it; pending: (n, 2) zeros, one for each."""
+    """Test each row of a run against the field, then lay it; pending: (n, 2) zeros, one for each."""
     _replay_rows(moves, strokes, about, contacts, pending, table(2, 3))
 
 
@@ -287,7 +281,7 @@ def _replay_run(moves: Moves, strokes: Strokes, about: Surroundings, contacts: C
 def _replay_rows(
     moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts, pending: Floats, lowered: Floats
 ) -> None:
-    """As _replay_run; lowered: (2, 3) scratch space for the lowered ends of a move."""
+    """Kernel of _replay_run; lowered: (2, 3) scratch space for the lowered ends of a move."""
     begin, bead = about.first, about.first_bead
     first, open_mm, most, held = begin, 0.0, 0.0, FREE_END
     for row in range(begin, begin + len(pending)):

@@ -1,4 +1,4 @@
-"""Sequence: findings about the order of parts and layers, and about filament pulled back and pushed again."""
+"""Sequence: findings about the order of parts and layers, and about retractions."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,7 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 SLACK_MM = 0.02
-MOST_PULLED_MM = 15.0  # twice what the longest Bowden tubes need
+MOST_PULLED_MM = 15.0  # twice the need of the longest Bowden tubes
 
 
 def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
@@ -25,7 +25,7 @@ def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
 
 
 def _parts(program: ParsedProgram) -> list[Finding]:
-    """The first part that comes after a part with a greater number."""
+    """The first part printed after a part with a greater number."""
     extruding = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.remarks.part > 0)[program.remark])
     falling = np.flatnonzero(np.diff(program.remarks.part[program.remark[extruding]]) < 0)
     if not len(falling):
@@ -36,7 +36,7 @@ def _parts(program: ParsedProgram) -> list[Finding]:
 
 
 def _layers(program: ParsedProgram) -> Iterator[Finding]:
-    """In every part the first layer that lies lower than the one before it."""
+    """In every part the first layer that is lower than the one before it."""
     rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value))
     (part, layer), height_mm, lower = program.remarks[:2], program.remarks.height_mm, [np.zeros(0, dtype=np.int64)]
     for some in pieces(len(rows) - 1):
@@ -52,20 +52,20 @@ def _layers(program: ParsedProgram) -> Iterator[Finding]:
 
 
 def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
-    """Filament pushed at standstill that was not pulled back before, and beads begun with filament still pulled back.
+    """Errors for filament pushed at standstill without an earlier retraction, and for beads begun while retracted.
 
-    A program that never retracts and the moves of the start block are left out.
+    Programs without retractions and the moves of the start block are exempt.
     """
     e, material = program.e_mm, profile.material
     counted = (program.remarks.part + program.remarks.layer > 0)[program.remark]
     purge = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & ~counted)
-    if program.parts and len(purge):  # what the purge of a program of ours pulls back its first part pushes
+    if program.parts and len(purge):  # the first part of a tiltprint program primes what its purge retracted
         counted[purge[-1] + 1 :] = True
     rows = np.flatnonzero((np.abs(e) > 1e-9) & counted)
     if not (e[rows] < 0.0).any():
         return
     pushing = program.kind[rows] == MoveKind.EXTRUDE
-    # What is done between two beads must come to nothing, or to the extra push after it.
+    # The moves between two beads must sum to zero, or to the extra prime after them.
     run = np.cumsum(pushing, dtype=np.int32)
     still = np.flatnonzero(~pushing)
     runs, which = np.unique(run[still], return_inverse=True)
@@ -87,7 +87,7 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterato
 
 
 def _far_pulled(program: ParsedProgram) -> Iterator[Finding]:
-    """In every part the first place between two beads where more filament is pulled back than a hot end holds."""
+    """In every part the first retraction between two beads that is longer than a hot end."""
     is_bead = (program.kind == MoveKind.EXTRUDE) & (program.remarks.part + program.remarks.layer > 0)[program.remark]
     beads = np.flatnonzero(is_bead)
     if len(beads) < 2:
@@ -102,7 +102,7 @@ def _far_pulled(program: ParsedProgram) -> Iterator[Finding]:
 
 
 def _oozing(program: ParsedProgram) -> list[Finding]:
-    """The first turn of the table, in a program that pulls filament back, before which it was not."""
+    """The first turn of the table without a retraction before it, in a program that retracts."""
     if not (program.e_mm < -1e-9).any():
         return []
     turns = np.flatnonzero(program.kind == MoveKind.ROTATE)

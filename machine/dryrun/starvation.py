@@ -1,8 +1,8 @@
-"""Starvation: findings about moves that a serial line cannot bring to the printer as fast as they are made.
+"""Starvation: findings about moves that a serial line cannot deliver as fast as they are printed.
 
-When the line is too slow the printer first slows short moves down, then stops in mid-motion, and a blob is left there. The
-planner is Marlin's: at most 15 blocks, each as fast as those behind it let the machine stop; a block lasts at least 20 ms
-while fewer than half of the places are taken, so that the sender catches up; the first block of an idle machine waits for two.
+When the line is too slow the printer first slows short moves down, then stops in mid-motion and leaves a blob. The planner is
+Marlin's: at most 15 blocks, each as fast as those behind it let the machine stop; a block takes at least 20 ms while fewer than
+half of the places are taken, so that the sender catches up; the first block of an idle machine waits for two.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ from mdp.mesh import Floats, Indices
 from profiles.machine import Machine
 from slicer.estimate.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 
-USUAL_FRAME_BYTES = FRAME_BYTES - 1  # of the checksums of ASCII, 0 to 127, most have two digits; the line's number comes on top
+USUAL_FRAME_BYTES = FRAME_BYTES - 1  # most ASCII checksums, 0 to 127, have two digits; the line's number is added
 GREETING = 3  # lines sent before the program
 FREE_BAUD = 1e12  # a line that takes no time
 OK_BYTES = float(len("ok N12345 P15 B3\n"))  # during which the printer reads nothing
@@ -53,8 +53,9 @@ def _findings(program: ParsedProgram, rows: Indices, stopped: NDArray[np.bool_],
 def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> tuple[NDArray[np.bool_], float]:
     """Play a program's lines over a serial line and its blocks in the printer's planner.
 
-    (2, n) of each row, whether the printer slowed the move down since too few were planned, and whether it had run dry before it
-    although it need not have stood still; seconds until the last move is over."""
+    Returns (2, n) masks of rows that the printer slowed for lack of planned moves, and before which it ran dry without need; and
+    the seconds until the last move is over.
+    """
     accelerations = program.remarks.acceleration[program.remark]
     blocks, moving = blocks_of(program.changes(), program.feed / 60.0, standstills(program), machine, accelerations)
     own, ahead = _bytes(lines, program.line[moving])
@@ -67,9 +68,9 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
 
 
 def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:
-    """(m,) bytes on the wire of the line of each block, which stands in text line `at`, and of the lines since the block before.
+    """(m,) bytes on the wire of the line of each block, at text line `at`, and of the lines since the block before.
 
-    A further block of the same line (an arc's) has no bytes.
+    Further blocks of the same line (of an arc) have no bytes.
     """
     texts = (line if is_plain_move(line) else read_line(line).command for line in lines)
     letters = np.array([0, *(len(text) for text in texts)], dtype=np.float64)
@@ -83,8 +84,8 @@ def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:
 
 @no_nrt
 def _run(now: float, state: Floats, span: Indices, entry2: Floats, blocks: Blocks) -> None:
-    """Begin and end the blocks of the planner until now. state: [begin, duration, end speed, gate]; span: [current, last, first,
-    end] block, NONE: none; entry2: (m + 1,) squares of the speeds at which blocks begin."""
+    """Begin and end the planner's blocks until now. state: [begin, duration, end speed, gate]; span: [current, last, first, end]
+    block, NONE: none; entry2: (m + 1,) squares of the speeds at which blocks begin."""
     while True:
         if span[0] != NONE:
             end = state[0] + state[1]
@@ -106,7 +107,7 @@ def _run(now: float, state: Floats, span: Indices, entry2: Floats, blocks: Block
 
 @no_nrt
 def _wait_for_room(now: float, places: int, state: Floats, span: Indices, entry2: Floats, blocks: Blocks) -> float:
-    """The time from which on fewer than `places` blocks are planned."""
+    """The time at which fewer than `places` blocks are planned."""
     _run(now, state, span, entry2, blocks)
     while span[3] - span[2] + (1 if span[0] != NONE else 0) >= places:
         now = max(now, state[0] + state[1] if span[0] != NONE else state[3])
@@ -118,8 +119,8 @@ def _wait_for_room(now: float, places: int, state: Floats, span: Indices, entry2
 def _play(
     blocks: Blocks, line: tuple[Floats, Floats, float, float], jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]
 ) -> float:
-    """Seconds until the last block is over; slowed and stopped (m,) are filled in, some cruise speeds lowered. line: (m,) bytes
-    of the line of each block, (m,) of other lines before it, bytes in flight at most, seconds a byte."""
+    """Seconds until the last block is over; fills in the masks slowed and stopped (m,), and lowers some cruise speeds. line: (m,)
+    bytes of the line of each block, (m,) of other lines before it, greatest bytes in flight, seconds per byte."""
     n, (own, ahead, ring, byte_s) = len(blocks.length), line
     corner2, taken, cruise, length = floats(n, 0.0), floats(n, 0.0), blocks.cruise, blocks.length
     state, span, entry2 = floats(4, 0.0), np.empty(4, np.int64), floats(n + 1, 0.0)

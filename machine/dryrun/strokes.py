@@ -1,4 +1,4 @@
-"""Strokes: a program's rows as the replay takes them: beads with their places and sizes, what each move may touch and span."""
+"""Strokes: a program's rows for the replay: beads with places and sizes, and what each move may touch and span."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,23 +20,24 @@ from slicer.bead import infill_cell_mm, support_cell_mm
 from slicer.paths import Kind
 
 ROUNDING_MM = 1e-6
-SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
-LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose
-ON_PLATE = 1.5  # heights of a bead: its top is no higher where it lies on the plate
-CROSSING_MM = 0.2  # on the way to a turn of the table, or from it to the next bead, the tip keeps so far above the print
-ACROSS_MM, WAY_MM = 0.5, 3.0  # a shorter way next to a bead is a wipe
-FEWEST_LEVELS = 3  # of beads, for a file's layers to be known by them
+SLACK_MM = 0.4  # depth of the head without a finding: beads are round, their positions rounded
+LEVEL_SLACK_MM = 0.05  # a travel below the newest bead; plastic there was printed at the same pose
+ON_PLATE = 1.5  # heights of a bead: greatest height of its top on the plate
+CROSSING_MM = 0.2  # clearance above the print on the way to a turn of the table, or from it to the next bead
+ACROSS_MM, WAY_MM = 0.5, 3.0  # a shorter move next to a bead is a wipe
+FEWEST_LEVELS = 3  # of beads, to infer a file's layers
 SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 STANDS_OFF = (*SUPPORT, Kind.SKIRT.value)
 FILLING = (Kind.SKIN.value, Kind.TOP_SKIN.value, Kind.GAP.value)
-ZIGZAG = 3.0  # spans: infill that turns at a wall may have a line's end, the joint and the next line's end beyond what it crosses
+# spans: infill that turns at a wall may have a line's end, the joint and the next line's end beyond the cell it crosses
+ZIGZAG = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Beads:
     """The beads that (m,) rows of a program deposit; their ends and sizes are computed on demand, to save memory.
 
-    sizes: (k, 2) widths and heights, mm; size: (m,) which of them each bead has.
+    sizes: (k, 2) widths and heights, mm; size: (m,) index of each bead's size.
     """
 
     program: ParsedProgram
@@ -58,26 +59,26 @@ class Beads:
 
     @cached_property
     def _runs(self) -> tuple[Indices, Floats]:
-        """(j,) the first beads of runs at one pose, and (j, 3) the printing direction of each run."""
+        """(j,) first beads of runs at one pose, and (j, 3) the printing direction of each run."""
         begins = np.flatnonzero(np.append(True, self.program.turned_between(self.rows))[: len(self.rows)])
         poses = self.program.end[self.rows[begins], 3:].tolist()
         return begins, np.array([rotation(self.machine, Pose(*pose))[2] for pose in poses]).reshape(-1, 3)
 
     @property
     def width_mm(self) -> Floats:
-        """(m,) widths."""
+        """(m,) widths, mm."""
         width_mm: Floats = self.sizes[self.size, 0]
         return width_mm
 
     @property
     def height_mm(self) -> Floats:
-        """(m,) heights."""
+        """(m,) heights, mm."""
         height_mm: Floats = self.sizes[self.size, 1]
         return height_mm
 
     @property
     def length_mm(self) -> Floats:
-        """(m,) lengths."""
+        """(m,) lengths, mm."""
         return self._measures[0]
 
     def boxes(self, count: int | None = None) -> Iterator[tuple[slice, Floats]]:
@@ -97,8 +98,7 @@ class Beads:
 
 
 class Strokes(NamedTuple):
-    """(n,) of each row: the path it belongs to, the length of all moves up to its end, and whether it is support, which keeps
-    a gap."""
+    """(n,) for each row: its path, the length of all moves up to its end, and whether it is support, which keeps a gap."""
 
     path: NDArray[np.int32]
     way: Floats
@@ -106,11 +106,11 @@ class Strokes(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """(n, 5) start and end of each row; (n,) its MoveKind, whether it lies below the bead that was just laid, whether it leads to
-    or from a turn of the table, its remarks. spans: for each remark, how far beads may span over sparse infill or support.
+    """(n, 5) start and end of each row; (n,) its kind, whether it is below the newest bead, whether it leads to or from a turn of
+    the table, and its remark.
 
-    rows, sizes, size: of the beads. Apart from Strokes, which the innermost functions take: each array more there slows
-    all of it down.
+    spans: allowed span of beads over sparse infill or support, by remark. rows, sizes, size: of the beads. Separate from Strokes,
+    which the innermost functions take: each additional array there slows everything down.
     """
 
     start: Floats
@@ -126,8 +126,8 @@ class Moves(NamedTuple):
 
 
 def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Beads:
-    """The beads of some rows, their widths and heights from the program's comments, else from its layers or the profile's, and
-    from the filament pushed."""
+    """The beads of some rows; widths and heights come from the program's comments, else from its layers or the profile, and from
+    the filament pushed."""
     remarks, size = program.remarks, program.remark[rows]
     sizes = np.column_stack([remarks.width_mm, remarks.height_mm])
     unsized = np.flatnonzero((np.minimum(remarks.width_mm, remarks.height_mm) <= 0.0)[size])
@@ -149,7 +149,7 @@ def beads_of(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) 
 
 
 def parts_on_plate(program: ParsedProgram, deposited: Beads) -> list[int]:
-    """The parts after part 1 with a first layer on the plate: each begins another model, printed after the one before."""
+    """The parts after part 1 with a first layer on the plate: each begins another model."""
     part, layer = program.remarks[:2]
     used = np.unique(program.remark[deposited.rows])
     lowest = np.full(int(part.max(initial=0)) + 1, np.iinfo(np.int64).max)
@@ -162,7 +162,7 @@ def parts_on_plate(program: ParsedProgram, deposited: Beads) -> list[int]:
 
 
 def turned_box(box: Floats, turn: Floats) -> Floats:
-    """(2, 3) bounding box of a box turned by a (3, 3) matrix, or turned and moved by a (3, 4) one."""
+    """(2, 3) bounding box of a box rotated by a (3, 3) matrix, or transformed by a (3, 4) one."""
     middle = turn[:, :3] @ box.mean(axis=0) + turn[:, 3:].sum(axis=1)
     reach = np.abs(turn[:, :3]) @ np.ptp(box, axis=0) / 2.0 + ROUNDING_MM
     return np.stack([middle - reach, middle + reach])
@@ -181,10 +181,9 @@ def lengths_of(segments: Floats) -> Floats:
 
 
 def _layers_mm(beads: Beads, has_heights: bool, profile: Profile) -> tuple[float, float]:
-    """Heights of the first layer and of others for beads without a height comment: the profile's, or in a file without any such
-    comment those of its own level beads.
-    """
-    process, most = profile.process, profile.machine.head.nozzle_mm  # a higher step is no layer's
+    """Heights of the first and the other layers for beads without a height comment. They are the profile's, or in a file without
+    any such comment those of its own level beads."""
+    process, most = profile.process, profile.machine.head.nozzle_mm  # a higher step is not a layer
     first, usual = process.first_layer_height_mm, process.layer_height_mm
     if has_heights:
         return first, usual
@@ -229,9 +228,8 @@ def moves_of(program: ParsedProgram, deposited: Beads, profile: Profile) -> Move
 
 
 def _spans(program: ParsedProgram, profile: Profile) -> Floats:
-    """How far a bead of each remark may span: skin, over the cells of sparse infill; support, over its own lines; any bead, its
-    own width: walls, too, bridge slots and teeth narrower than themselves.
-    """
+    """Allowed span of a bead, by remark: skin, the cells of sparse infill; support, its own lines; any bead, its own width, as
+    walls also bridge slots and teeth narrower than themselves."""
     process = profile.process
     infill_mm, support_mm = infill_cell_mm(process), support_cell_mm(process)
     of_type = {**dict.fromkeys(FILLING, infill_mm), Kind.INFILL.value: ZIGZAG * infill_mm, **dict.fromkeys(SUPPORT, support_mm)}
@@ -241,7 +239,7 @@ def _spans(program: ParsedProgram, profile: Profile) -> Floats:
 
 
 def _below_last_bead(program: ParsedProgram, rows: NDArray[np.int64], beads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The travels among some rows that go below the last bead, laid at the same pose."""
+    """Travels among some rows that go below the last bead, at the same pose."""
     after = np.searchsorted(beads, rows)
     rows, last = rows[after > 0], beads[after[after > 0] - 1]
     height = np.maximum(program.start[last, 2], program.end[last, 2])
@@ -253,7 +251,7 @@ def _below_last_bead(program: ParsedProgram, rows: NDArray[np.int64], beads: NDA
 
 
 def _ways_to_turns(program: ParsedProgram, rows: NDArray[np.int64], beads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The travels among some rows between the last bead before a turn of the table and the first one after it."""
+    """Travels among some rows between the last bead before a turn of the table and the first one after it."""
     turns = np.flatnonzero(program.kind == MoveKind.ROTATE)
     rows = rows[(program.kind[rows] == MoveKind.TRAVEL) & (program.e_mm[rows] >= 0.0)]
     after = np.searchsorted(beads, rows)
