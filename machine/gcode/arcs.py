@@ -1,4 +1,4 @@
-"""Arcs: the geometry of G2 and G3, and runs of short straight moves that lie on one circle."""
+"""Arcs: geometry of G2 and G3, and recognition of arcs in polylines."""
 
 from collections.abc import Mapping
 from math import acos, atan2, ceil, cos, floor, hypot, pi, sin
@@ -10,9 +10,9 @@ from mdp.kernels.kernel import helper, kernel
 from mdp.mesh import Floats
 
 FEWEST_CHORDS = 3  # fewer straight moves are not worth an arc
-LARGEST_MM, SMALLEST_MM = 500.0, 0.3  # radii beyond: straight to the eye, or smaller than a bead
-WIDEST = 1.7 * pi  # sweep of one arc: a whole circle would end where it begins, which rounding could turn into nothing
-UNEVEN = 0.01  # filament per mm may differ by this share along an arc
+LARGEST_MM, SMALLEST_MM = 500.0, 0.3  # radii beyond: visually straight, or smaller than a bead
+WIDEST = 1.7 * pi  # sweep of one arc: a whole circle ends where it begins, and rounding could reduce it to nothing
+UNEVEN = 0.01  # greatest relative variation of filament per mm along an arc
 MOST_CHORDS = 20000
 AXIS_DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))  # a quarter turn apart
 
@@ -31,8 +31,8 @@ def sweep_rad(start: Point, end: Point, centre: Point, clockwise: bool) -> float
 
 
 def arc_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: bool) -> Point | None:
-    """Centre by the words I J or R of an arc, mm; None where they give none, or the ends are too far apart for R. An R below 0
-    takes the wider arc."""
+    """Centre by the words I J or R of an arc, mm; None without these, or if the ends are too far apart for R. An R below 0
+    selects the longer arc."""
     if "R" not in shape:
         return (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None
     radius, dx, dy = shape["R"], end[0] - start[0], end[1] - start[1]
@@ -46,7 +46,7 @@ def arc_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: 
 
 
 def arc_box(start: Point, end: Point, centre: Point, clockwise: bool) -> tuple[Point, Point]:
-    """Least and greatest x y of an arc: of its ends, and of where it passes the direction of an axis."""
+    """Least and greatest x y of an arc."""
     first = atan2(start[1] - centre[1], start[0] - centre[0])
     low, high = sorted((first, first + sweep_rad(start, end, centre, clockwise)))
     radius = max(hypot(x - centre[0], y - centre[1]) for x, y in (start, end))
@@ -56,13 +56,13 @@ def arc_box(start: Point, end: Point, centre: Point, clockwise: bool) -> tuple[P
 
 
 def chord_count(radius: float, sweep: float, tolerance_mm: float) -> int:
-    """How many equal chords stay within the tolerance of an arc."""
+    """Number of equal chords that stay within the tolerance of an arc."""
     most = 2.0 * acos(max(1.0 - tolerance_mm / radius, -0.5)) if radius > tolerance_mm else 1.0
     return min(max(1, ceil(abs(sweep) / max(most, 1e-6))), MOST_CHORDS)
 
 
 def chords(start: Point, end: Point, centre: Point, sweep: float, count: int) -> list[Point]:
-    """Ends of `count` chords of equal angle, the last one exactly the end; a radius that differs at the ends goes over."""
+    """Ends of `count` chords of equal angle, the last one exactly the end; different radii at the ends are interpolated."""
     first = atan2(start[1] - centre[1], start[0] - centre[0])
     r0, r1 = hypot(start[0] - centre[0], start[1] - centre[1]), hypot(end[0] - centre[0], end[1] - centre[1])
     points = []
@@ -85,7 +85,7 @@ def fit_arcs(points: Floats, pushed: Floats, tolerance_mm: float) -> tuple[NDArr
 
 @kernel
 def _fit_arcs(points: Floats, density: Floats, tolerance: float, runs: NDArray[np.int64], arcs: Floats) -> int:
-    """Fills in the runs and their arcs; returns how many there are."""
+    """Fill in the runs and their arcs; returns their number."""
     n = len(points)
     count, i = 0, 0
     while i + FEWEST_CHORDS < n:
@@ -109,7 +109,7 @@ def _fit_arcs(points: Floats, density: Floats, tolerance: float, runs: NDArray[n
 
 @helper
 def _circle(points: Floats, density: Floats, i: int, j: int, tolerance: float) -> tuple[bool, float, float, float]:
-    """The circle through the first, middle and last of points i..j, and whether all chords keep to it, all one way round."""
+    """The circle through the first, middle and last of points i..j, and whether all chords follow it in one direction."""
     ax, ay = points[i, 0], points[i, 1]
     bx, by = points[(i + j) // 2, 0] - ax, points[(i + j) // 2, 1] - ay
     cx, cy = points[j, 0] - ax, points[j, 1] - ay

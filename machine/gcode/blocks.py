@@ -1,5 +1,4 @@
-"""Blocks: the G-code blocks of a machine: their placeholders and values, the filled-in blocks, and the check before there is a
-program."""
+"""Blocks: a machine's G-code blocks: placeholders, values and checks."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,9 +22,9 @@ from profiles.profile import Profile
 
 RESUME, BEFORE_LAYER = "resume", "before_layer"
 MOST_QUOTED = 3
-OTHER_WORD = {"S": "P", "P": "S"}  # what a temperature stands behind in the other kind of firmware
-WITH_E = {"G76", "M66", "M67", "M68"}  # the commands of CNC programs that use an E
-EXPRESSION = frozenset("#[<%")  # of CNC programs, which are not read here
+OTHER_WORD = {"S": "P", "P": "S"}  # the word of a temperature in the other kind of firmware
+WITH_E = {"G76", "M66", "M67", "M68"}  # commands of CNC programs with an E word
+EXPRESSION = frozenset("#[<%")  # of CNC programs, which are not parsed here
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
@@ -46,14 +45,14 @@ def block_problems(profile: Profile, *blocks: str) -> list[str]:
 
 
 def check_blocks(profile: Profile) -> None:
-    """Raises ProfileError where a block cannot be filled in, or is written for another firmware."""
+    """Raise ProfileError if a block cannot be filled in, or is written for another firmware."""
     problems = block_problems(profile)
     if problems:
         raise ProfileError("; ".join(problems))
 
 
 def _moving(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
-    """A problem for each line of the block before layers that cannot be run over a print."""
+    """A problem for each line of the block before layers that cannot be run above a print."""
     for line in lines:
         if not stands_still(line, dialect):
             yield (
@@ -88,18 +87,18 @@ def block_values(profile: Profile, block: str) -> dict[str, object]:
 
 
 def filled_start(profile: Profile) -> list[str]:
-    """The lines of the start block with its placeholders filled in, comments left out. Raises ProfileError."""
+    """The lines of the start block, filled in and without comments. Raises ProfileError."""
     machine = profile.machine
     lines = fill_block(machine.gcode.start, "start", block_values(profile, "start"), dialect_of(machine))
     return [command for line in lines if (command := read_line(line).command)]
 
 
 def cold_block(lines: Sequence[str], dialect: Dialect) -> tuple[list[str], list[str]]:
-    """The filled-in lines of a block that homes, without what heats or waits for heat; and those that are left out because they
-    run a macro, a file or a cycle of the machine's own, or are not known.
+    """The filled-in lines of a homing block without heating, and those omitted because they run a macro, a file or a machine
+    cycle, or are unknown.
 
-    Raises MoveError where a line that may heat is one that homes, or stands before it: without it the machine may not be homed
-    as it must be. A block without homing is one as a whole, but for a firmware that is homed by hand.
+    Raises MoveError if a line that may heat also homes, or comes before homing: without it the machine may not be homed properly.
+    A block without homing counts as a whole, unless the firmware is homed by hand.
     """
     heats = [heat_in(line, dialect) for line in lines]
     homing = [index for index, line in enumerate(lines) if homes(line, dialect)]
@@ -116,7 +115,7 @@ def cold_block(lines: Sequence[str], dialect: Dialect) -> tuple[list[str], list[
 
 
 def refused_lines(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
-    """The filled-in lines of a block that are not in the firmware's words."""
+    """The filled-in lines of a block that the firmware does not understand."""
     for line in lines:
         text = read_line(line).command.upper()
         if text and text.split()[0] not in dialect.statements and not _is_known(text, dialect):
@@ -155,7 +154,7 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
 
 
 def resume_placeholders(machine: Machine, tip_mm: Sequence[float] | Floats, pose: Pose, clear_z_mm: float) -> dict[str, object]:
-    """The placeholders of the block that resumes a print after a power cut: the tip's place, the table's pose, a safe height."""
+    """The placeholders of the block that resumes a print after a power cut: tip position, pose, safe height."""
     return {
         "x_mm": float(tip_mm[0]), "y_mm": float(tip_mm[1]), "z_mm": float(tip_mm[2]),
         "tilt_deg": pose.tilt_deg, "turn_deg": pose.turn_deg, "clear_z_mm": clear_z_mm, **_axes(machine),
@@ -173,15 +172,15 @@ def _axes(machine: Machine) -> dict[str, object]:
 
 
 def fill_block(block: str, name: str, values: Mapping[str, object], dialect: Dialect) -> list[str]:
-    """The block's lines with {placeholders} replaced, empty lines left out.
+    """The block's lines with {placeholders} replaced, without empty lines.
 
-    A firmware on a serial line gets them without remarks in parentheses, whose words it would execute. Raises ProfileError for an
-    unknown placeholder, for a line whose text firmwares read differently and for a command too long for the firmware.
+    Lines for a serial firmware lose comments in parentheses, whose words it would execute. Raises ProfileError for an unknown
+    placeholder, for a line that firmwares read differently and for a command too long for the firmware.
     """
     lines, longest = [], dialect.longest_line
     for line in block.split("\n"):
         text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).rstrip()
-        text = text if dialect.statements else text.strip()  # RepRapFirmware tells by the indent what an `if` holds
+        text = text if dialect.statements else text.strip()  # RepRapFirmware recognises the body of an `if` by its indent
         try:
             command = read_line(text).command
             text = plain_line(text) if dialect.serial else text

@@ -1,12 +1,10 @@
-"""Commands: the one table of what each G-code command does, a row each.
+"""Commands: the table of all G-code commands and their effects.
 
-Whether a command heats, moves, homes, waits, is remembered or may be repeated is looked up here by the sender, the pause, the
-resume, the dry run, calibration and manual control.
-
-`Command` says what the columns mean. Rows that only one firmware has stand with it in machine/firmware: `commands_of(dialect)` is
-the table of a firmware, EVERY that of all of them. Sources: marlinfw.org/meta/gcode and Marlin's gcode/gcode.h;
-docs.duet3d.com/User_manual/Reference/Gcodes and GCodes/GCodes2.cpp; klipper3d.org/G-Codes.html; linuxcnc.org/docs, gcode and
-m-code.
+Sender, pause, resume, dry run, calibration and manual control look up here whether a command heats, moves, homes, waits, is
+remembered or may be repeated. `Command` documents the columns. Rows of a single firmware are in machine/firmware:
+`commands_of(dialect)` is the table of a firmware, EVERY that of all of them. Sources: marlinfw.org/meta/gcode and Marlin's
+gcode/gcode.h; docs.duet3d.com/User_manual/Reference/Gcodes and GCodes/GCodes2.cpp; klipper3d.org/G-Codes.html; linuxcnc.org/docs,
+gcode and m-code.
 """
 
 import re
@@ -123,7 +121,7 @@ COMMANDS: dict[str, Command] = {
     "M900": Command("linear advance", modal=True, tunes=True),
     "M413": Command("power-loss recovery", tunes=True),
     "M420": Command("use the mesh of the bed"),
-    # a person
+    # waiting for the user
     "M0": Command("wait for a person", waits="person", refused=AT_BUTTONS),
     "M1": Command("wait for a person", waits="person", refused=AT_BUTTONS),
     "M125": Command("park and wait for a person", waits="person", answer_s=PERSON_S),
@@ -131,7 +129,7 @@ COMMANDS: dict[str, Command] = {
     "M600": Command("change the filament, the nozzle hot", moves="other", heats="any", waits="person", answer_s=PERSON_S),
     "M701": Command("load filament, the nozzle hot", moves="other", heats="any", answer_s=PERSON_S),
     "M702": Command("unload filament, the nozzle hot", moves="other", heats="any", answer_s=PERSON_S),
-    # shown, named, told
+    # display, names, host messages
     "M73": Command("progress", shows=True, repeatable=True),
     "M110": Command("line number", refused="would break the line numbers"),
     "M112": Command("emergency stop", refused=SENDERS),
@@ -144,7 +142,7 @@ COMMANDS: dict[str, Command] = {
     "M150": Command("lights"),
     "M300": Command("beep", shows=True),
     "M486": Command("name the objects of a print", shows=True, repeatable=True),
-    # files and macros: whatever they hold
+    # files and macros with any content
     "M24": Command("start a file of the printer's own", heats="any"),
     "M32": Command("start a file of the printer's own", heats="any"),
     "M25": Command("pause that file"),
@@ -157,15 +155,15 @@ COMMANDS: dict[str, Command] = {
 # fmt: on
 
 NOTHING_KNOWN = Command("not known")
-EVERY: Mapping[str, Command] = {  # where firmwares differ the shared row counts, then that of the first firmware
+EVERY: Mapping[str, Command] = {  # shared rows take precedence, then the first firmware's
     name: command
     for table in (*(dialect.commands for firmware in reversed(FIRMWARES) for dialect in firmware.dialects.values()), COMMANDS)
     for name, command in table.items()
 }
 PATHS = frozenset(name for name, command in EVERY.items() if command.moves == "path")
-# What sets a target without waiting, then what waits for it: a reader of G-code tells every firmware's heating by these names.
+# Codes that set a target without waiting, then those that wait for it; readers identify every firmware's heating by these.
 NOZZLE, BED = (tuple(name for name, row in COMMANDS.items() if row.heats == heater) for heater in ("nozzle", "bed"))
-URGENT = frozenset(name for name, row in COMMANDS.items() if row.refused == SENDERS)  # heeded by a firmware before their turn
+URGENT = frozenset(name for name, row in COMMANDS.items() if row.refused == SENDERS)  # executed out of turn by a firmware
 
 
 def commands_of(dialect: Dialect) -> Mapping[str, Command]:
@@ -174,7 +172,7 @@ def commands_of(dialect: Dialect) -> Mapping[str, Command]:
 
 
 def command_named(name: str, commands: Mapping[str, Command] = EVERY) -> Command:
-    """The row of a name in capitals, "M104" or a macro's; NOTHING_KNOWN where there is none."""
+    """The row of a name in capitals, "M104" or a macro's; NOTHING_KNOWN for an unknown one."""
     row = commands.get(name)
     if row is None and TOOLS.fullmatch(name):
         row = commands.get(TOOL)
@@ -184,7 +182,7 @@ def command_named(name: str, commands: Mapping[str, Command] = EVERY) -> Command
 
 
 def command_in(line: str) -> Command:
-    """The row of the command that a line without comment begins with, however it is spelled: m0104S200 is M104."""
+    """The row of the first command in a line without comment, in any spelling: m0104S200 is M104."""
     return command_named(split_command(line.upper())[0])
 
 
@@ -208,7 +206,7 @@ def homes(line: str, dialect: Dialect) -> bool:
 
 
 def stands_still(line: str, dialect: Dialect) -> bool:
-    """Whether a line is known to move nothing and to leave the rest of a program its meaning; a macro is not."""
+    """Whether a line is known to move nothing and to keep the meaning of later lines; macros are not."""
     for row in (command_named(name, commands_of(dialect)) for name, _ in _commands(line)):
         stirs = row.moves or row.homes or row.probes or row.motors or row.changes or row.refused or row.heats == "any"
         if stirs or row is NOTHING_KNOWN:
@@ -217,7 +215,7 @@ def stands_still(line: str, dialect: Dialect) -> bool:
 
 
 def _commands(line: str) -> list[tuple[str, str]]:
-    """Name and rest of every command in a line; displayed text is no command.
+    """Name and rest of every command in a line, without displayed text.
 
     A line that firmwares read differently counts as one unknown command.
     """

@@ -1,18 +1,18 @@
-"""Line text: a line of G-code taken apart into the command that is sent and its comment.
+"""Line text: splits a line of G-code into the command that is sent and its comment.
 
-This is the one reading of a line. The dry run parses the command, the sender sends it, and a file for a server or a card holds
-it, so all three have the same text. Firmwares differ in what they make of a line, and a command avoids all of that:
+All readers of lines use it: the dry run parses the command, the sender sends it, and a file for a server or a card contains it,
+so all three have the same text. Firmwares differ in how they read a line, and commands avoid all of these differences:
 
-* Remarks in parentheses: CNC firmwares skip them. Marlin (gcode/parser.cpp) and RepRapFirmware (StringParser.cpp, FFF mode)
+* Comments in parentheses: CNC firmwares skip them. Marlin (gcode/parser.cpp) and RepRapFirmware (StringParser.cpp, FFF mode)
   execute the words inside; Klipper (klippy/gcode.py) fails on them.
 * Small letters and blanks inside words: Marlin ignores small letters unless built with GCODE_CASE_INSENSITIVE.
 * `G01` and `G28 XY`: Klipper does not know the first, and homes every axis at the second.
 * An axis named twice: Marlin and Klipper take the last value, RepRapFirmware the first, LinuxCNC stops.
 * `X1E2`: RepRapFirmware may read an exponent, the others the words X1 and E2.
-* Line numbers of the file's own: Marlin skips one number only, and the sender adds its own.
-* A `;` between quotes: text for RepRapFirmware, the beginning of a comment for Marlin and OctoPrint.
-* A backspace deletes what stands before it in Marlin, the character 127 the whole line in RepRapFirmware.
-* A backslash: Marlin (queue.cpp, process_stream_char) drops it, so that the checksum does not fit any more.
+* Line numbers in the file: Marlin skips one number only, and the sender adds its own.
+* A `;` in quotes: text for RepRapFirmware, the beginning of a comment for Marlin and OctoPrint.
+* A backspace deletes the character before it in Marlin, the character 127 the whole line in RepRapFirmware.
+* A backslash: Marlin (queue.cpp, process_stream_char) drops it, which invalidates the checksum.
 """
 
 import re
@@ -23,22 +23,22 @@ from machine.firmware import dialects
 from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, WORD, quote
 from profiles.errors import GcodeError
 
-is_plain_move = re.compile(r"G[01](?: [A-Z]-?[0-9.]+)+").fullmatch  # nearly every line; it is its own command
+is_plain_move = re.compile(r"G[01](?: [A-Z]-?[0-9.]+)+").fullmatch  # nearly every line; its command is the line itself
 
 PIECE = re.compile(r'"[^"]*"|\([^()]*\)|;.*|[^"();]+|["()]', re.DOTALL)
 FRAME = re.compile(r"[Nn] *[0-9]+ *")
 UNNUMBERED = re.compile(r"[Nn] *[GMTgmt] *[0-9]")
 CHECKED = re.compile(r"([^;]*)\*([^*;]*)(;.*)?", re.DOTALL)
 HEAD = re.compile(r"([GMTgmt]) *0*([0-9]{1,6})(?:\.([0-9]{0,6}))?(?![0-9.])")
-# Commands whose rest is a text, parentheses included: messages, expressions of RepRapFirmware, names of files on a card.
+# Commands followed by text, parentheses included: messages, expressions of RepRapFirmware, names of files on a card.
 MESSAGES = frozenset({"M117", "M118"})
 STATEMENTS = frozenset().union(*(dialect.statements for dialect in dialects().values()))
 FREE_TEXT = MESSAGES | STATEMENTS | {"M23", "M28", "M30", "M32", "M33", "M928"}
-# Commands with a text that is only shown: a character in it that cannot be sent may be replaced.
+# Commands with displayed text, in which characters that cannot be sent may be replaced.
 SHOWN = MESSAGES | {"M0", "M1", "M291", "M486", "RESPOND", "SET_DISPLAY_TEXT"}
 SHOWN |= {"EXCLUDE_OBJECT_DEFINE", "EXCLUDE_OBJECT_START", "EXCLUDE_OBJECT_END", "EXCLUDE_OBJECT"}
-UNREADABLE = frozenset({"G0", "G1", "G2", "G3", "G92"})  # with other words than letters with numbers: refused as they are written
-UNSENDABLE = str.maketrans({"\\": "/", "*": "x"})  # printable, but a backslash or a star in a line spoils its checksum
+UNREADABLE = frozenset({"G0", "G1", "G2", "G3", "G92"})  # refused with words other than letters with numbers
+UNSENDABLE = str.maketrans({"\\": "/", "*": "x"})  # printable, but a backslash or a star invalidates the checksum
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 SIGNS = " .,:'+-%/"
 LETTERS = {
@@ -46,23 +46,24 @@ LETTERS = {
     "°": " deg ", "–": "-", "—": "-", "‘": "'", "’": "'", "“": "'", "”": "'", "„": "'", "×": "x", "·": "-", "€": "EUR",
 }  # fmt: skip
 
-# Comments that begin layers and parts, their sign and the blanks around taken off: all read them alike.
-LAYER = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}")  # PrusaSlicer's word and ours, Cura's
+# Comments that begin layers and parts, without the sign and surrounding blanks; every reader uses these.
+LAYER = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}")  # of PrusaSlicer and tiltprint, and of Cura
 PART = re.compile(r"PART: *([0-9]{1,6})(?: of ([0-9]{1,6}))?.*")
 
 
 class LineText(NamedTuple):
-    """command: as it is sent, "" where the line has none; comment: what follows its `;`."""
+    """command: as sent, "" for none; comment: the text after its `;`."""
 
     command: str
     comment: str
 
 
 def read_line(line: str) -> LineText:
-    """Take a line apart, with or without its line end. Raises GcodeError, which does not name the line, where firmwares would not
-    agree about its text: parentheses or quotes without their partner, an axis named twice, a checksum that does not fit.
+    """Split a line, with or without its line end, into command and comment.
 
-    A command of words comes out in capitals, one blank before each word; a text or a macro stays as it is written.
+    Words come out in capitals with one blank before each; texts and macros stay as written. Raises GcodeError, which does not
+    name the line, for text that firmwares read differently: unpaired parentheses or quotes, an axis named twice, a wrong
+    checksum.
     """
     text = line.strip()
     if text[:1] in ("", ";"):
@@ -94,7 +95,7 @@ def command_name(text: str) -> str:
 
 
 def macro_name(line: str) -> str:
-    """The macro that a line of a program calls, in capitals; "" where it has none."""
+    """The macro that a line of a program calls, in capitals; "" for none."""
     if line[1:2].isdigit():  # nearly every line
         return ""
     try:
@@ -105,9 +106,9 @@ def macro_name(line: str) -> str:
 
 
 def plain_line(line: str) -> str:
-    """A line as every firmware of a printer reads it as we do, for a file that is not sent command by command.
+    """A line for a file, in a form that every printer firmware reads alike.
 
-    It stays as it is, indent and comment included, where its text is the command already. Raises GcodeError as read_line().
+    Unchanged, with indent and comment, if its text already is the command. Raises GcodeError like read_line().
     """
     if is_plain_move(line):
         return line
@@ -124,7 +125,7 @@ def plain_line(line: str) -> str:
 
 
 def to_ascii(command: str) -> str:
-    """A command whose text is only shown, in printable ASCII: letters lose their accents, what has no likeness becomes `?`."""
+    """A command with displayed text in printable ASCII: letters lose their accents, other characters become `?`."""
     if (command.isascii() and command.isprintable()) or command_name(command) not in SHOWN:
         return command
     plain = "".join(c if c.isascii() and c.isprintable() else _likeness(c) for c in command)
@@ -137,7 +138,7 @@ def _likeness(letter: str) -> str:
 
 
 def _unframe(text: str, begin: int) -> str:
-    """A line without number and checksum."""
+    """A line without number and checksum. Raises GcodeError for a wrong checksum."""
     checked = CHECKED.fullmatch(text)
     if checked is None:
         return text[begin:]
@@ -151,9 +152,8 @@ def _unframe(text: str, begin: int) -> str:
 
 
 def _without_remarks(text: str, name: str) -> tuple[str, str]:
-    """Code without remarks in parentheses, and the comment. Parentheses between quotes, in a free text, or in a macro right
-    behind a letter (NAME=cube_(1)) are no remarks.
-    """
+    """Code without comments in parentheses, and the comment. Parentheses in quotes, in free text, or directly after a letter in a
+    macro (NAME=cube_(1)) are not comments."""
     code, comment = "", ""
     free, macro, shown = name in FREE_TEXT, MACRO.fullmatch(name) is not None, name in SHOWN
     for piece in PIECE.findall(text):
@@ -177,7 +177,7 @@ def _without_remarks(text: str, name: str) -> tuple[str, str]:
 
 
 def _canonical(code: str, name: str) -> str:
-    """The one way of writing a command of letters and numbers; of other commands the name at most."""
+    """The canonical form of a command of letters and numbers; of other commands at most the name changes."""
     head = HEAD.match(code)
     if name in FREE_TEXT and head:
         rest = code[head.end() :].strip()

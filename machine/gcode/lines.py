@@ -1,6 +1,4 @@
-"""Lines: a G-code text as a sequence of its lines that holds their bytes, a third of what strings of their own would take; and
-files of G-code.
-"""
+"""Lines: a G-code text as a sequence of lines in one byte array, a third of the size of separate strings; and files of G-code."""
 
 import codecs
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,22 +23,22 @@ OLD_LETTERS = "tiltprint-old-letters"
 
 
 class Texts(NamedTuple):
-    """Pieces of text one after the other: piece k is content[start[k] : start[k + 1]], UTF-8."""
+    """Pieces of text in sequence: piece k is content[start[k] : start[k + 1]], UTF-8."""
 
     content: Bytes
     start: Starts
 
     @staticmethod
     def of(pieces: Sequence[bytes]) -> "Texts":
-        """Pieces put together; a kernel takes no array of no bytes, so without any text there is a blank."""
+        """Join pieces; content is a blank if all are empty, for a kernel accepts no empty array."""
         return Texts(np.frombuffer(b"".join(pieces) or b" ", np.uint8), np.cumsum([0, *map(len, pieces)]))
 
 
 class Lines(Sequence[str]):
     """The lines of a text without their ends; equal to any sequence of the same lines.
 
-    content: UTF-8 with a line end after every line; start: (n + 1,) where each line begins, and where the last one ends, in 32
-    bits as long as these do.
+    content: UTF-8 with a line end after every line; start: (n + 1,) where each line begins, and where the last one ends, 32-bit
+    if that suffices.
     """
 
     def __init__(self, content: Bytes, start: Starts) -> None:
@@ -48,7 +46,7 @@ class Lines(Sequence[str]):
 
     @classmethod
     def of(cls, lines: Iterable[str]) -> "Lines":
-        """Any lines, taken one by one."""
+        """Lines from any iterable of strings."""
         if isinstance(lines, Lines):
             return lines
         content, sizes, left = bytearray(), [np.zeros(1, dtype=np.int64)], iter(lines)
@@ -59,7 +57,7 @@ class Lines(Sequence[str]):
 
     @classmethod
     def of_text(cls, pieces: Iterable[str]) -> "Lines":
-        """A text that comes in pieces, whose lines end with a line feed."""
+        """Lines of a text in pieces, with line feeds."""
         content = bytearray()
         for text in pieces:
             content += _bytes(text)
@@ -67,7 +65,7 @@ class Lines(Sequence[str]):
 
     @classmethod
     def of_bytes(cls, content: bytes | bytearray) -> "Lines":
-        """A whole text in UTF-8, whose lines end with a line feed; the bytes stay where they are."""
+        """Lines of a whole text in UTF-8, with line feeds; the bytes are not copied."""
         if content and content[-1] != NEWLINE:
             content += b"\n"
         text, width = np.frombuffer(content, dtype=np.uint8), _width(len(content))
@@ -77,7 +75,7 @@ class Lines(Sequence[str]):
         return cls(text, np.concatenate(ends))
 
     def beginning_with(self, word: str) -> list[int]:
-        """The places of the lines that begin with a word."""
+        """Indices of the lines that begin with a word."""
         begins = np.flatnonzero(np.diff(self.start) > len(_bytes(word)))
         for k, letter in enumerate(_bytes(word)):
             begins = begins[self.content[self.start[begins] + k] == letter]
@@ -122,7 +120,7 @@ class Lines(Sequence[str]):
 
 
 def _width(size: int) -> type[np.signedinteger[Any]]:
-    """The integer type for positions in a text of that many bytes."""
+    """The integer type for positions in a text of `size` bytes."""
     return np.int32 if size < 2**31 else np.int64
 
 
@@ -135,7 +133,7 @@ def _text(content: Bytes) -> str:
 
 
 def _old_letters(error: UnicodeError) -> tuple[str, int]:
-    """Bytes that are no UTF-8, as Windows and older programs mean them: Windows-1252, or Latin-1 where that has no letter."""
+    """Decode bytes that are not UTF-8 as Windows-1252, or Latin-1 where that is undefined, as older programs write them."""
     if not isinstance(error, UnicodeDecodeError):
         raise error
     given = error.object[error.start : error.end]
@@ -146,8 +144,10 @@ codecs.register_error(OLD_LETTERS, _old_letters)
 
 
 class GcodeFile:
-    """Iterating gives the lines without their ends. A file is UTF-8; single bytes that are not, as in the comments of other
-    programs, are read as Windows-1252. Raises GcodeError when the file cannot be read or is no text, which a zero byte shows.
+    """A G-code file; iterating gives its lines without ends.
+
+    A file is UTF-8; single bytes that are not, as in comments of other programs, are read as Windows-1252. Raises GcodeError when
+    the file is unreadable or contains a zero byte, and thus is not text.
     """
 
     def __init__(self, path: Path) -> None:
@@ -159,7 +159,7 @@ class GcodeFile:
                 yield self._checked(line).rstrip("\n")
 
     def lines(self) -> Lines:
-        """All lines at once; raises GcodeError."""
+        """All lines at once. Raises GcodeError."""
         with self._refusing():
             content = self.path.read_bytes()
             if content.isascii() and b"\r" not in content and b"\0" not in content:  # nearly every file: it is not copied
@@ -168,7 +168,7 @@ class GcodeFile:
                 return Lines.of_text(map(self._checked, iter(lambda: file.read(PIECE), "")))
 
     def sha256(self) -> str:
-        """Hexadecimal SHA-256 of the file's bytes; raises GcodeError."""
+        """Hexadecimal SHA-256 of the file's bytes. Raises GcodeError."""
         with self._refusing(), self.path.open("rb") as file:
             return file_digest(file, "sha256").hexdigest()
 

@@ -1,11 +1,11 @@
-"""Modes: what G20, G21, G90 to G94, M82, M83 and F have set, and where the words of a move lead; and all that a firmware
-remembers of the commands it was given, so that a print can go on as if nothing had happened.
+"""Modes: the state set by G20, G21, G90 to G94, M82, M83 and F, the effect of moves on it; and the whole modal state of a
+firmware, so that a print can resume unchanged.
 
-The one reading of modes: the dry run's reader, the host's state and the simulated printer each keep a `Modes`. A place is a list
-X Y Z tilt turn E as its owner counts them; the program's coordinate of it is place + offset.
+The dry run's reader, the host's state and the simulated printer each keep a `Modes`. A position is a list X Y Z tilt turn E as
+its owner counts them; the program's coordinates are position + offset.
 
-Marlin: gcode.h, axis_is_relative: G90 and G91 go for E too, M82 and M83 for E alone. RepRapFirmware: GCodes2.cpp: G90 and G91
-leave drivesRelative alone. Klipper: gcode_move.py: E is relative under G91 or M83, and a G92 without words calls all axes 0.
+Marlin: gcode.h, axis_is_relative: G90 and G91 apply to E too, M82 and M83 to E alone. RepRapFirmware: GCodes2.cpp: G90 and G91
+leave drivesRelative alone. Klipper: gcode_move.py: E is relative under G91 or M83, and a G92 without words sets all axes to 0.
 """
 
 from collections.abc import Iterable, Mapping
@@ -22,25 +22,25 @@ from profiles.machine import Machine
 
 INCH_MM = 25.4
 E_AXIS = 5
-LINEAR = (0, 1, 2, E_AXIS)  # their words count in inches after G20, degrees never do
+LINEAR = (0, 1, 2, E_AXIS)  # their words are in inches after G20, degrees never are
 MODES = ("G20", "G21", "G90", "G91", "G93", "G94", "M82", "M83")
 Coordinates = tuple[float | None, ...]  # X Y Z tilt turn E
 
 
 class Axes(NamedTuple):
-    """The letters of a machine's axes, and the dialect that reads their modes."""
+    """The letters of a machine's axes, and the dialect that determines their modes."""
 
-    letters: tuple[str, ...] = ("X", "Y", "Z", "A", "C", "E")  # in the order of a place
+    letters: tuple[str, ...] = ("X", "Y", "Z", "A", "C", "E")  # in the order of a position
     words: Mapping[str, int] = {"X": 0, "Y": 1, "Z": 2, "A": 3, "C": 4, "E": E_AXIS}  # those that a move may have
     dialect: Dialect = dialects()["marlin"]
-    steppers: tuple[str, str] = ("", "")  # Klipper's names of those that tilt and turn, in capitals
+    steppers: tuple[str, str] = ("", "")  # Klipper's names of the tilt and turn steppers, in capitals
 
     def __deepcopy__(self, memo: object) -> "Axes":
         return self
 
 
 def axes_of(machine: Machine | None) -> Axes:
-    """The axes of a machine, Marlin's A and C where none is known."""
+    """The axes of a machine, by default Marlin's with A and C."""
     if machine is None:
         return Axes()
     dialect = dialect_of(machine)
@@ -53,7 +53,8 @@ def axes_of(machine: Machine | None) -> Axes:
 
 @dataclass(slots=True)
 class Modes:
-    """feed: mm/min (deg/min), or after G93 one over minutes; 0: none given yet. strict: move() refuses what it cannot use."""
+    """Modal settings of moves. feed: mm/min (deg/min), or after G93 one over minutes; 0: none yet. strict: move() refuses invalid
+    words."""
 
     axes: Axes
     feed: float = 0.0
@@ -62,12 +63,12 @@ class Modes:
     relative: bool = False
     filament_relative: bool = False  # set by M82 and M83, and by G90 and G91 in some firmwares
     inverse_time: bool = False
-    offset: list[float] = field(default_factory=lambda: [0.0] * 6)  # of G92: program's coordinate less the place
-    units: list[float] = field(default_factory=lambda: [1.0] * 6)  # mm or deg of a word's 1
-    steps: list[bool] = field(default_factory=lambda: [False] * 6)  # whether a word is a step
+    offset: list[float] = field(default_factory=lambda: [0.0] * 6)  # of G92: program's coordinate minus position
+    units: list[float] = field(default_factory=lambda: [1.0] * 6)  # mm or deg of one unit of a word
+    steps: list[bool] = field(default_factory=lambda: [False] * 6)  # whether a word is relative
 
     def set(self, name: str) -> None:
-        """One of MODES."""
+        """Apply one of MODES."""
         if name in ("G20", "G21"):
             self.inches = name == "G20"
             for axis in LINEAR:
@@ -87,14 +88,14 @@ class Modes:
 
     @property
     def unit_mm(self) -> float:
-        """mm of one unit of length."""
+        """mm per unit of length."""
         return self.units[0]
 
     def move(self, coordinates: list[Any], words: Iterable[Word]) -> bool:
         """Apply the words of a move to `coordinates` and the feed; True when an axis is named.
 
-        None is an unknown coordinate: a relative move leaves it unknown. Raises GcodeError, if strict, for an F that is not above
-        0 and for a word that is no axis's; else they change nothing.
+        None is an unknown coordinate, which a relative move leaves unknown. If strict, raises GcodeError for an F not above 0 and
+        for a word that is not an axis; otherwise these change nothing.
         """
         axes, units, steps, offset = self.axes.words, self.units, self.steps, self.offset
         moved = False
@@ -126,8 +127,8 @@ class Modes:
 
 @dataclass
 class ModalState:
-    """The state of a firmware: take() every command in order; lines() are the commands that restore it.
-    at: the positions of the program (what M114 reports), rotary axes unwrapped; None where the sender cannot know them."""
+    """The state of a firmware: take() every command in order; lines() are the commands that restore it. at: the program's
+    positions (as M114 reports them), rotary axes unwrapped; None if the sender cannot know them."""
 
     axes: Axes
     at: list[float | None] = field(default_factory=lambda: [None] * 6)
@@ -136,7 +137,7 @@ class ModalState:
     fans: dict[str, str] = field(default_factory=dict)
     settings: dict[str, str] = field(default_factory=dict)
     pulled_mm: float = 0.0  # retracted filament
-    pushed_mm: float = 0.0  # filament that the last command pushes; inf: an unknown amount
+    pushed_mm: float = 0.0  # by the last command; inf: an unknown amount
     modes: Modes = field(init=False)
 
     def __post_init__(self) -> None:
@@ -148,7 +149,7 @@ class ModalState:
 
     @property
     def follows(self) -> bool:
-        """Whether X Y Z are places on the table now (TCP)."""
+        """Whether X Y Z are positions relative to the table now (TCP)."""
         return self.settings.get("follow") == self.axes.dialect.follow_on != ""
 
     def take(self, command: str) -> bool:
@@ -191,7 +192,7 @@ class ModalState:
         return False
 
     def lines(self) -> list[str]:
-        """Commands that bring a firmware to this state, positions left out but for the filament's."""
+        """Commands that bring a firmware to this state, without positions except the filament's."""
         modes = self.modes
         lines = ["G20" if modes.inches else "G21", "G91" if modes.relative else "G90"]
         lines.append("M83" if modes.filament_relative else "M82")
@@ -203,7 +204,7 @@ class ModalState:
         return [*lines, *self.settings.values(), *self.fans.values()]
 
     def names_filament(self, command: str) -> bool:
-        """Whether a command is a move that has a word for filament."""
+        """Whether a command is a move with a filament word."""
         name, rest = split_command(command.upper())
         return name in PATHS and any(self.axes.words.get(letter) == E_AXIS for letter, _ in read_words(rest))
 
@@ -214,16 +215,16 @@ class ModalState:
         after = at[E_AXIS]
         self.pushed_mm = after - before if before is not None and after is not None else self._unsummed(words)
         if self.pulled_mm or self.pushed_mm < 0.0:
-            self.pulled_mm = max(0.0, round(self.pulled_mm - self.pushed_mm, 9))  # what sums of words leave over is nothing
+            self.pulled_mm = max(0.0, round(self.pulled_mm - self.pushed_mm, 9))  # rounding errors of sums count as zero
         return moved
 
     def _unsummed(self, words: list[Word]) -> float:
-        """Filament that a move pushes where it is not known where the filament has stood."""
+        """Filament that a move pushes when its starting value is unknown."""
         pushed = [value * self.modes.unit_mm for letter, value in words if self.axes.words.get(letter) == E_AXIS]
         return sum(pushed) if self.modes.steps[E_AXIS] or not pushed else inf
 
     def _turn(self, values: Mapping[str, str]) -> bool:
-        """A MANUAL_STEPPER."""
+        """Apply a MANUAL_STEPPER."""
         if values.get("STEPPER") not in self.axes.steppers:
             return False
         axis = 3 + self.axes.steppers.index(values["STEPPER"])

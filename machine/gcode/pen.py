@@ -1,7 +1,7 @@
-"""Pen: the firmware's state after the lines written so far, and the lines of the next moves.
+"""Pen: the firmware's state after the lines written so far, and the formatting of further moves.
 
-A kernel sets the lines of many moves in digits, for nearly all lines of a program are these; single words, and the lines that
-bring the table to a pose in each firmware's way, are set one by one.
+A kernel formats many moves at once, which are nearly all lines of a program; single words, and the lines that turn the table in
+each firmware's way, are formatted one by one.
 """
 
 from collections.abc import Iterator
@@ -24,21 +24,24 @@ from slicer.strokes.travels import distance
 
 Whole = NDArray[np.int64]
 
-LONGEST = 128  # characters of a line: five words of 20 digits at most with sign and point, and the command
+LONGEST = 128  # characters of a line: five words of at most 20 digits with sign and point, and the command
 SPACE, MINUS, POINT, ZERO, LINE_END, FEED = 32, 45, 46, 48, 10, 70
-COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point
+COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # after the point
 PUSHING, TRAVELLING, STANDING = range(3)  # kinds of paths: strokes and wipes, travels, retractions
-X, Y, Z, PUSHED, F = range(5)  # what the firmware knows
-STEPS = 20  # a short stroke that must go slower does so by twentieths, or the speeds of its like would flicker
+X, Y, Z, PUSHED, F = range(5)  # known to the firmware
+STEPS = 20  # a short stroke slows down in steps of a twentieth, or the speeds of similar strokes would flicker
 UNKNOWN = -(10**12)
 STROKE = np.frombuffer(b"G1", np.uint8)
-STEP_DEG = 1.0  # a followed turn goes in steps: between them the tip leaves its place by a thousandth of its distance to the axes
+STEP_DEG = 1.0  # step of a followed turn: between steps the tip deviates by a thousandth of its distance to the axes
 
 
 class Paths(NamedTuple):
-    """Moves to write. points_mm: (n, 3) as the file calls them; filament_mm: (n,) pushed on the way to each; starts: (m + 1,)
-    where the points of each path begin; does: (m,) PUSHING, TRAVELLING or STANDING; speed: (m,) units/s; most_mm_s: (m,) of
-    filament as planned, RICHER times that is the most that the lines ask for."""
+    """Moves to write.
+
+    points_mm: (n, 3) in file coordinates; filament_mm: (n,) pushed on the way to each; starts: (m + 1,) first point of each path;
+    does: (m,) PUSHING, TRAVELLING or STANDING; speed: (m,) units/s; most_mm_s: (m,) planned filament speed, RICHER times which is
+    the limit for written lines.
+    """
 
     points_mm: Floats
     filament_mm: Floats
@@ -52,7 +55,7 @@ class Paths(NamedTuple):
 def _write(
     paths: Paths, texts: Texts, travel: Bytes, letter: int, relative: bool, known: Whole, filament_mm: Floats, text: Bytes
 ) -> int:
-    """Fills in the text and returns its length."""
+    """Fill in the text and return its length."""
     at = 0
     for path in range(len(paths.starts) - 1):
         at = _copy(texts.content, texts.start[path], texts.start[path + 1], text, at)
@@ -97,10 +100,11 @@ def _write(
 
 @helper
 def _stretch(points_mm: Floats, filament_mm: Floats, first: int, end: int) -> tuple[float, float]:
-    """Factor that scales the filament of each step, in proportion to its written length, so that the sum stays; and the most
-    filament for a millimetre as written. A factor of 0: nothing is redistributed.
+    """Factor that scales each step's filament in proportion to its written length with a constant sum, and the greatest filament
+    per written mm.
 
-    Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed.
+    A factor of 0: nothing is redistributed. Otherwise a step of a few thousandths, which rounding halves, would double the
+    extruder's speed.
     """
     whole = shared = densest = 0.0
     for k in range(first + 1, end):
@@ -131,7 +135,7 @@ def _thousandths(value_mm: float) -> int:
 
 @no_nrt
 def _filament(letter: int, relative: bool, filament_mm: float, known: Whole, text: Bytes, at: int) -> int:
-    """The word of filament up to what has been pushed: a step, or the sum where the firmware knows no steps."""
+    """Write the filament word up to the amount pushed: a step, or the sum if the firmware has no relative filament."""
     pushed = int(np.rint(filament_mm * 1e5))
     value = pushed - known[PUSHED] if relative else pushed
     known[PUSHED] = pushed
@@ -140,7 +144,7 @@ def _filament(letter: int, relative: bool, filament_mm: float, known: Whole, tex
 
 @no_nrt
 def _feed(units_s: float, known: Whole, text: Bytes, at: int) -> int:
-    """The F word where it changes."""
+    """Write the F word if it changes."""
     feed = max(int(np.rint(60.0 * units_s)), 1)
     if feed == known[F]:
         return at
@@ -158,7 +162,7 @@ def _copy(what: Bytes, first: int, end: int, text: Bytes, at: int) -> int:
 
 @no_nrt
 def _word(letter: int, value: int, digits: int, text: Bytes, at: int) -> int:
-    """A blank, a letter and a whole number with a point before its last digits; returns the end of the text."""
+    """Write a blank, a letter and an integer with a decimal point before its last digits; returns the end of the text."""
     text[at], text[at + 1] = SPACE, letter
     at += 2
     if value < 0:
@@ -184,8 +188,8 @@ def _word(letter: int, value: int, digits: int, text: Bytes, at: int) -> int:
 
 @dataclass
 class Pen:
-    """pose: where the table stands; known: (5,) X Y Z in thousandths of a mm, filament in 1e-5 mm and F in units/min that the
-    firmware knows; pushed_mm: (1,) filament pushed so far, not rounded; kind: number of the last stroke's kind, -1: none."""
+    """State of the output. pose: of the table; known: (5,) X Y Z in thousandths of a mm, filament in 1e-5 mm and F in units/min
+    that the firmware knows; pushed_mm: (1,) unrounded filament so far; kind: number of the last stroke's kind, -1: none."""
 
     dialect: Dialect
     machine: Machine
@@ -208,33 +212,34 @@ class Pen:
 
     @property
     def place_mm(self) -> Floats:
-        """(3,) X Y Z as the file calls them."""
+        """(3,) X Y Z in file coordinates."""
         place: Floats = self.known[X:PUSHED] / 1000.0
         return place
 
     def file_coordinates(self, points_mm: Floats) -> Floats:
-        """(n, 3) axis positions as the file calls them."""
+        """(n, 3) axis positions in file coordinates."""
         return followed_places(self.machine, self.pose, points_mm) if self.machine.coordinates == "workpiece" else points_mm
 
     def paths(self, paths: Paths, texts: Texts) -> str:
-        """The lines of many moves, with their ends: the coordinates that change, then filament, then the F that changes.
+        """The lines of many moves with their ends: changed coordinates, then filament, then a changed F.
 
-        texts: m + 1 of lines between the m paths, one before each and one behind the last. A point where the tip is already gives
-        no line, its filament goes to the next one."""
+        texts: m + 1 of lines between the m paths, one before each and one after the last. A point at the tip's position gives no
+        line; its filament is added to the next one.
+        """
         travel, letter = np.frombuffer(self.dialect.travel.encode(), np.uint8), ord(self.filament_letter)
         text = np.empty(LONGEST * int(paths.starts[-1] - paths.starts[0]) + len(texts.content), np.uint8)
         size = _write(paths, texts, travel, letter, self.dialect.filament_relative, self.known, self.pushed_mm, text)
         return text[:size].tobytes().decode("utf-8")
 
     def filament(self, pushed_mm: float) -> str:
-        """The filament's word for a length to push: a step, or the sum where the firmware knows no steps."""
+        """The filament word for a length to push: a step, or the sum if the firmware has no relative filament."""
         self.pushed_mm[0] += pushed_mm
         e = round(float(self.pushed_mm[0]) * 1e5)
         step, self.known[PUSHED] = e - int(self.known[PUSHED]), e
         return f" {self.filament_letter}{(step if self.dialect.filament_relative else e) / 1e5:.5f}"
 
     def speed(self, units_s: float) -> str:
-        """The F word where it changes."""
+        """The F word if it changes, else ""."""
         feed = max(1, round(60.0 * units_s))
         if feed == self.known[F]:
             return ""
@@ -242,7 +247,7 @@ class Pen:
         return f" F{feed}"
 
     def coordinates(self, place_mm: Floats) -> str:
-        """The words of the coordinates that change; place_mm: (3,) as the file calls them."""
+        """The words of the changed coordinates; place_mm: (3,) in file coordinates."""
         text = ""
         for axis, value in enumerate(np.rint(place_mm * 1000.0).astype(np.int64).tolist()):
             if value != self.known[axis]:
@@ -252,17 +257,17 @@ class Pen:
 
 
 def angle(degrees: float) -> str:
-    """An angle as it is written."""
+    """An angle as text."""
     return f"{round(degrees * 1e4) / 1e4:.4f}"
 
 
 def number(value: float) -> str:
-    """A number without needless zeros."""
+    """A number without trailing zeros."""
     return f"{value:.5f}".rstrip("0").rstrip(".")
 
 
 def turn(to: Pose, speed_deg_s: float, pen: Pen) -> Iterator[str]:
-    """Turn the table from pen.pose to a pose at a speed along sqrt(tilt^2 + turn^2), the head standing still."""
+    """Turn the table from pen.pose to a pose at a speed along sqrt(tilt^2 + turn^2), with the head at rest."""
     if pen.machine.shape == "fixed":
         return
     tilt_deg, turn_deg = to.tilt_deg - pen.pose.tilt_deg, to.turn_deg - pen.pose.turn_deg
@@ -271,7 +276,7 @@ def turn(to: Pose, speed_deg_s: float, pen: Pen) -> Iterator[str]:
     elif pen.machine.coordinates == "workpiece" and (tilt_deg or turn_deg):
         yield from _followed(to, hypot(tilt_deg, turn_deg) / speed_deg_s, pen)
     else:
-        pen.known[F] = 0  # the line gives its F
+        pen.known[F] = 0  # the line has an F of its own
         along = hypot(tilt_deg, turn_deg)
         share = max(abs(tilt_deg), abs(turn_deg)) / along if pen.dialect.largest_delta and along > 0 else 1.0
         yield f"{pen.dialect.travel}{_words(to, pen)}{pen.speed(speed_deg_s * share)}"
@@ -284,9 +289,9 @@ def _words(pose: Pose, pen: Pen) -> str:
 
 
 def _stepped(to: Pose, tilt_deg: float, turn_deg: float, speed_deg_s: float, pen: Pen) -> Iterator[str]:
-    """MANUAL_STEPPER, one line an axis: both begin together, and speeds and accelerations in proportion end them together.
+    """MANUAL_STEPPER lines, one per axis: both start together, and proportional speeds and accelerations end them together.
 
-    Only the last one is waited for; it is the one that goes farther.
+    Only the last line, that of the longer move, waits.
     """
     axes = [
         (abs(tilt_deg), pen.values["tilt_stepper"], to.tilt_deg, pen.machine.tilt),
@@ -303,9 +308,10 @@ def _stepped(to: Pose, tilt_deg: float, turn_deg: float, speed_deg_s: float, pen
 
 
 def _followed(to: Pose, seconds: float, pen: Pen) -> Iterator[str]:
-    """A turn under a firmware that keeps the tip on the table: small steps whose places keep the head where it is."""
+    """A turn under a firmware that keeps the tip on the table: small steps whose positions keep the head in place."""
     machine, begin = pen.machine, pen.pose
-    head = axis_positions(machine, np.array([[*pen.place_mm, begin.tilt_deg, begin.turn_deg]]))  # the file's places are rounded
+    # the file's positions are rounded
+    head = axis_positions(machine, np.array([[*pen.place_mm, begin.tilt_deg, begin.turn_deg]]))
     far = max(abs(to.tilt_deg - begin.tilt_deg), abs(to.turn_deg - begin.turn_deg))
     count = max(1, ceil(far / STEP_DEG))
     if pen.dialect.inverse_time:

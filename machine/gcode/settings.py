@@ -1,6 +1,5 @@
-"""Settings: the comments at the head and foot of a G-code file that record how it was made, and the totals of each part's beads,
-by which a later change of the file shows.
-"""
+"""Settings: comments at the head and foot of a G-code file that record its settings, and totals of each part that reveal later
+changes of the file."""
 
 import re
 from collections.abc import Iterator
@@ -31,7 +30,7 @@ def head(name: str, profile: Profile) -> Iterator[str]:
 
 
 def foot(profile: Profile, filament_mm: float, seconds: float) -> Iterator[str]:
-    """Filament, time and, where its price is set, cost in PrusaSlicer's words, which print hosts look for, then every setting."""
+    """Filament, time and, if a price is set, cost in PrusaSlicer's words, which print hosts parse, then every setting."""
     material = profile.material
     yield f"; filament used [mm] = {filament_mm:.2f}"
     yield f"; filament used [cm3] = {filament_cm3(filament_mm, material):.2f}"
@@ -50,13 +49,13 @@ def foot(profile: Profile, filament_mm: float, seconds: float) -> Iterator[str]:
 
 
 def comment(text: str) -> str:
-    """One comment line: printable ASCII, not longer than print hosts expect."""
+    """A comment line: printable ASCII, not longer than print hosts expect."""
     plain = "".join(c if " " <= c <= "~" else "?" for c in text)
     return f"; {plain[:LONGEST_COMMENT]}"
 
 
 def flat(value: Any, key: str) -> Iterator[tuple[str, str]]:
-    """Dotted keys and values of nested tables; lists get [0], [1], ..., texts of several lines too."""
+    """Dotted keys and values of nested tables; lists and multi-line texts get [0], [1], ..."""
     if isinstance(value, dict):
         for name, below in value.items():
             yield from flat(below, f"{key}.{name}" if key else name)
@@ -85,7 +84,7 @@ class PartTotals:
 
 
 def totals_comment(points_mm: Floats, filament_mm: float, layers: int) -> str:
-    """The comment that sums up a part, whose strokes pass through (n, 3) points; empty where it has no strokes."""
+    """The comment with the totals of a part, whose strokes pass through (n, 3) points; "" without strokes."""
     if not len(points_mm):
         return ""
     low, high = points_mm.min(axis=0).tolist(), points_mm.max(axis=0).tolist()
@@ -94,7 +93,7 @@ def totals_comment(points_mm: Floats, filament_mm: float, layers: int) -> str:
 
 
 def read_totals(text: str, line: int, part: int) -> PartTotals | None:
-    """The totals in a comment's text behind its colon; None for any other text."""
+    """The totals in a comment's text after its colon; None for any other text."""
     match = FORM.fullmatch(text.strip())
     if match is None:
         return None

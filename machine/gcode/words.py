@@ -1,13 +1,13 @@
-"""Words: a command of G-code taken apart into words of letter and number, or a macro into KEY=VALUE.
+"""Words: parses a G-code command into words of letter and number, or a macro into KEY=VALUE.
 
-The dry run's reader, the host and the simulated printer all read with these. Letters are capitals: callers make them so.
+The dry run's reader, the host and the simulated printer all use it. Letters are capitals: callers convert them.
 """
 
 import re
 
 Word = tuple[str, float]
 
-PAUSE_REMARK = ";PAUSE:"  # stands behind a command that waits for a person, says why, and tells a sender to pause by itself
+PAUSE_REMARK = ";PAUSE:"  # after a command that waits for the user: gives the reason, and makes a sender pause by itself
 
 NUMBER = r"[-+]?(?:[0-9]{1,12}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?![0-9])"  # bounded: no infinity from a thousand digits
 BLOCK = re.compile(rf"(?:[A-Z] *{NUMBER} *)*")
@@ -22,8 +22,8 @@ _spaced = re.compile(rf"(?: +[A-Z]{NUMBER})*\s*").fullmatch
 
 
 def read_words(text: str) -> list[Word]:
-    """The words with a number, in order; as in Marlin an E is never an exponent. A number too long to be meant is none."""
-    if _spaced(text):  # the usual line: blanks part it faster
+    """The words with a number, in order; as in Marlin an E is never an exponent. Numbers that are too long are skipped."""
+    if _spaced(text):  # the usual line: splitting at blanks is faster
         return [(word[0], float(word[1:])) for word in text.split()]
     return [(letter, float(value)) for letter, value in WORD.findall(text)]
 
@@ -34,12 +34,12 @@ def read_letters(text: str) -> list[str]:
 
 
 def read_values(text: str) -> dict[str, str]:
-    """KEY=VALUE of a macro: keys in capitals, values as written, quotes taken off."""
+    """KEY=VALUE of a macro: keys in capitals, values as written, without quotes."""
     return {key.upper(): value.strip('"') for key, value in VALUE.findall(text)}
 
 
 def read_number(text: str) -> float | None:
-    """The number that a text is; None for any other."""
+    """A text as a number, or None."""
     return float(text) if _number(text) else None
 
 
@@ -55,5 +55,5 @@ def split_command(text: str) -> tuple[str, str]:
 
 
 def quote(text: str) -> str:
-    """A line as a message quotes it."""
+    """A line quoted for a message."""
     return repr(text if len(text) <= 40 else text[:40] + "...")

@@ -1,4 +1,4 @@
-"""Gcode: a machine program as text in the firmware's dialect; the same program gives the same bytes."""
+"""Writer: formats a machine program as G-code of the firmware's dialect, deterministically."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import ceil, isinf, isnan
@@ -48,7 +48,7 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Lines:
 def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
     """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end; filament in mm.
 
-    Counted with the waits for hotter layers after turns of the table.
+    Includes the waits for hotter layers after turns of the table.
     """
     machine = profile.machine
     start, end, move = straight_moves(program, level(machine))
@@ -68,7 +68,7 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
 def _text(
     program: MachineProgram, parts: Sequence[BeginPart], profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen
 ) -> Iterator[str]:
-    """The text in pieces, each of whole lines: the moves between two marks, which are most of it, as a kernel writes them."""
+    """The text in pieces of whole lines; a kernel formats the moves between two marks, which are most of it."""
     total = float(elapsed[-1])
     part_rows = [*(row for row, mark in program.marked() if isinstance(mark, BeginPart)), len(program)]
     strokes = np.flatnonzero(program.is_stroke & (program.what != NUMBER[Kind.PURGE]))  # the purge line belongs to no part
@@ -81,11 +81,11 @@ def _text(
         yield from _moves(program, done, row, last_strokes, profile, pen)
         done = row + 1
         if isinstance(mark, Reorient):
-            # the heat of the layer after the turn where that is to be hotter: some of it comes in the meantime
+            # the target of the layer after the turn if that is hotter: the nozzle warms up during the turn
             ahead = _set_nozzle(max(_coming_c(program.marks[k:], profile), pen.nozzle_c), pen)
             wait = [pen.dialect.nozzle_wait.format(number(pen.nozzle_c))] if ahead else []
             yield _ended((*ahead, *_reorient(mark, parts[pen.part] if pen.part < len(parts) else None, pen), *wait))
-        elif isinstance(mark, Pause):  # the firmware's own word; a sender that pauses by itself goes by the remark
+        elif isinstance(mark, Pause):  # the firmware's own command; a sender that pauses by itself uses the remark
             word, reason = (pen.dialect.filament_change, "filament change") if mark.change else (pen.dialect.pause, "pause")
             yield f"{word} {PAUSE_REMARK}{reason} before layer {mark.layer} of part {mark.part}\n"
         elif isinstance(mark, BeginPart):
@@ -111,12 +111,12 @@ def _block(name: str, pen: Pen, **values: object) -> list[str]:
 
 
 def _dialect_line(word: str, pen: Pen, **values: object) -> list[str]:
-    """A line of the dialect with its placeholders filled; nothing where the firmware has no such word."""
+    """A line of the dialect, filled in; [] if the firmware has no such command."""
     return fill_block(word, "dialect", pen.values | values, pen.dialect)
 
 
 def _start(profile: Profile, parts: Sequence[BeginPart], pen: Pen) -> Iterator[str]:
-    """The firmware's first lines, the start block, its modes, and the first layer's temperature unless the block has set it."""
+    """The firmware's first lines, the start block, its modes, and the first layer's temperature unless the block sets it."""
     dialect, heat, advance = pen.dialect, profile.material.first_layer_nozzle_c, profile.material.pressure_advance
     yield ";TYPE:Custom"
     for word in (*dialect.before_start, dialect.parts):
@@ -185,7 +185,7 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
 
 
 def _coming_c(marks: Sequence[Mark], profile: Profile) -> float:
-    """Nozzle temperature of the first layer among marks, deg C; 0 where there is none."""
+    """Nozzle temperature of the first layer among marks, deg C; 0 without one."""
     return next((_nozzle_c(mark, profile) for mark in marks if isinstance(mark, BeginLayer)), 0.0)
 
 
@@ -217,7 +217,7 @@ def _progress(seconds: float, total: float, pen: Pen) -> Iterator[str]:
 
 
 def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int], profile: Profile, pen: Pen) -> Iterator[str]:
-    """The text of the moves in rows first to end, among which there is no mark."""
+    """The text of the moves in rows first to end, which contain no mark."""
     if first == end:
         return
     points = pen.file_coordinates(program.points_mm[program.starts[first] : program.starts[end]])
@@ -265,8 +265,8 @@ def _moves(program: MachineProgram, first: int, end: int, last_strokes: set[int]
 def _before_stroke(
     kind: int, fan: float, acceleration_mm_s2: float, width_mm: float, profile: Profile, pen: Pen
 ) -> Iterator[str]:
-    """The lines that a change of fan, acceleration, kind or width needs before a stroke. fan: NaN for the layer's; acceleration:
-    inf where the axes decide."""
+    """Lines for a change of fan, acceleration, kind or width before a stroke. fan: NaN for the layer's; acceleration: inf if the
+    axes decide."""
     yield from _set_fan(pen.layer_fan if isnan(fan) else fan, pen)
     if not isinf(acceleration_mm_s2) and round(acceleration_mm_s2) != pen.acceleration and pen.dialect.acceleration:
         pen.acceleration = round(acceleration_mm_s2)
@@ -280,7 +280,7 @@ def _before_stroke(
 
 
 def _with_arcs(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, profile: Profile, pen: Pen) -> Iterator[str]:
-    """A stroke (n, 3) in one plane with arcs where they keep to it; filament_mm: (n - 1,)."""
+    """A stroke (n, 3) in one plane, with arcs where they fit; filament_mm: (n - 1,)."""
     flat = np.rint(points_mm[:, :2] * 1000.0) / 1000.0
     runs, arcs = fit_arcs(flat, filament_mm, profile.machine.arc_tolerance_mm - ROUNDING_MM)
     does, speed, most = np.array([PUSHING], np.int8), np.array([speed_mm_s]), np.array([stroke_filament_mm_s(profile)])

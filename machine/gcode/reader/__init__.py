@@ -1,4 +1,4 @@
-"""Reader: a G-code text as a firmware would understand it, command by command.
+"""Reader: interprets a G-code text like a firmware, command by command.
 
-`parse.parse_gcode` gives a `parsed.ParsedProgram`, one row a move; `machine.gcode.lines.GcodeFile` is a file of text.
+`parse.parse_gcode` returns a `parsed.ParsedProgram` with one row per move; `machine.gcode.lines.GcodeFile` is a text file.
 """

@@ -1,4 +1,4 @@
-"""Codes: the effect of each G and M code and of each macro of Klipper on the reader; moves, arcs and turns become rows."""
+"""Codes: the effect of each G and M code and each Klipper macro on the reader; moves, arcs and turns become rows."""
 
 import re
 from collections.abc import Mapping
@@ -16,14 +16,14 @@ from machine.kinematics.table import axis_positions, followed_places
 from mdp.pose import Pose
 from profiles.errors import GcodeError
 
-CHORD_MM = 0.005  # arcs are read as chords that stay so near
-ROUND_MM = 0.1  # by how much an arc's radius may differ at its ends
+CHORD_MM = 0.005  # deviation of the chords of arcs
+ROUND_MM = 0.1  # allowed difference of an arc's radius at its ends
 Values = Mapping[str, str]
 KEYS = re.compile(r"(?: +[A-Z_][A-Z0-9_]*=(?:\"[^\"]*\"|[^\s\"'#()\\]*))* *").fullmatch  # a # begins a comment for Klipper
 HEATERS = {"EXTRUDER": NOZZLE, "HEATER_BED": BED}
 
 
-# What is put on record under its Marlin name, with its value; and what has no bearing on motion, heat or time.
+# Codes recorded under their Marlin names, with their values; and codes without effect on motion, heat or time.
 # fmt: off
 NOTED = frozenset({
     "G4", "M0", "M1", "M18", "M84", "M104", "M106", "M107", "M109", "M140", "M190", "M226", "M400", "M600",
@@ -34,8 +34,8 @@ WITHOUT_EFFECT = frozenset({
 })
 # fmt: on
 SILENT_MACROS = frozenset(name for name, command in klipper.COMMANDS.items() if command.shows or command.tunes)
-# What may stand behind a command besides words with numbers: of G codes only these take letters alone, of M codes those that set
-# what the dry run counts with take none; firmwares differ in what they make of the rest.
+# Allowed text after a command besides words with numbers: of the G codes only these take letters alone; M codes with values that
+# the dry run uses take none, for firmwares differ in how they read it.
 BARE_WORDS = frozenset({"G28", "G29", "G32", "G34"})
 VALUED = frozenset({"M82", "M83", "M104", "M109", "M140", "M190", "M200", "M204", "M207", "M220", "M221", "M568"})
 KEYED = frozenset({"MANUAL_STEPPER", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_VELOCITY_LIMIT"})
@@ -43,7 +43,7 @@ MACROS = KEYED | SILENT_MACROS | {"TURN_OFF_HEATERS", "PAUSE"}
 
 
 def do_command(reader: Reader, name: str, words: Words) -> None:
-    """Do one command. Raises GcodeError for motion codes that are not supported; other unknown codes are counted."""
+    """Execute a command. Raises GcodeError for unsupported motion codes; other unknown codes are counted."""
     dialect = reader.dialect
     if reader.turning:
         flush(reader)
@@ -101,7 +101,7 @@ def do_command(reader: Reader, name: str, words: Words) -> None:
 
 
 def do_macro(reader: Reader, code: str) -> bool:
-    """Do one line in capitals; False when its name is not known."""
+    """Execute a macro line in capitals; False for an unknown name."""
     name, _, rest = code.partition(" ")
     if HOMES.fullmatch(name):
         _home_turned(reader, name.removeprefix(HOME))
@@ -131,7 +131,7 @@ def do_macro(reader: Reader, code: str) -> bool:
 
 
 def flush(reader: Reader) -> None:
-    """The turns of steppers that go on together become one row, as long as the slowest of them."""
+    """Combine pending stepper turns in one row, as long as the slowest of them."""
     before, minutes = reader.at.copy(), 0.0
     for axis, value, speed_deg_s in reader.turning:
         minutes = max(minutes, abs(value - before[axis]) / speed_deg_s / 60.0)
@@ -141,7 +141,7 @@ def flush(reader: Reader) -> None:
 
 
 def _follow(reader: Reader, name: str) -> None:
-    """From here on X Y Z are places on the table (TCP), or axis positions again; nothing moves."""
+    """Switch X Y Z to positions relative to the table (TCP), or back to axis positions; nothing moves."""
     reader.note(name)
     on = name == reader.dialect.follow_on
     if on != reader.followed:
@@ -153,7 +153,7 @@ def _follow(reader: Reader, name: str) -> None:
 
 
 def _straight(reader: Reader, name: str, words: Words) -> None:
-    """G0 and G1: a row, unless only F is given; RepRapFirmware's H1, H3 and H4 go until an end stop."""
+    """Execute G0 or G1: a row, unless only F is given; RepRapFirmware's H1, H3 and H4 run to an end stop."""
     reader.motion, dialect, modes = name, reader.dialect, reader.modes
     if dialect.endstop_word and name in ("G0", "G1"):
         if words.get(dialect.endstop_word) in (1.0, 3.0, 4.0):
@@ -163,7 +163,7 @@ def _straight(reader: Reader, name: str, words: Words) -> None:
     before = reader.at.copy()
     if not modes.move(reader.at, words.items()):
         return
-    if reader.flow != 1.0 or reader.filament_mm2:  # the extruder turns by more or less; the program's own sum stays
+    if reader.flow != 1.0 or reader.filament_mm2:  # the extruder moves by more or less; the program's own sum stays
         step = reader.at[E_AXIS] - before[E_AXIS]
         pushed = step * reader.flow / (reader.filament_mm2 or 1.0)
         reader.at[E_AXIS] = before[E_AXIS] + pushed
@@ -179,7 +179,7 @@ def _straight(reader: Reader, name: str, words: Words) -> None:
 
 
 def _arc(reader: Reader, name: str, words: Words) -> None:
-    """G2 and G3 in the X Y plane, by I J or R: rows of chords, the other axes going along evenly."""
+    """Execute G2 or G3 in the X Y plane, by I J or R: rows of chords; the other axes move proportionally."""
     clockwise, before = name == "G2", reader.at.copy()
     unit_mm, letters = reader.modes.unit_mm, reader.letters
     shape = {letter: value * unit_mm for letter, value in words.items() if letter in "IJR" and letter not in letters}
@@ -204,12 +204,12 @@ def _arc(reader: Reader, name: str, words: Words) -> None:
 
 
 def _axes(reader: Reader, words: Words) -> list[str]:
-    """The letters of axes, filament left out."""
+    """The letters of axes, without filament."""
     return [letter for letter in words if reader.letters.get(letter, E_AXIS) != E_AXIS]
 
 
 def _at_home(reader: Reader, letters: list[str]) -> None:
-    """Axes stand at 0, or the nearest place inside their limits."""
+    """Put axes to 0, or to the nearest position within their limits."""
     if reader.followed:
         raise GcodeError(f"homing while the firmware follows the table: {reader.dialect.follow_off} first")
     reader.note("G28", letters="".join(letters))
@@ -218,7 +218,7 @@ def _at_home(reader: Reader, letters: list[str]) -> None:
 
 
 def _set(reader: Reader, words: Words) -> None:
-    """G92: the named axes stand at the given values from now on; E keeps its sum and changes its zero."""
+    """Execute G92: set the named axes to values; E keeps its sum and changes its zero."""
     _note(reader, "G92", words)
     for axis, coordinate in reader.modes.named(words.items()):
         if axis == E_AXIS:
@@ -228,7 +228,7 @@ def _set(reader: Reader, words: Words) -> None:
 
 
 def _note(reader: Reader, name: str, words: Words) -> None:
-    """Put a command on record under its Marlin name, with its value."""
+    """Record a command under its Marlin name, with its value."""
     order = ("P", "S", "R") if reader.dialect.value_word == "P" else ("S", "R")
     value = next((words[letter] for letter in order if letter in words), 0.0)
     if name == "G4":
@@ -237,8 +237,8 @@ def _note(reader: Reader, name: str, words: Words) -> None:
 
 
 def _retract(reader: Reader, name: str, words: Words) -> None:
-    """G10 pulls filament back as M207 has it, G11 pushes it again; with P G10 sets a tool's temperature (RepRapFirmware), with
-    L20 a new zero (CNC)."""
+    """Execute G10, which retracts by M207's length, or G11, which primes; with P G10 sets a tool's temperature (RepRapFirmware),
+    with L20 a new zero (CNC)."""
     if name == "G10" and words.get("L") == 20.0:
         _set(reader, {letter: value for letter, value in words.items() if letter in reader.letters})
     elif name == "G10" and "L" in words:
@@ -255,7 +255,7 @@ def _retract(reader: Reader, name: str, words: Words) -> None:
 
 
 def _retraction(reader: Reader, words: Words) -> None:
-    """M207: how much G10 pulls (S, mm) and how fast (F, mm/min)."""
+    """Execute M207: length (S, mm) and speed (F, mm/min) of G10."""
     if not reader.retracted:
         reader.retraction_mm = max(0.0, words.get("S", reader.retraction_mm))
     if words.get("F", 0.0) > 0:
@@ -263,20 +263,20 @@ def _retraction(reader: Reader, words: Words) -> None:
 
 
 def _tool_heat(reader: Reader, words: Words) -> None:
-    """M568 (RepRapFirmware): S sets the tool's temperature, A0 switches its heater off."""
+    """Execute M568 (RepRapFirmware): S sets the tool's temperature, A0 switches its heater off."""
     if "S" in words or words.get("A") == 0.0:
         reader.note("M104", 0.0 if words.get("A") == 0.0 else words["S"], "S")
 
 
 def _wait(reader: Reader) -> None:
-    """M116 (RepRapFirmware): wait for all heaters that are on."""
+    """Execute M116 (RepRapFirmware): wait for all heaters that are on."""
     for code, target in (("M190", reader.bed_c), ("M109", reader.nozzle_c)):
         if target > 0:
             reader.note(code, target, "S")
 
 
 def _accelerate(reader: Reader, words: Words) -> None:
-    """M204: P for moves that push filament, T for others, S for both; values that are not above 0 change nothing."""
+    """Execute M204: P for moves with filament, T for others, S for both; values not above 0 change nothing."""
     for letter, value in words.items():
         if value > 0 and letter in "PS":
             reader.printing = value * reader.modes.unit_mm
@@ -285,7 +285,7 @@ def _accelerate(reader: Reader, words: Words) -> None:
 
 
 def _override(reader: Reader, name: str, words: Words) -> None:
-    """M220, M221: S percent of every feed, of all filament; a value that is not above 0 changes nothing."""
+    """Execute M220 or M221: S percent of every feed, of all filament; a value not above 0 changes nothing."""
     percent = words.get("S", 0.0)
     if percent > 0 and name == "M220":
         reader.feed_share = percent / 100.0
@@ -294,7 +294,7 @@ def _override(reader: Reader, name: str, words: Words) -> None:
 
 
 def _volumetric(reader: Reader, words: Words) -> None:
-    """M200: with D, the filament's diameter, E words are mm3 from here on; D0 or S0: millimetres again."""
+    """Execute M200: with D, the filament's diameter, later E words are mm³; D0 or S0: millimetres again."""
     if "D" in words or words.get("S") == 0.0:
         diameter = words.get("D", 0.0) * reader.modes.unit_mm
         reader.filament_mm2 = pi * max(diameter, 0.0) ** 2 / 4.0 if words.get("S") != 0.0 else 0.0
@@ -309,7 +309,7 @@ def _number(values: Values, key: str, default: float | None = None) -> float:
 
 
 def _home_turned(reader: Reader, letters: str) -> None:
-    """HOME_AB and the like, which machines define for themselves: the named rotary axes stand at their zero."""
+    """Execute HOME_AB and similar macros, which machines define: the named rotary axes go to their zero."""
     for axis, letter in enumerate((reader.machine.tilt.letter, reader.machine.turn.letter), start=3):
         if letter in letters:
             reader.note("G28", letters=letter)
@@ -317,7 +317,7 @@ def _home_turned(reader: Reader, letters: str) -> None:
 
 
 def _turn(reader: Reader, values: Values) -> None:
-    """MANUAL_STEPPER of a rotary axis: MOVE, SET_POSITION, homing by STOP_ON_ENDSTOP; SYNC=0 lets the next one begin too."""
+    """Execute MANUAL_STEPPER of a rotary axis: MOVE, SET_POSITION, homing by STOP_ON_ENDSTOP; SYNC=0 starts the next one too."""
     names = reader.modes.axes.steppers
     if values.get("STEPPER") not in names:
         reader.ignore("MANUAL_STEPPER")
@@ -352,7 +352,7 @@ def _heat(reader: Reader, values: Values) -> None:
 
 
 def _wait_for(reader: Reader, values: Values) -> None:
-    """TEMPERATURE_WAIT: the heater's target counts, for MINIMUM stands a little below it."""
+    """Execute TEMPERATURE_WAIT: the heater's target counts, for MINIMUM is slightly below it."""
     target = {"EXTRUDER": reader.nozzle_c, "HEATER_BED": reader.bed_c}.get(values.get("SENSOR", ""), 0.0)
     if target > 0:
         reader.note(HEATERS[values["SENSOR"]][1], target, "S")

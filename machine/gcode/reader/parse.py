@@ -1,4 +1,4 @@
-"""Parse: G-code text of any dialect back into moves with absolute axis positions, one array row per move."""
+"""Parse: converts G-code text of any dialect to moves with absolute axis positions, one array row per move."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -26,19 +26,19 @@ from slicer.paths import Unsupported
 
 LONGEST_LINE = 2000
 CONDITIONS = ("IF", "ELIF", "ELSE", "WHILE")
-SECOND = re.compile(r"[GM] *[0-9]+")  # a second command of a line
+SECOND = re.compile(r"[GM] *[0-9]+")  # a second command in a line
 STRING = re.compile(r'"[^"]*"')
 PLACED = (*PATHS, "G4", "G10", "G28", "G92")
 STOPS = ("M0", "M1", "M2", "M30")
 STILL = 1e-9
-SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded places, lets the head leave its place by less
+SWAY_MM = 0.05  # greatest deviation of the head in a followed turn, from straight steps and rounded positions
 
 
 def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     """Read G-code lines (with or without line ends) as the machine's firmware would.
 
-    Raises GcodeError, with the line, for what is not G-code and for motion codes that are not supported; M codes and
-    macros that are not known are counted in `ignored`: code -> (first line, how often).
+    Raises GcodeError, naming the line, for text that is not G-code and for unsupported motion codes; unknown M codes and macros
+    are counted in `ignored`: code -> (first line, count).
     """
     lines = Lines.of(lines)
     reader, at = reader_of(machine, len(lines)), 0
@@ -62,7 +62,7 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
 
 
 def _line(reader: Reader, line: str) -> None:
-    """Any line: its comment, then its command, as it is sent. Raises GcodeError, which does not name the line."""
+    """Read any line: its comment, then its command, as it is sent. Raises GcodeError, which does not name the line."""
     if reader.ended:
         _remark(reader, line.partition(";")[2])
         return
@@ -81,7 +81,7 @@ def _line(reader: Reader, line: str) -> None:
 
 
 def _remark(reader: Reader, text: str) -> None:
-    """Apply a comment, without its sign: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
+    """Apply a comment, without its sign: PrusaSlicer's words, Cura's LAYER, and PART, CONTENTS and UNSUPPORTED of tiltprint."""
     text = text.strip()
     if begins_layer(text):
         reader.layer += 1
@@ -112,7 +112,7 @@ def _remark(reader: Reader, text: str) -> None:
 
 
 def _positive(text: str) -> float:
-    """The number of a comment; 0 when it is none, for a comment must not stop a print."""
+    """The number in a comment; 0 for any other text, for a comment must not stop a print."""
     return float(text) if re.fullmatch(r" *[0-9]{1,9}(?:\.[0-9]{1,12})? *", text) else 0.0
 
 
@@ -129,10 +129,11 @@ def _check_condition(reader: Reader, line: str, command: str) -> None:
 
 
 def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
-    """Letters and numbers: one command, or as CNC firmwares have it several, their words shared, the one that moves last.
+    """Execute letters and numbers: one command, or for CNC firmwares several that share their words, the one that moves last.
 
-    A firmware on a serial line wants a command in front and one command in a line: Marlin and Klipper take a second one for a
-    parameter, RepRapFirmware does it."""
+    A serial firmware needs one command per line, at the front: Marlin and Klipper take a second one for a parameter,
+    RepRapFirmware executes it.
+    """
     named = [_name(*word) for word in words if word[0] in "GMT"]
     others = {letter: value for letter, value in words if letter not in "GMT"}
     goes_on = reader.motion != "" and not reader.dialect.serial and not reader.letters.keys().isdisjoint(others)
@@ -161,7 +162,7 @@ def _block(reader: Reader, words: Sequence[Word], text: str) -> None:
 
 
 def _irregular(reader: Reader, code: str, text: str) -> None:
-    """Commands whose words are not all letter and number: axis names alone, texts, macros."""
+    """Execute commands with other words than letter and number: axis names alone, texts, macros."""
     dialect = reader.dialect
     if to_ascii(text) != text:
         reader.replaced.append((reader.number, text))
@@ -189,7 +190,7 @@ def _irregular(reader: Reader, code: str, text: str) -> None:
 
 
 def _check_alone(name: str, rest: str, text: str) -> None:
-    """Refuse a second command behind the words and texts of a first one, which RepRapFirmware would do."""
+    """Refuse a second command after the words and texts of a first one, which RepRapFirmware would execute."""
     if second := SECOND.search(STRING.sub("", rest)):
         raise GcodeError(f"{quote(text)} holds two commands, {name} and {second[0]}: write one a line")
 
@@ -199,7 +200,7 @@ def _name(letter: str, value: float) -> str:
 
 
 def _program_of(reader: Reader) -> ParsedProgram:
-    """The program that a reader has read."""
+    """The program in a reader."""
     columns, count = reader.columns, reader.rows
     begins, remark = columns.starts if len(columns.starts) else columns.places, columns.remark_rows[: reader.remarks].T
     program = ParsedProgram(
@@ -220,7 +221,7 @@ def _program_of(reader: Reader) -> ParsedProgram:
 
 
 def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader) -> ParsedProgram:
-    """The program whose (m,) followed rows are axis positions too, with feeds by the measure of NIST."""
+    """The program with its (m,) followed rows converted to axis positions, with feeds by the measure of NIST."""
     asked = (program.feed < 0.0) | np.isinf(program.feed)
     asked[followed] = True
     if reader.dialect.largest_delta:
@@ -237,16 +238,16 @@ def _in_axis_positions(program: ParsedProgram, followed: Indices, reader: Reader
 
 
 def _feed_length(change: Floats, largest: bool = False) -> Floats:
-    """(n,) lengths that F refers to along (n, 6) changes, by the rule of NIST RS274.
+    """(n,) lengths to which F refers along (n, 6) changes, by the rule of NIST RS274.
 
-    largest: of a pure turn only the axis that goes farthest (Klipper).
+    largest: for pure turns only the axis that moves farthest (Klipper).
     """
     length, measure = lengths(change)
     return np.where(measure == 1, np.abs(change[:, 3:5]).max(axis=1, initial=0.0), length) if largest else length
 
 
 def _feeds(given: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floats:
-    """Units per minute along what NIST counts, from feeds along another measure, inverse time, or as fast as the axes can."""
+    """Units per minute by NIST's measure, from feeds by another measure, inverse time, or the axes' top speeds."""
     length = _feed_length(change)
     with np.errstate(divide="ignore", invalid="ignore"):
         fastest = 60.0 * length / (np.abs(change) / speeds).max(axis=1)
@@ -259,7 +260,7 @@ def _feeds(given: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floa
 
 
 def _turn_starts(program: ParsedProgram, followed: Indices) -> NDArray[np.bool_]:
-    """(n,) False for a row that continues the turn of the row before, with the head at rest and in the same direction."""
+    """(n,) False for a row that continues the turn of the row before, in the same direction with the head at rest."""
     start, end = program.start, program.end
     turn = end[:, 3:] - start[:, 3:]
     size = np.hypot(turn[:, 0], turn[:, 1])
@@ -278,7 +279,7 @@ def _turn_starts(program: ParsedProgram, followed: Indices) -> NDArray[np.bool_]
 
 
 def _merge_turns(keep: NDArray[np.bool_], program: ParsedProgram) -> ParsedProgram:
-    """The program with each turn in one row, at the pace of the whole."""
+    """The program with each turn in one row, at the mean speed of the turn."""
     first = np.flatnonzero(keep)
     last = np.append(first[1:], len(keep)) - 1
     minutes = np.add.reduceat(_feed_length(program.changes()) / program.feed, first)

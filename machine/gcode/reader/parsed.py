@@ -1,4 +1,4 @@
-"""Parsed program: the moves, events and comments of a G-code text as arrays with one row per move."""
+"""Parsed program: moves, events and comments of a G-code text as arrays with one row per move."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ from slicer.paths import Unsupported
 
 AT_ONCE = 8_192  # rows
 Indices32 = NDArray[np.int32]
-OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
+OWN = "macro"  # code of an Event for a macro defined by the machine, whose name is in letters
 
 
 class MoveKind(IntEnum):
-    """The kind of a straight move; RETRACT: filament alone, either way; ROTATE: the table turns."""
+    """Kind of a straight move; RETRACT: filament alone, either way; ROTATE: the table turns."""
 
     TRAVEL = 0
     EXTRUDE = 1
@@ -44,8 +44,8 @@ class Event:
 
 
 class Remarks(NamedTuple):
-    """The state that comments and M204 set for the rows that follow, (k,) each: part, layer, type, width and height of a bead,
-    acceleration in mm/s2, inf where the axes' limits count."""
+    """State of the following rows set by comments and M204, (k,) each: part, layer, type, width and height of a bead,
+    acceleration in mm/s², inf for the axes' limits."""
 
     part: Indices32
     layer: Indices32
@@ -59,12 +59,13 @@ class Remarks(NamedTuple):
 class ParsedProgram:
     """A G-code text as arrays with one row per move (n rows).
 
-    line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row before
-    where G28 or G92 set a position. e_mm: filament pushed by the move. feed: F in units per minute. remark: which of remarks
-    holds for the row. types: the ;TYPE: names. layers: number of layer changes. parts: their numbers in order. replaced: line
-    number and command of every text with characters that a serial line does not carry. announced: how many parts `;PART:1 of 3`
-    announces, 0 without such a comment; part_totals: from ;CONTENTS: comments; unsupported: line, part and area of each
-    ;UNSUPPORTED: comment, whose layer is 0 and whose reason is empty where it names none."""
+    line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the end of the
+    row before after G28 or G92. e_mm: filament pushed by the move. feed: F in units per minute. remark: index of the row's
+    remark. types: the ;TYPE: names. layers: number of layer changes. parts: their numbers in order. replaced: line number and
+    command of every text with characters that a serial line does not carry. announced: number of parts announced by `;PART:1 of
+    3`, 0 without such a comment; part_totals: from ;CONTENTS: comments; unsupported: line, part and area of each ;UNSUPPORTED:
+    comment, with layer 0 and an empty reason if not given.
+    """
 
     line: Indices32
     start: Floats
@@ -122,7 +123,7 @@ class ParsedProgram:
 
     @cached_property
     def bounds(self) -> Floats:
-        """(2, 5) least and greatest place of each axis at the ends of moves; infinite where there is none."""
+        """(2, 5) least and greatest position of each axis at the ends of moves; infinite without moves."""
         return np.transpose([(axis.min(initial=np.inf), axis.max(initial=-np.inf)) for axis in self.end.T])
 
     def ways_mm(self, rows: Indices | slice = slice(None)) -> Floats:
@@ -130,33 +131,33 @@ class ParsedProgram:
         return _ways(self.start[rows], self.end[rows])
 
     def changes(self, rows: Indices | slice = slice(None)) -> Floats:
-        """(m, 6) of X Y Z tilt turn E, in some rows."""
+        """(m, 6) changes of X Y Z tilt turn E in some rows."""
         return np.column_stack([self.end[rows] - self.start[rows], self.e_mm[rows]])
 
     def turned_between(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """(m - 1,) whether the table's pose changes between neighbours of (m,) rows."""
+        """(m - 1,) whether the table's pose changes between neighbours among (m,) rows."""
         tilt_deg, turn_deg = self.end[rows, 3], self.end[rows, 4]
         turned: NDArray[np.bool_] = (tilt_deg[1:] != tilt_deg[:-1]) | (turn_deg[1:] != turn_deg[:-1])
         return turned
 
     def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
-        """(m,) a number for the layer of each row, unique over all parts."""
+        """(m,) number of the layer of each row, unique over all parts."""
         keys: NDArray[np.int64] = self._remark_keys[self.remark[rows]]
         return keys
 
     @property
     def layer_key_count(self) -> int:
-        """Upper bound of the layer_keys, exclusive."""
+        """Exclusive upper bound of the layer_keys."""
         return int(self._remark_keys.max(initial=-1)) + 1
 
     @cached_property
     def _remark_keys(self) -> NDArray[np.int64]:
-        """(k,) the layer_keys of remarks."""
+        """(k,) layer_keys of the remarks."""
         layer = self.remarks.layer
         return self.remarks.part.astype(np.int64) * (int(layer.max(initial=0)) + 1) + layer
 
     def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
-        """(n,) which rows belong to these ;TYPE: names."""
+        """(n,) mask of the rows with these ;TYPE: names."""
         marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.remarks.type]
         return marked[self.remark]
 
@@ -171,12 +172,12 @@ def _ways(start: Floats, end: Floats) -> Floats:
 
 
 def pieces(count: int) -> Iterator[slice]:
-    """Slices that cover `count` rows, AT_ONCE at most in each, for work whose temporaries are far larger than its result."""
+    """Slices that cover `count` rows, at most AT_ONCE each, for work with temporaries far larger than its result."""
     return (slice(begin, min(begin + AT_ONCE, count)) for begin in range(0, count, AT_ONCE))
 
 
 def pose_runs(program: ParsedProgram) -> Iterator[tuple[slice, Pose]]:
-    """The rows from the first straight move after a turn of the table up to the next turn, and the pose of all of them."""
+    """Rows from the first straight move after a turn of the table up to the next turn, with their pose."""
     turns, before = [np.zeros(1, dtype=np.int64)], program.start[:1, 3:]
     for some in pieces(len(program.line)):
         poses = np.concatenate([before, program.end[some, 3:]])
@@ -189,12 +190,12 @@ def pose_runs(program: ParsedProgram) -> Iterator[tuple[slice, Pose]]:
 
 
 def temperatures(program: ParsedProgram, *codes: str) -> Floats:
-    """(n,) the target that the last of the events of these codes before each row has set, deg C; 0 before the first."""
+    """(n,) target set by the last event with one of these codes before each row, deg C; 0 before the first."""
     return _levels(program, [(event, event.value) for event in program.events if event.code in codes])
 
 
 def fan_shares(program: ParsedProgram, machine: Machine) -> Floats:
-    """(n,) 0..1; M106 without a value means full, and full is 255 also where the firmware knows 0 to 1 as well."""
+    """(n,) fan speed 0..1; M106 without a value means full, and 255 is full also for firmwares that accept 0 to 1."""
     dialect = dialect_of(machine)
     shares = []
     for event in program.events:

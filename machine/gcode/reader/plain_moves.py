@@ -1,8 +1,8 @@
-"""Plain moves: runs of usual lines read at once by a kernel, as `Modes.move`, `straight` and `remark` would one by one.
+"""Plain moves: a kernel reads runs of ordinary lines at once, with the same result as the parser line by line.
 
-G0 and G1 lines and the comments between them are 99 lines in a hundred of a program. What is not usual ends the run, and the
-reader takes that line: other letters than the machine's axes and F, a feed that is not above 0, a number of more digits than one
-division reads exactly, comments of parts and kinds of line that are new.
+G0 and G1 lines and the comments between them are 99 % of a program. A run ends at other lines, which the parser reads: letters
+other than the machine's axes and F, a feed not above 0, a number with too many digits for exact division, comments of parts and
+new line types.
 """
 
 from itertools import islice
@@ -19,24 +19,25 @@ from mdp.kernels.kernel import kernel, no_nrt
 from mdp.mesh import Floats
 
 LONGEST = 200
-MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
-NONE, F = -1, 6  # what a letter stands for, besides the axes 0 to 5
-MOST_TYPES = 64  # kinds of line; slicers have about 15, a further one ends the run
-WHOLE_DIGITS, DECIMALS = 9, 12  # of a width or height, as machine.gcode.reader.parse reads it
+MOST_DIGITS = 15  # integers below 2^53 are exact, as are the powers of ten to divide by: the quotient is rounded once
+NONE, F = -1, 6  # meaning of a letter, besides the axes 0 to 5
+MOST_TYPES = 64  # line types; slicers have about 15, a further one ends the run
+WHOLE_DIGITS, DECIMALS = 9, 12  # of a width or height, as in machine.gcode.reader.parse
 FIRST = (b"G0", b"G1", b";", b"\n")  # of lines that may be plain
-# What the reader has, in floats: the axes, F, then what the comments said, as in a remark, and the number of layers.
+# The reader's state as floats: the axes, F, then the comments' values as in a remark, and the number of layers.
 PART, LAYER, TYPE, WIDTH, HEIGHT, LAYERS, STATE = range(7, 14)
 
 
-# What begins a comment that says something; the others say nothing. SINGLE stands alone.
+# Beginnings of comments with a meaning; SINGLE stands alone.
 WIDTH_IS, HEIGHT_IS, TYPE_IS, SINGLE = range(4)
 WORDS = Texts.of([b"WIDTH:", b"HEIGHT:", b"TYPE:", b"LAYER_CHANGE", b"LAYER:", b"PART:", b"CONTENTS:", b"UNSUPPORTED:"])
 
 
 class Meaning(NamedTuple):
-    """The meaning of words during a run. letters: (256,) axis, F or NONE of each byte; words: WORDS; types: the known kinds,
-    by number. units, steps, offset: (6,) as those of Modes. rapid: G0 is as fast as can be. accelerations: (2,) of moves that
-    push filament, and of others.
+    """Meaning of words during a run.
+
+    letters: (256,) axis, F or NONE of each byte; words: WORDS; types: the known line types, by number. units, steps, offset: (6,)
+    as in Modes. rapid: G0 is as fast as possible. accelerations: (2,) of moves with filament, and of others.
     """
 
     letters: NDArray[np.int8]
@@ -51,13 +52,13 @@ class Meaning(NamedTuple):
 
 
 def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
-    """Rows of the plain lines from line `first`, counted from 0; returns the first line that is not plain.
+    """Read rows of plain lines from line `first`, counted from 0; returns the first line that is not plain.
 
-    Nothing is read while M221, M200 or G93 change the meaning of a move's words, nor while a turn is still pending.
+    Nothing is read while M221, M200 or G93 change the meaning of a move's words, or while a turn is pending.
     """
     modes = reader.modes
     begin = lines.content[lines.start[first] : lines.start[first] + 2].tobytes()
-    if begin not in FIRST and begin[:1] not in FIRST:  # nothing need be got ready
+    if begin not in FIRST and begin[:1] not in FIRST:  # no preparation needed
         return first
     if reader.flow != 1.0 or reader.filament_mm2 or modes.inverse_time or reader.turning or reader.ended:
         return first
@@ -89,7 +90,8 @@ def read_plain_moves(reader: Reader, lines: Lines, first: int) -> int:
 
 @kernel
 def _read_run(lines: Texts, meaning: Meaning, columns: Columns, state: Floats, counts: NDArray[np.int64]) -> None:
-    """counts: the line after the run, rows, remarks, and the line of the last move; they are updated, as is the state."""
+    """Kernel of read_plain_moves; updates the state and counts: the line after the run, rows, remarks, and the line of the last
+    move."""
     text, words = lines.content, np.empty((32, 2))
     line, row, remarks = counts[0], counts[1], counts[2]
     while line < len(lines.start) - 1 and remarks < len(columns.remark_rows):
@@ -133,7 +135,7 @@ def _read_run(lines: Texts, meaning: Meaning, columns: Columns, state: Floats, c
 
 @no_nrt
 def _remark(state: Floats, acceleration: float, remark_rows: Floats, remarks: int) -> int:
-    """How many remarks there are with that of a row, which may be that of the row before."""
+    """Add a row's remark unless it equals the last one; returns the number of remarks."""
     last = REMARK_COLUMNS - 1
     same = remarks > 0 and remark_rows[remarks - 1, last] == acceleration
     for k in range(last):
@@ -153,12 +155,12 @@ def _is_blank(byte: int) -> bool:
 
 @no_nrt
 def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Floats) -> bool:
-    """Whether a comment is plain; if so, it is applied to the state. The sign and the blanks behind it are skipped."""
+    """Whether a comment is plain; if so, apply it to the state. The sign and following blanks are skipped."""
     while begin < end and _is_blank(text[begin]):
         begin += 1
     if begin == end:
         return True
-    if text[begin] < 32 or text[begin] > 126 or text[end - 1] < 32 or text[end - 1] > 126:  # it may be a blank of another kind
+    if text[begin] < 32 or text[begin] > 126 or text[end - 1] < 32 or text[end - 1] > 126:  # possibly another kind of blank
         return False
     for k in range(len(meaning.words.start) - 1):
         word = meaning.words.content[meaning.words.start[k] : meaning.words.start[k + 1]]
@@ -188,8 +190,8 @@ def _read_remark(text: Bytes, begin: int, end: int, meaning: Meaning, state: Flo
 
 @no_nrt
 def _read_number(text: Bytes, at: int, end: int) -> tuple[int, float, int, int]:
-    """Where a number without sign ends, at a blank or the end; its value, digits before its point and after it, -1 without one.
-    An end of -1: it is none, or has more digits than are read exactly."""
+    """Parse an unsigned number up to a blank or the end: its end, value, digits before the point and after it, -1 without a
+    point. An end of -1: not a number, or too many digits for an exact value."""
     whole, digits, decimals = 0, 0, -1
     while at < end and text[at] != 32:
         if text[at] == 46 and decimals < 0:
@@ -217,7 +219,7 @@ def _begins(text: Bytes, begin: int, end: int, word: Bytes) -> bool:
 
 @no_nrt
 def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], words: Floats) -> int:
-    """Number of words of a plain move, with the axis and value of each; -1: the line is no plain move."""
+    """Number of words of a plain move, with the axis and value of each; -1: the line is not a plain move."""
     if end - begin < 5 or end - begin >= LONGEST or text[begin] != 71 or (text[begin + 1] != 48 and text[begin + 1] != 49):
         return -1
     at, count, named = begin + 2, 0, 0
@@ -232,7 +234,7 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
         at, value, digits, _ = _read_number(text, at, end)
         if at < 0 or axis == NONE or digits > 12:
             return -1
-        if (axis == F and (negative or value <= 0.0)) or named >> axis & 1:  # firmwares do not agree on a word given twice
+        if (axis == F and (negative or value <= 0.0)) or named >> axis & 1:  # firmwares disagree about a repeated word
             return -1
         named |= 1 << axis
         words[count, 0], words[count, 1] = axis, -value if negative else value

@@ -1,4 +1,4 @@
-"""State: the firmware's state while a text is read, and the rows and events so far, in columns that a kernel can write to."""
+"""Reader state: the firmware's state while a text is read, and rows and events in columns that a kernel can write to."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,15 +18,14 @@ from profiles.machine import Machine
 from slicer.paths import Unsupported
 
 DEFAULT_FEED = 1500.0
-REMARK_COLUMNS = 6  # columns of remark_rows: part, layer, type, width, height, acceleration
+REMARK_COLUMNS = 6  # of remark_rows: part, layer, type, width, height, acceleration
 ROOM = 1024  # remarks
-Words = Mapping[str, float]  # of one command; of a letter that stands there twice, as in the text behind an M code, the last one
+Words = Mapping[str, float]  # of one command; the last one of a repeated letter
 
 
 class Columns(NamedTuple):
-    """Room for rows, one an entry. places: (room + 1, 5), row k ends at k + 1; starts: (room, 5) begins of rows, (0, 5) as long
-    as each begins at the end of the one before it, as nearly always; remark_rows: (k, REMARK_COLUMNS) room for remarks.
-    """
+    """Space for rows. places: (room + 1, 5), row k ends at k + 1; starts: (room, 5) starts of rows, (0, 5) as long as each starts
+    at the end of the one before it, as is usual; remark_rows: (k, REMARK_COLUMNS) space for remarks."""
 
     line: NDArray[np.int32]
     e_mm: Floats
@@ -42,7 +41,8 @@ class Reader:
     """Position X Y Z tilt turn E, modes, the state set by comments, and the rows so far.
 
     at: X Y Z tilt turn as the program counts them, all filament pushed so far. A row's feed below 0 is one over its minutes
-    (G93), inf: as fast as the axes can. Rows that follow each other often share a remark: what comments and M204 say of them."""
+    (G93), inf: as fast as the axes can. Consecutive rows often share a remark, with the values of comments and M204.
+    """
 
     machine: Machine
     dialect: Dialect
@@ -53,9 +53,9 @@ class Reader:
     columns: Columns
     rows: int = 0
     remarks: int = 0
-    feed_share: float = 1.0  # of M220, by which every F is multiplied
-    flow: float = 1.0  # of M221, by which all filament that moves push is
-    filament_mm2: float = 0.0  # of M200: E words are then mm3
+    feed_share: float = 1.0  # of M220, factor on every F
+    flow: float = 1.0  # of M221, factor on all filament
+    filament_mm2: float = 0.0  # of M200: E words are then mm³
     followed: bool = False
     printing: float = inf
     travelling: float = inf
@@ -73,20 +73,20 @@ class Reader:
     width: float = 0.0
     height: float = 0.0
     number: int = 0
-    condition: int | None = None  # how far the condition is indented on which the lines below it depend (RepRapFirmware)
+    condition: int | None = None  # indent of the condition on which the lines below it depend (RepRapFirmware)
     turning: list[tuple[int, float, float]] = field(default_factory=list)
     types: dict[str, int] = field(default_factory=lambda: {"": 0})
     parts: list[int] = field(default_factory=list)
     announced: int = 0
     part_totals: list[PartTotals] = field(default_factory=list)
-    switches: list[int] = field(default_factory=list)  # rows from which on X Y Z are places on the table, or no more
+    switches: list[int] = field(default_factory=list)  # rows from which X Y Z are positions relative to the table, or no longer
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
-    replaced: list[tuple[int, str]] = field(default_factory=list)  # lines whose text is shown otherwise than written
+    replaced: list[tuple[int, str]] = field(default_factory=list)  # lines whose displayed text differs from the file
     unsupported: list[tuple[int, int, Unsupported]] = field(default_factory=list)
 
     def make_room(self, place: list[float], rows: int) -> None:
-        """Room for a number of further rows, the first of which begins at a place (X Y Z tilt turn, then anything)."""
+        """Make space for further rows, the first of which starts at a position (X Y Z tilt turn, then anything)."""
         count, columns, room = self.rows, self.columns, len(self.columns.places) - 1
         if count + rows > room:
             fixed = ("remark_rows",) if len(columns.starts) else ("remark_rows", "starts")
@@ -101,7 +101,7 @@ class Reader:
         self.columns = columns
 
     def row(self, before: list[float], feed: float) -> None:
-        """A move from a place to where the machine is now."""
+        """Add a move from a position to the current one."""
         self.make_room(before, 1)
         columns, row = self.columns, self.rows
         acceleration = self.printing if self.at[E_AXIS] != before[E_AXIS] else self.travelling
@@ -117,7 +117,7 @@ class Reader:
         self.rows += 1
 
     def note(self, code: str, value: float = 0.0, letters: str = "") -> None:
-        """Record an event before the next row; targets of heaters are remembered."""
+        """Record an event before the next row; heater targets are remembered."""
         if code in NOZZLE:
             self.nozzle_c = value
         elif code in BED:
@@ -125,18 +125,18 @@ class Reader:
         self.events.append(Event(self.number, code, value, letters, self.rows))
 
     def ignore(self, code: str) -> None:
-        """Count a command that is unknown and moves nothing."""
+        """Count an unknown command that moves nothing."""
         first, count = self.ignored.get(code, (self.number, 0))
         self.ignored[code] = (first, count + 1)
 
     def own(self, code: str) -> None:
-        """Count and record a macro of the machine's own, which may home and heat unseen."""
+        """Count and record a macro defined by the machine, which may home and heat unseen."""
         self.ignore(code)
         self.note(OWN, letters=code)
 
 
 def reader_of(machine: Machine, room: int) -> Reader:
-    """A reader that has read nothing, with room for `room` rows: the machine stands at home."""
+    """An empty reader with space for `room` rows; the machine is at home."""
     modes = Modes(axes_of(machine), feed=DEFAULT_FEED, strict=True)
     linear = [min(max(0.0, axis.limits_mm[0]), axis.limits_mm[1]) for axis in (machine.x, machine.y, machine.z)]
     home = [*linear, machine.tilt.zero_deg, machine.turn.zero_deg, 0.0]
@@ -148,7 +148,7 @@ def reader_of(machine: Machine, room: int) -> Reader:
 
 
 def _longer(column: NDArray[Any], length: int) -> NDArray[Any]:
-    """An array with room for more."""
+    """A copy of an array with more space."""
     longer = np.empty((length, *column.shape[1:]), column.dtype)
     longer[: len(column)] = column
     return longer
