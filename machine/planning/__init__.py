@@ -1,5 +1,5 @@
-"""Planning: sliced parts become strokes, travels and turns of the table, each inside the limits, each with its time.
+"""Planning: turns sliced parts into strokes, travels and turns of the table, within the limits and with their times.
 
-`plan.plan` makes the `moves.MachineProgram`; `limits` and `fit` say what the axes reach, `stand.route` how
-the tip gets out of the way of a turn. Planning and dry run time their moves by `slicer.estimate.timing.move_times`.
+`plan.plan` makes the `moves.MachineProgram`; `limits` and `fit` check the reach of the axes, `stand.route` moves the tip out of
+the way of a turn. Planning and dry run compute times with `slicer.estimate.timing.move_times`.
 """

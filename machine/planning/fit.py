@@ -1,9 +1,8 @@
-"""Fit: whether a machine has room for parts, known before slicing: every axis reaches them, they stand on the plate; where models
-stand there, and whether the head passes those that stand while it prints another.
+"""Fit: whether parts fit a machine, checked before slicing: reach of the axes, plate, arrangement of models, and clearance of the
+head.
 
-Models of one size stand in rows and columns, others one by one, the largest first, each as near as possible to the place that the
-plate has for them. The finished parts of other models stand beside a part as a print stands beside a limb; all are taken as their
-convex hulls.
+Models of equal size stand in rows and columns, others one by one, the largest first, each as near as possible to its place. The
+finished parts of other models are obstacles like the print beside a limb; all are represented by their convex hulls.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,22 +33,22 @@ from slicer.paths import SlicedPart
 from slicer.raft import lift_mm, reach_mm
 
 Place = tuple[float, float]
-STILL = np.eye(3)  # turns nothing
-EDGE_MM = 2.0  # kept to the plate's edge
-STEP_MM = 2.5  # between places that are tried beside those where boxes touch
+STILL = np.eye(3)  # identity rotation
+EDGE_MM = 2.0  # distance to the plate's edge
+STEP_MM = 2.5  # lattice of places that are tried besides those where boxes touch
 ROUNDING_MM = 1e-6
 ROUNDING_DIGITS = 6
-CELLS_MM = (2.0, 0.6)  # finer ones would bring models nearer to each other by 2 mm at most, and take many times as long
-SIDES = 8  # sides of the polygon that stands for the round corner of a brim
+CELLS_MM = (2.0, 0.6)  # finer cells would bring models at most 2 mm nearer, and take many times as long
+SIDES = 8  # sides of the polygon that replaces the round corner of a brim
 _ROUND = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)])
-PartOfModel = tuple[int, int]  # a model of the plate and one of its parts, both by their places in the lists, from 0
+PartOfModel = tuple[int, int]  # a model of the plate and one of its parts, both as indices from 0
 
 
 def check_parts(parts: Sequence[Part], profile: Profile) -> None:
-    """Raise MoveError when the machine has no room for a part of a model about the turn axis, at its place on the plate.
+    """Raise MoveError when a part does not fit the machine at the model's place on the plate.
 
-    A part that stands as its pose has it reaches outside X, Y or Z, or the first one stands over the plate's edge. Half a line
-    is left at the sides, for the tip stays so far inside what it prints.
+    Checks X, Y and Z in the part's pose, and the first part against the plate's edge. The model is centred on the turn axis. Half
+    a line is subtracted at the sides, because the tip stays that far inside what it prints.
     """
     for part in parts:
         _check_reach(part, profile)
@@ -73,9 +72,9 @@ def _check_reach(part: Part, profile: Profile) -> None:
 
 
 def check_standing(mesh: Mesh, profile: Profile) -> None:
-    """Raise MoveError when what stands on the platform of a model about the turn axis lies over the plate's edge at its place.
+    """Raise MoveError when the base of a model, centred on the turn axis, extends over the plate's edge at its place.
 
-    Brims and supports are not known yet: the dry run looks at them.
+    Brims and supports are not known yet; the dry run checks them.
     """
     machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
     standing = mesh.vertices[mesh.vertices[:, 2] <= PLATE_TOLERANCE_MM, :2] + _shift(profile)[:2]
@@ -90,7 +89,7 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
 
 
 def _shift(profile: Profile) -> Floats:
-    """(3,) what moves the model to its place, on its raft where it has one, mm."""
+    """(3,) translation of the model to its place, on its raft if it has one, mm."""
     return np.array([*profile.process.place_mm, lift_mm(profile)])
 
 
@@ -102,7 +101,7 @@ def _advice(profile: Profile) -> str:
 
 
 def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.0) -> Decomposition:
-    """A decomposition moved by x, y over the plate and lifted onto a raft, its planes and marks too."""
+    """A decomposition moved by x, y and up, with its planes and marks."""
     if place_mm == MIDDLE and up_mm == 0.0:
         return decomposition
     shift = np.array([*place_mm, up_mm])
@@ -114,9 +113,9 @@ def standing_at(decomposition: Decomposition, place_mm: Place, up_mm: float = 0.
 def lifted(
     decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile
 ) -> tuple[Decomposition, list[SlicedPart]]:
-    """Parts that were sliced as if they stood on the plate, and their layers, above their raft.
+    """Parts that were sliced directly on the plate, and their layers, lifted onto their raft.
 
-    So the layers are those that they have without a raft, and all that keeps clear of the table keeps clear of the raft.
+    The layers are the same as without a raft, and whatever is clear of the table is clear of the raft.
     """
     up = np.array([0.0, 0.0, lift_mm(profile)])
     moved = [piece.moved(*(part.rotation @ up)[:2].tolist()) for part, piece in zip(decomposition.parts, sliced, strict=True)]
@@ -124,7 +123,7 @@ def lifted(
 
 
 def mesh_at_place(mesh: Mesh, profile: Profile) -> Mesh:
-    """A mesh at its place on the plate, and on its raft, as it is printed."""
+    """A mesh at its place on the plate and on its raft, as printed."""
     return mesh.transform(STILL, _shift(profile))
 
 
@@ -140,7 +139,7 @@ def _plane_moved(plane: Plane, shift: Floats) -> Plane:
 
 
 class Misfit(NamedTuple):
-    """The box, by its number, that finds no place; how many stand already; whether it has room and only the head does not."""
+    """The index of the box without a place; the number already placed; whether it would fit but for the head."""
 
     number: int
     standing: int
@@ -148,10 +147,10 @@ class Misfit(NamedTuple):
 
 
 def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine, about_mm: Place = MIDDLE) -> list[Place]:
-    """Up to `count` middles (workpiece x, y, mm) of boxes of that size, gap_mm apart, the nearest to a place first.
+    """Up to `count` centres (workpiece x, y, mm) of equal boxes, gap_mm apart, the nearest to a place first.
 
-    Rows and columns may have a box or a gap at that place, or in the middle of the plate: what holds most is taken, among equals
-    what stays nearer to the place.
+    Rows and columns may have a box or a gap at that place or at the plate's centre: the arrangement with most boxes is taken, and
+    among these the one nearest to the place.
     """
     lattices: list[list[Place]] = []
     for anchor_mm, shift in product(dict.fromkeys((about_mm, MIDDLE)), product((0.0, 0.5), (0.0, 0.5))):
@@ -167,10 +166,11 @@ def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine,
 
 
 class Plate:
-    """The models of a plate, each about the turn axis: where they stand, and whether the head passes them.
+    """The models of a plate, each centred on the turn axis: their places, and whether the head clears them.
 
-    together: the parts that are printed first, layer by layer; alone: those that follow one after the other. brim_mm: width of
-    the brim around what stands on the plate. With a raft all stand higher. sizes_mm: the models' boxes, gap_mm apart."""
+    together: the parts printed first, layer by layer; alone: those that follow in turn. brim_mm: width of the brim on the plate.
+    With a raft all are lifted. sizes_mm: the models' boxes, gap_mm apart.
+    """
 
     def __init__(
         self, models: Sequence[Decomposition], together: Sequence[PartOfModel], alone: Sequence[PartOfModel], profile: Profile,
@@ -185,7 +185,7 @@ class Plate:
         self._hull, self._is_reached, self._passes = cache(self._find_hull), cache(self._find_reached), cache(self._find_passed)
 
     def arrange(self) -> list[Place] | Misfit:
-        """The middles (workpiece x, y, mm) of the models' boxes about their place on the plate; or what does not fit."""
+        """The centres (workpiece x, y, mm) of the models' boxes around their place on the plate; or the misfit."""
         sizes_mm, about_mm = self._sizes_mm, self._profile.process.place_mm
         if len(set(sizes_mm)) == 1:
             rows = places_on_plate(sizes_mm[0], self._gap_mm, len(sizes_mm), self._machine, about_mm)
@@ -194,12 +194,12 @@ class Plate:
             if self.is_clear(dict(enumerate(rows))):
                 return rows
         found = self._one_by_one(about_mm)
-        if isinstance(found, Misfit):  # two that fit side by side do not where the first one has the middle
+        if isinstance(found, Misfit):  # two boxes that fit side by side do not fit if the first one takes the centre
             from_corner = self._one_by_one((-self._machine.table.radius_mm, -self._machine.table.radius_mm))
             if isinstance(from_corner, Misfit):
                 return max(found, from_corner, key=lambda misfit: misfit.standing)
             found = from_corner
-        # all are moved together so that the middle of what they cover is at their place, where that keeps them on the plate
+        # move all together so that their bounding box is centred at their place, if they stay on the plate
         middles, halves = np.array(found), 0.5 * np.array(sizes_mm)
         moved = middles + np.array(about_mm) - 0.5 * ((middles - halves).min(axis=0) + (middles + halves).max(axis=0))
         if (over_edge_mm(np.abs(moved) + halves + EDGE_MM, self._machine.table)[0] > ROUNDING_MM).any():
@@ -208,7 +208,7 @@ class Plate:
         return together if self.is_clear(dict(enumerate(together))) else found
 
     def _one_by_one(self, near_mm: Place) -> list[Place] | Misfit:
-        """The largest first, each as near to a place as it may stand."""
+        """Place the largest first, each as near as possible to a place."""
         standing, sizes_mm = dict[int, Place](), self._sizes_mm
         for k in sorted(range(len(sizes_mm)), key=lambda k: (-sizes_mm[k][0] * sizes_mm[k][1], k)):
             places = self._free_places(k, standing, near_mm)
@@ -219,7 +219,7 @@ class Plate:
         return [standing[k] for k in range(len(sizes_mm))]
 
     def _free_places(self, number: int, standing: Mapping[int, Place], near_mm: Place) -> list[Place]:
-        """Where a box has room, the nearest to a place first: beside and in line with those that stand, and on a lattice."""
+        """Free places of a box, the nearest to a place first: beside and in line with placed boxes, and on a lattice."""
         size, reach_mm = np.array(self._sizes_mm[number]), self._machine.table.radius_mm
         boxes = np.array([[standing[k], self._sizes_mm[k]] for k in standing]).reshape(-1, 2, 2)
         apart, aligned = 0.5 * (boxes[:, 1] + size) + self._gap_mm, 0.5 * (boxes[:, 1] - size)
@@ -234,11 +234,11 @@ class Plate:
         return [(x, y) for x, y in places[np.lexsort((places[:, 0], places[:, 1], away))].tolist()]
 
     def is_clear(self, places: Mapping[int, Place]) -> bool:
-        """Whether the parts of the models that have places can be printed there."""
+        """Whether the parts of the placed models can be printed there."""
         return all(self._allowed(number, places) for number, (k, _) in enumerate(self.alone) if k in places)
 
     def poses(self, places: Mapping[int, Place]) -> list[Pose]:
-        """For every part that is printed alone its pose, so that the table turns little; each part must have one."""
+        """A pose for every part printed alone, with little turning of the table; each part must have one."""
         options = [self._allowed(number, places) for number in range(len(self.alone))]
         begins = [[level(self._machine)]] if self.together else []
 
@@ -248,13 +248,13 @@ class Plate:
         return least_rotation(self._machine, [*begins, *options], fits)[len(begins) :]
 
     def _width_around(self, model: Decomposition) -> float:
-        """How far brim or raft and support reach around a model on the plate, mm; both run round the support."""
+        """Reach of brim or raft and support around a model on the plate, mm; both also surround the support."""
         has_support = self._profile.process.support != "none" and any(part.risky_area_mm2 > 0.0 for part in model.parts)
         around_mm = reach_mm(self._profile.process) if self._up_mm else self.brim_mm
         return around_mm + (AROUND_MM if has_support else 0.0)
 
     def _allowed(self, number: int, places: Mapping[int, Place], tried: Sequence[Pose] | None = None) -> list[Pose]:
-        """The poses at which a part can be printed while all that comes before it stands."""
+        """The poses in which a part can be printed beside everything printed before it."""
         model, machine = self.alone[number][0], self._machine
         part = self._parts[model][self.alone[number][1]]
         if tried is None:
@@ -271,23 +271,23 @@ class Plate:
         ]
 
     def _find_reached(self, part: Part, pose: Pose, place: Place) -> bool:
-        """Whether a part at a place is within the axes' limits, and clear of the table."""
+        """Whether a part at a place is within the axes' limits and clear of the table."""
         points = self._hull(part).reshape(-1, 3) + np.array([*place, 0.0])
         return find_obstacle(self._machine, pose, points) is None
 
     def _find_passed(self, part: Part, pose: Pose, standing: Part, away_mm: Place) -> bool:
-        """Whether the head passes a part of another model that stands away_mm from the part's own."""
+        """Whether the head clears a part of another model at a displacement from the part's own."""
         beside = self._hull(standing) + np.array([*away_mm, 0.0])
         base_mm = part.base.offset_mm - part.lifted_mm  # with its raft
         return passes_clear(self._machine, pose, (self._hull(part), beside), base_mm, CELLS_MM)
 
     def _find_hull(self, part: Part) -> Floats:
-        """(m, 3, 3) corners of the faces of a part's hull; on the plate with its brim, raft or support."""
+        """(m, 3, 3) corners of the faces of a part's hull; on the plate including brim, raft or support."""
         hull = convex_hull(part.mesh.vertices)
         if self._around_mm.get(part, 0.0) > 0.0:
             low = hull.vertices[hull.vertices[:, 2] <= part.lifted_mm + PLATE_TOLERANCE_MM]
             brims = (low[:, None] + self._around_mm[part] / np.cos(np.pi / SIDES) * _ROUND).reshape(-1, 3)
-            plate = brims - [0.0, 0.0, part.lifted_mm]  # where a raft is as high as the part is lifted
+            plate = brims - [0.0, 0.0, part.lifted_mm]  # a raft is as high as the part is lifted
             hull = convex_hull(np.vstack([hull.vertices, brims, plate]))
         return hull.vertices[hull.faces]
 

@@ -1,9 +1,9 @@
-"""Layer: a layer's strokes as moves, each as fast as axes, extruder and hot end can, and the tip's ways between them: pulling
-back with a wipe, lifting, crossing, and how high for the head to clear what stands beside a limb that is being printed.
+"""Layer: a layer's strokes as moves, as fast as axes, extruder and hot end allow, and the travels between them: retraction with a
+wipe, lift, and crossing at a height at which the head clears what stands beside a limb.
 
-Filament that makes up for what oozed while the table turned is pushed during a stroke inside, not at standstill. How much oozed
-is not known. Pushed at the beginning of a wall, what did not ooze would be a drop on the seam; spread over the first stretch of
-infill or support it makes that a little thicker, where nobody sees or feels it.
+Filament that replaces what oozed during a turn of the table is pushed within an inner stroke, not at standstill. How much oozed
+is unknown. At the beginning of a wall, excess filament would leave a blob on the seam; spread over the first stretch of infill or
+support it only makes that a little thicker.
 """
 
 from collections.abc import Sequence
@@ -35,23 +35,24 @@ from slicer.paths import Kind, Layer, SlicedPart, bead_area_mm2
 from slicer.strokes.speed import stroke_accelerations
 from slicer.strokes.travels import STANDING_MM, distance, first_length, runs_round, wipe_trail
 
-TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
+TO_AND_FRO = 4  # reversals of a wipe on a single stroke shorter than it
 NOWHERE = np.zeros((0, 3))
 NO_ENDS = np.zeros(0, dtype=np.int64)
-STEP_MM = 0.5  # between the points that sample ways and beads, and size of the cells in which only the highest point counts
-MOST_COASTED = 0.25  # a path coasts over this share of its length at most
-RUN_MM = 20.0  # the filament of a turn is spread over so much of a stroke
-MOST_FULL = 1.5  # of what the width and the height of a bead need: what did not ooze shall not fill the room twice
+STEP_MM = 0.5  # between sample points of paths and beads, and size of the cells of which only the highest point counts
+MOST_COASTED = 0.25  # greatest fraction of a path for coasting
+RUN_MM = 20.0  # length of a stroke over which the filament of a turn is spread
+MOST_FULL = 1.5  # of a bead's nominal filament: filament that did not ooze must not fill the space twice
 SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN)
 
 
 @dataclass
 class Tip:
-    """The tip's position (machine X Y Z), the table's pose, the hull of the earlier parts, and all moves so far.
+    """Position of the tip (machine X Y Z), pose of the table, hull of the earlier parts, and all moves so far.
 
-    trail: (n, 3) the way of a wipe over what has been printed since the last retraction. run_in_mm: filament that the next
-    strokes inside are to push beyond their own. limb: while a limb is printed, its part number and what stands beside it.
-    has_limbs: from the first limb on, what is printed may be higher than the tip."""
+    trail: (n, 3) path of a wipe over the strokes since the last retraction. run_in_mm: filament that the next inner strokes are
+    to push in addition. limb: while a limb is printed, its part number and what stands beside it. has_limbs: a limb has been
+    printed, so that the print may be higher than the tip.
+    """
 
     profile: Profile
     at_mm: Floats
@@ -72,19 +73,19 @@ class Tip:
         return speeds_of(self.profile)
 
     def add(self, moves: Moves) -> None:
-        """Moves that begin where it stands."""
+        """Append moves that begin at the tip."""
         self.moves.append(moves)
         if len(moves.ways):
             self.at_mm = moves.ways[-1, :3]
 
     def move(self, what: int, way_mm: Floats, pushed_mm: Floats | float, speed: float, acceleration_mm_s2: float = inf) -> None:
-        """One move that is not a stroke, along (n, 3) points."""
+        """Append a move that is not a stroke, along (n, 3) points."""
         ways = np.empty((len(way_mm), 4))
         ways[:, :3], ways[:, 3] = way_mm, pushed_mm
         self.add(Moves(ways, np.array([[what, len(way_mm), speed, nan, nan, acceleration_mm_s2]])))
 
     def mark(self, mark: Mark) -> None:
-        """A mark, or a turn of the table, after which the last strokes cannot be wiped over any more."""
+        """Append a mark or a turn of the table; after a turn earlier strokes cannot be wiped over."""
         self.marks.append(mark)
         if isinstance(mark, Reorient):
             self.move(REORIENT, self.at_mm[None], 0.0, mark.speed_deg_s)
@@ -94,9 +95,9 @@ class Tip:
 
 
 def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats) -> float:
-    """Z at which the tip crosses along an approach (k, 2) to a stroke's start, pulled back where it `retracts`.
+    """Z at which the tip crosses along an approach (k, 2) to a stroke's start, retracted if `retracts`.
 
-    Within a limb the filament is pulled back and the tip lifted wherever the head would meet what stands beside the limb.
+    Within a limb the tip retracts and lifts wherever the head would hit what stands beside the limb.
     """
     if retracts:
         retract(tip)
@@ -112,8 +113,8 @@ def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: 
 
 
 def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float) -> float:
-    """Z at which the head clears what stands beside a limb on the way to a path's start: `over` where that is enough, else the
-    least height that is, with the clearance beneath the nozzle, too."""
+    """Z at which the head clears what stands beside a limb on the way to a path's start. `over` if that suffices, else the least
+    sufficient height with the clearance of the nozzle."""
     assert tip.limb is not None
     (part, standing), machine = tip.limb, tip.profile.machine
     way = np.vstack([tip.at_mm[:2], approach, start[:2]])
@@ -130,7 +131,7 @@ def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, ove
 
 
 def go(tip: Tip, *goals_mm: Sequence[float] | Floats) -> None:
-    """Straight travels from place to place, straight up and down at the lift speed."""
+    """Append straight travels from place to place, vertical ones at the lift speed."""
     for goal_mm in goals_mm:
         tip.add(_straight(tip.at_mm, np.array(goal_mm, dtype=np.float64), tip.speeds))
 
@@ -145,8 +146,8 @@ def _straight(at_mm: Floats, goal_mm: Floats, speeds: Speeds) -> Moves:
 
 @no_nrt
 def add_travel(out: Moves, done: Indices, between_mm: Floats, x_mm: float, y_mm: float, z_mm: float, speeds: Speeds) -> None:
-    """Write a travel from the last point past (k, 2) places at the goal's height to the goal; it leaves out points where the tip
-    stands already, and is left out where it leads nowhere. done: as in add_point."""
+    """Write a travel from the last point past (k, 2) places at the goal's height to the goal. Points at the tip's position are
+    omitted, as are travels of length 0. done: as in add_point."""
     first, upright = done[0], True
     x, y, z = out.ways[first - 1, 0], out.ways[first - 1, 1], out.ways[first - 1, 2]
     add_point(out, done, x, y, z, 0.0)
@@ -164,7 +165,7 @@ def add_travel(out: Moves, done: Indices, between_mm: Floats, x_mm: float, y_mm:
 
 
 def retract(tip: Tip) -> None:
-    """Retract the rest of the retraction length, wiping over the last strokes where there are any."""
+    """Retract the rest of the retraction length, wiping over the last strokes if there are any."""
     material, speeds = tip.profile.material, tip.speeds
     amount = material.retract_mm - tip.retracted_mm
     if amount <= 0:
@@ -183,8 +184,8 @@ def retract(tip: Tip) -> None:
 
 
 class Laid(NamedTuple):
-    """The strokes of a layer where they lie in the machine, mm: points (n, 3), where those of each begin (k + 1,), widths (k,),
-    whether a wipe may go over each; the way to each: points (m, 2) of all of them, where those begin (k + 1,)."""
+    """Strokes of a layer in machine coordinates, mm: points (n, 3), their starts (k + 1,), widths (k,), whether a wipe may follow
+    each; all approach points (m, 2) and their starts (k + 1,)."""
 
     points: Floats
     starts: Indices
@@ -196,7 +197,7 @@ class Laid(NamedTuple):
 
 @kernel
 def trail_after(laid: Laid, first: int, end: int, before: Floats, wipe_mm: float) -> Floats:
-    """The way (n, 3) of a wipe of wipe_mm after some of a layer's strokes; before: that before them, none after a retraction."""
+    """Path (n, 3) of a wipe of wipe_mm after some of a layer's strokes; before: the path before them, empty after a retraction."""
     from_here = end - 1
     while from_here > first and not _suffices(laid, from_here, wipe_mm):
         from_here -= 1
@@ -216,10 +217,10 @@ def _suffices(laid: Laid, k: int, wipe_mm: float) -> bool:
 
 @helper
 def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
-    """The way of a wipe after one stroke.
+    """Path of a wipe after one stroke.
 
-    Where the stroke is shorter it goes on, back over the way to its beginning, to the strokes before it in the layer; where
-    there are none, to and fro. Where it must not go over the stroke itself, it goes on over those at once.
+    If the stroke is too short, the path continues via its beginning to earlier strokes of the layer, or back and forth without
+    these. If it must not follow the stroke itself, it uses the earlier ones only.
     """
     points = laid.points[laid.starts[k] : laid.starts[k + 1]]
     if not laid.wiped[k] and not (len(before) and runs_round(points, laid.width[k])):
@@ -255,9 +256,9 @@ def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
 
 
 def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> StandingColumns:
-    """The printed beads that stand above the base plane of a limb, in its frame.
+    """The printed beads above the base plane of a limb, in its frame.
 
-    Beads less than their width above the plane are left out: they are the steps of the cut face on which the limb stands.
+    Beads less than their width above the plane are left out: they are the steps of the cut face below the limb.
     """
     tops, widest_mm = [np.zeros((0, 3))], 0.0
     for part, piece in printed:
@@ -270,19 +271,19 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
             points, before = _resampled(placed, layer.starts[1:-1] - 1)
             tops.append(points[points[:, 2] > width_mm[before]])
             widest_mm = max(widest_mm, float(width_mm[high].max()))
-    slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of way and of bead, half a cell's diagonal
+    slack_mm = 0.5 * widest_mm + (1.0 + sqrt(0.5)) * STEP_MM  # half a step of path and of bead, half a cell's diagonal
     return StandingColumns.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
 
 
 def clear_height_mm(standing: StandingColumns, way_mm: Floats, height_mm: float) -> float:
-    """The least height of at least height_mm at which the tip may go along a way (n, 2) in the limb's frame."""
+    """The least height, at least height_mm, at which the tip may move along a path (n, 2) in the limb's frame."""
     return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm)[0], height_mm).max()))
 
 
 def _resampled(way_mm: Floats, ends: Indices = NO_ENDS) -> tuple[Floats, Indices]:
-    """A way (n, d) with points added so that they are at most STEP_MM apart, and the point of the way that each comes from.
+    """A path (n, d) with added points at most STEP_MM apart, and the index of the original point before each.
 
-    ends: points from which no way leads to the next one.
+    ends: points after which the path is interrupted.
     """
     steps = np.diff(way_mm, axis=0)
     counts = np.maximum(np.ceil(np.linalg.norm(steps, axis=1) / STEP_MM), 1).astype(np.int64)
@@ -294,9 +295,9 @@ def _resampled(way_mm: Floats, ends: Indices = NO_ENDS) -> tuple[Floats, Indices
 
 
 def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_plate: bool) -> None:
-    """Print a layer whose points are at (n, 3) machine coordinates, its own moved by a shift.
+    """Print a layer whose points are at (n, 3) machine coordinates, shifted from its own.
 
-    From one place where the filament is pulled back to the next the moves are written at once.
+    The moves from one retraction to the next are written at once.
     """
     profile, starts = tip.profile, layer.starts
     strokes = _strokes(tip, layer, points, on_plate=on_plate)
@@ -304,7 +305,7 @@ def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_pla
     laid = Laid(points, starts, layer.width_mm, layer.wiped, layer.approach + shift[:2], layer.approach_starts)
     firsts = points[starts[:-1]]
     apart = np.linalg.norm(firsts - np.vstack([tip.at_mm, points[starts[1:-1] - 1]]), axis=1) > STANDING_MM
-    alone = apart if tip.limb is not None else apart & layer.retract  # a stroke may begin where the one before it ends
+    alone = apart if tip.limb is not None else apart & layer.retract  # a stroke may begin at the end of the one before it
     ways = np.concatenate([[0], np.cumsum(strokes.rows[:, POINTS].astype(np.int64))])
     for a, b in pairwise([0, *(np.flatnonzero(alone[1:]) + 1).tolist(), len(layer)]):
         over = float(firsts[a, 2])
@@ -321,7 +322,7 @@ def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_pla
 def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves:
     """The strokes of a layer whose points are at (n, 3) machine coordinates.
 
-    Filament by volume (a stroke's flow holds the material's); the speed lowered to what axes, extruder and hot end can do.
+    Filament by volume (a stroke's flow includes the material's); speed limited by axes, extruder and hot end.
     """
     profile, counts = tip.profile, np.diff(layer.starts)
     material = profile.material
@@ -339,7 +340,7 @@ def _strokes(tip: Tip, layer: Layer, points: Floats, *, on_plate: bool) -> Moves
 
 
 def _ways(points_mm: Floats, flat_mm: Floats, starts: Indices, area_mm2: Floats, filament_mm2: float) -> Floats:
-    """(n, 4) points of strokes with the filament of beads of (k,) areas; flat_mm (n, 2): the points before they were moved."""
+    """(n, 4) points of strokes with the filament of beads of (k,) areas; flat_mm (n, 2): the points before the shift."""
     steps_mm = np.hypot(*np.diff(flat_mm, axis=0, prepend=flat_mm[:1]).T)
     steps_mm[starts[:-1]] = 0.0
     return np.column_stack([points_mm, steps_mm * np.repeat(area_mm2, np.diff(starts)) / filament_mm2])
@@ -347,7 +348,7 @@ def _ways(points_mm: Floats, flat_mm: Floats, starts: Indices, area_mm2: Floats,
 
 @kernel
 def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> Moves:
-    """The strokes, some of which push nothing over their last coast_mm; a step is cut where that begins. flat_mm: as in _ways."""
+    """The strokes, some of which push nothing over their last coast_mm; steps are split where that begins. flat_mm: as in _ways."""
     out, done = Moves(table(len(strokes.ways) + len(coasts), 4), strokes.rows), longs(2, 0)
     first = 0
     for k in range(len(coasts)):
@@ -370,17 +371,16 @@ def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> 
 
 
 def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> float:
-    """Add filament that is still to be pushed after a turn to the strokes of a layer; how much they take, mm.
+    """Add the filament due after a turn to the strokes of a layer; returns the amount added, mm.
 
-    A stroke takes half more than its width and height need, the next one some of the rest; one that is seen takes it only in a
-    layer that has no other.
+    A stroke takes up to half more than its nominal filament; visible strokes take it only in a layer without others.
     """
     if more_mm <= 0.0:
         return 0.0
     seen, taken_mm = layer.is_of(*SEEN), 0.0
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
     fastest = stroke_filament_mm_s(profile)
-    needed_mm = bead_area_mm2(layer.width_mm, layer.height_mm) * profile.material.flow / filament_mm2  # for a millimetre
+    needed_mm = bead_area_mm2(layer.width_mm, layer.height_mm) * profile.material.flow / filament_mm2  # per millimetre
     ends = np.cumsum(strokes.rows[:, POINTS].astype(np.int64))
     for k in np.flatnonzero(~seen | seen.all()).tolist():
         if taken_mm >= more_mm:
@@ -399,9 +399,9 @@ def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> fl
 
 @kernel
 def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices, begin: Floats, speeds: Speeds) -> Moves:
-    """Strokes with the travels to those that begin apart from where the one before them ends, along the approach.
+    """Strokes with travels, along the approach, to those that do not begin at the end of the one before.
 
-    begin: (5,) X Y Z of the tip, Z over which it crosses to the first stroke, and what is to be pushed before that.
+    begin: (5,) X Y Z of the tip, Z of the crossing to the first stroke, and filament to push before that.
     """
     most = len(strokes.ways) + approach_starts[-1] - approach_starts[0] + 7 * len(apart) + 1  # three travels and a push
     out, done = Moves(table(most, 4), table(5 * len(apart), 6)), longs(2, 0)

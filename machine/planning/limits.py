@@ -1,4 +1,4 @@
-"""Limits: what every axis allows; a program outside is refused before any text is written, a speed is lowered to fit."""
+"""Limits: what every axis allows; a program outside is refused before any text is written, speeds are lowered to fit."""
 
 from math import pi
 
@@ -18,7 +18,7 @@ ROUNDING = 5e-4
 
 
 def axis_limits(machine: Machine) -> dict[str, Limits]:
-    """Least and greatest value of X, Y, Z and the two rotary letters, mm and deg, as limits and cables allow."""
+    """Least and greatest value of X, Y, Z and the two rotary letters, mm and deg, by limits and cables."""
     return {
         "X": machine.x.limits_mm,
         "Y": machine.y.limits_mm,
@@ -29,7 +29,7 @@ def axis_limits(machine: Machine) -> dict[str, Limits]:
 
 
 def check(program: MachineProgram, machine: Machine) -> None:
-    """Raise MoveError when a point or a turn lies outside an axis's limits; the first one in print order is named."""
+    """Raise MoveError when a point or a turn exceeds an axis's limits, naming the first one in print order."""
     limits = axis_limits(machine)
     least, most = np.array(list(limits.values())).T
     reached = np.full((len(program.points_mm), 5), np.nan)
@@ -48,7 +48,7 @@ def check(program: MachineProgram, machine: Machine) -> None:
 
 
 def location(program: MachineProgram, index: int) -> str:
-    """Where a move stands in the print: "part 2, layer 14", or how it gets there."""
+    """Location of a move in the print: "part 2, layer 14", or between these."""
     before = program.marks[: int(np.searchsorted(program.mark_rows, index, side="right"))]
     part = next((mark for mark in reversed(before) if isinstance(mark, BeginPart)), None)
     layer = next((mark for mark in reversed(before) if isinstance(mark, BeginLayer)), None)
@@ -60,20 +60,19 @@ def location(program: MachineProgram, index: int) -> str:
 
 
 def wipe_filament_mm_s(machine: Machine) -> float:
-    """Greatest filament speed to plan a wipe with, mm/s: rounding in the text may raise it a little."""
+    """Greatest planned filament speed of a wipe, mm/s: rounding in the text may raise it a little."""
     return machine.extruder_speed_mm_s / RICHER
 
 
 def stroke_filament_mm_s(profile: Profile) -> float:
-    """Greatest filament speed to plan a stroke with, mm/s: as for a wipe, and not more than the hot end melts."""
+    """Greatest planned filament speed of a stroke, mm/s: as for a wipe, and within the hot end's limit."""
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
     return min(profile.material.volumetric_limit_mm3_s / filament_mm2, wipe_filament_mm_s(profile.machine))
 
 
 @kernel
 def path_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, axes_mm_s: Floats) -> Floats:
-    """(k,) speeds lowered to what X, Y and Z allow along paths one after the other; points_mm: (n, 3 or
-    more); starts: (k + 1,)."""
+    """(k,) speeds lowered to the limits of X, Y and Z along consecutive paths; points_mm: (n, 3 or more); starts: (k + 1,)."""
     lowered: Floats = floats(len(speeds_mm_s), 0.0)
     for k in range(len(lowered)):
         lowered[k] = path_speed(points_mm, starts[k], starts[k + 1], speeds_mm_s[k], axes_mm_s)
@@ -82,7 +81,7 @@ def path_speeds(points_mm: Floats, starts: Indices, speeds_mm_s: Floats, axes_mm
 
 @no_nrt
 def path_speed(points_mm: Floats, first: int, end: int, speed_mm_s: float, axes_mm_s: Floats) -> float:
-    """The speed lowered to what X, Y and Z allow along points first to end."""
+    """The speed lowered to the limits of X, Y and Z along points first to end."""
     for k in range(first + 1, end):
         squared = 0.0
         for axis in range(3):
@@ -94,7 +93,7 @@ def path_speed(points_mm: Floats, first: int, end: int, speed_mm_s: float, axes_
 
 
 def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
-    """(...) how far places (..., 2) lie over the plate's edge, below 0 on it; the edge in words."""
+    """(...) distance of places (..., 2) beyond the plate's edge, below 0 on the plate; and the edge in words."""
     if table.size_mm is None:
         over: Floats = np.hypot(points_mm[..., 0], points_mm[..., 1]) - table.radius_mm
         return over, f"{table.radius_mm:g} mm from its middle"
@@ -104,7 +103,7 @@ def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
 
 
 def turn_speed(tilt_deg: float, turn_deg: float, machine: Machine) -> float:
-    """deg/s along a turn of both rotary axes at once (sqrt of the sum of squares), the slower axis at its greatest speed."""
+    """Speed along a turn of both rotary axes, deg/s (root of the sum of squares), with the slower axis at its limit."""
     seconds = max(abs(tilt_deg) / machine.tilt.speed_deg_s, abs(turn_deg) / machine.turn.speed_deg_s)
     if seconds == 0.0:
         return min(machine.tilt.speed_deg_s, machine.turn.speed_deg_s)

@@ -1,4 +1,4 @@
-"""Moves: the machine program between the slicer and the G-code text, a row for each move, in machine coordinates."""
+"""Moves: the machine program between slicer and G-code, a row for each move, in machine coordinates."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from mdp.overhang import Mask
 from mdp.pose import Pose
 from slicer.paths import KINDS, Unsupported
 
-RICHER = 1.004  # times as much filament as planned a short stroke may get where the text rounds its ends
+RICHER = 1.004  # greatest ratio of a short stroke's filament to the planned, due to rounding of its ends
 
 
 @dataclass(frozen=True)
 class BeginPart:
-    """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient.
+    """Begin of part `index` at `pose`; a Reorient has turned the table before.
 
-    unsupported: the places of it that no support could be given.
+    unsupported: places of it without possible support.
     """
 
     index: int
@@ -32,8 +32,8 @@ class BeginPart:
 
 @dataclass(frozen=True)
 class BeginLayer:
-    """The strokes after this lie in one layer; z_mm is measured from the part's base plane,
-    or from the platform that its raft stands on, nozzle_add_c from the material's."""
+    """Begin of a layer; z_mm is relative to the part's base plane, or to the build plate below its raft, nozzle_add_c to the
+    material's."""
 
     part: int
     index: int
@@ -45,7 +45,7 @@ class BeginLayer:
 
 @dataclass(frozen=True)
 class Reorient:
-    """Turn the table to `pose` at the slowest axis's pace; the tip stands still at a safe place."""
+    """Turn the table to `pose` at the slowest axis's speed; the tip waits at a safe position."""
 
     pose: Pose
     speed_deg_s: float
@@ -53,7 +53,7 @@ class Reorient:
 
 @dataclass(frozen=True)
 class Pause:
-    """Wait for a person before a layer, counted from 1; change: who puts in another filament. The tip stands aside."""
+    """Wait for the user before a layer, counted from 1; change: to change the filament. The tip is aside."""
 
     part: int
     layer: int
@@ -61,13 +61,13 @@ class Pause:
 
 
 Mark = BeginPart | BeginLayer | Pause | Reorient
-TRAVEL, WIPE, RETRACT, REORIENT, MARK = range(len(KINDS), len(KINDS) + 5)  # behind the numbers of strokes, those of KINDS
+TRAVEL, WIPE, RETRACT, REORIENT, MARK = range(len(KINDS), len(KINDS) + 5)  # after the numbers of strokes, those of KINDS
 POINTS, SPEED = 1, 2  # columns of Moves.rows
 
 
 class Moves(NamedTuple):
-    """Moves one after the other. ways (n, 4): X Y Z of their points and the filament pushed on the way to each, 0 at the first
-    point of a path. rows (m, 6): what each is, how many points it has, speed, width, fan, acceleration, as in MachineProgram."""
+    """Consecutive moves. ways (n, 4): X Y Z of their points and the filament pushed on the way to each, 0 at the first point of a
+    path. rows (m, 6): kind, number of points, speed, width, fan, acceleration, as in MachineProgram."""
 
     ways: Floats
     rows: Floats
@@ -77,11 +77,11 @@ class Moves(NamedTuple):
 class MachineProgram:
     """All moves of a print in order, one row each, and the model's name for the file's head.
 
-    points_mm: (n, 3) machine coordinates; starts: (m + 1,) where the points of each move begin; filament_mm: (n,) pushed on the
-    way to each point, 0 at the first one of a path, where the tip already stands. Wipes and retractions push less than 0. A
-    retraction and a turn of the table have one point, where the tip stands; other marks have none. Columns, (m,) each: what:
-    index in KINDS of a stroke, else one of TRAVEL ... MARK; speed: mm/s, deg/s of turns; width_mm; fan: 0..1, NaN for the
-    layer's; acceleration_mm_s2: inf where the axes decide. marks: the values of the rows that are turns and marks, in order.
+    points_mm: (n, 3) machine coordinates; starts: (m + 1,) first point of each move; filament_mm: (n,) pushed on the way to each
+    point, 0 at the first one of a path, where the tip already is. Wipes and retractions push less than 0. A retraction and a turn
+    of the table have one point, the tip's; other marks have none. Columns, (m,) each: what: index in KINDS of a stroke, else one
+    of TRAVEL ... MARK; speed: mm/s, deg/s of turns; width_mm; fan: 0..1, NaN for the layer's; acceleration_mm_s2: inf if the axes
+    decide. marks: values of the rows that are turns or marks, in order.
     """
 
     name: str
@@ -97,7 +97,7 @@ class MachineProgram:
 
     @classmethod
     def of(cls, name: str, pieces: Sequence[Moves], marks: Sequence[Mark]) -> "MachineProgram":
-        """The table of moves one piece after the other."""
+        """The program of consecutive pieces of moves."""
         ways = np.concatenate([np.zeros((0, 4)), *(piece.ways for piece in pieces)])
         rows = np.concatenate([np.zeros((0, 6)), *(piece.rows for piece in pieces)])
         what, points, speed, width_mm, fan, acceleration = np.ascontiguousarray(rows.T)
@@ -110,28 +110,28 @@ class MachineProgram:
 
     @property
     def is_stroke(self) -> Mask:
-        """(m,) which moves are strokes."""
+        """(m,) mask of the strokes."""
         return self.what < len(KINDS)
 
     @property
     def mark_rows(self) -> Indices:
-        """Where the marks stand among the moves."""
+        """Rows of the marks."""
         return np.flatnonzero(self.what >= REORIENT)
 
     def marked(self) -> Iterator[tuple[int, Mark]]:
-        """The row and the value of each mark."""
+        """Row and value of each mark."""
         return zip(self.mark_rows.tolist(), self.marks, strict=True)
 
 
 def straight_moves(program: MachineProgram, start: Pose) -> tuple[Floats, Floats, Indices]:
-    """(n, 6) beginning and end of each straight move, X Y Z tilt turn E, and (n,) the row of the program that it belongs to.
+    """(n, 6) beginning and end of each straight move, X Y Z tilt turn E, and (n,) its row of the program.
 
-    start: how the table stands before the first one.
+    start: pose before the first one.
     """
     counts = np.diff(program.starts)
     move = np.repeat(np.arange(len(program)), counts)
     ends = np.ones(len(move), np.bool_)
-    ends[program.starts[:-1][(counts > 0) & (program.what <= WIPE)]] = False  # a path has one more point than it has steps
+    ends[program.starts[:-1][(counts > 0) & (program.what <= WIPE)]] = False  # a path has one more point than steps
     at = np.flatnonzero(ends)
     move = move[at]
     places = program.points_mm[np.where(program.what[move] > WIPE, at, at - 1)]
@@ -149,7 +149,7 @@ def straight_moves(program: MachineProgram, start: Pose) -> tuple[Floats, Floats
 
 @kernel
 def _sums(pushed_mm: Floats, counts: Indices) -> Floats:
-    """(n + 1,) filament before each row and after the last one, added up move by move."""
+    """(n + 1,) filament before each row and after the last one, summed move by move."""
     sums = floats(len(pushed_mm) + 1, 0.0)
     row = 0
     for count in counts:
@@ -163,14 +163,14 @@ def _sums(pushed_mm: Floats, counts: Indices) -> Floats:
 
 @no_nrt
 def add_point(out: Moves, done: Indices, x: float, y: float, z: float, pushed_mm: float) -> None:
-    """Write the next point. done (2,): how many points and rows are written."""
+    """Write the next point. done (2,): numbers of points and rows written."""
     out.ways[done[0], 0], out.ways[done[0], 1], out.ways[done[0], 2], out.ways[done[0], 3] = x, y, z, pushed_mm
     done[0] += 1
 
 
 @no_nrt
 def add_row(out: Moves, done: Indices, what: int, points: int, speed: float, acceleration_mm_s2: float) -> None:
-    """Write the next row, the move of the last points, which has neither width nor fan."""
+    """Write the next row, a move of the last points, without width or fan."""
     row = out.rows[done[1]]
     row[0], row[1], row[2], row[3], row[4], row[5] = what, points, speed, np.nan, np.nan, acceleration_mm_s2
     done[1] += 1

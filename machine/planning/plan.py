@@ -1,6 +1,5 @@
-"""Plan: sliced parts in order become one program of strokes, travels and reorientations in machine coordinates, after a line on
-the plate that fills the nozzle and wipes it.
-"""
+"""Plan: joins sliced parts to a program of strokes, travels and reorientations in machine coordinates, after a purge line on the
+plate."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,21 +23,21 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import NUMBER, Kind, Layer, Path, SlicedPart
 
-PURGE_WIDTH = 2.0  # of the line, in nozzles: a fat bead fills the nozzle soon and is peeled off whole
-EDGE_MM, GAP_MM = 1.0, 3.0  # kept to the plate's edge and to what is printed near the plate
-LOW_MM = 2.0  # what is printed higher above the plate passes over the line
+PURGE_WIDTH = 2.0  # of the purge line, in nozzle widths: a thick bead fills the nozzle soon and peels off in one piece
+EDGE_MM, GAP_MM = 1.0, 3.0  # distance to the plate's edge and to prints near the plate
+LOW_MM = 2.0  # prints higher above the plate pass over the line
 MOST_LANES, SHORTEST_MM = 4, 10.0
-OUTWARD = np.array([[0.0, -1.0], [-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])  # front, left, right, rear: the front is seen first
+OUTWARD = np.array([[0.0, -1.0], [-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])  # front, left, right, rear: the front is the most visible
 
 
 def plan(
     decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile, stops: Sequence[Stop] = ()
 ) -> MachineProgram:
-    """The machine program of a decomposition's sliced parts, in print order; parts without a path are left out.
+    """The machine program of a decomposition's sliced parts, in print order; parts without a path are omitted.
 
-    stops: where the print waits for a person. After the last part the table goes back to level, so that the next print's homing
-    finds it level, and the tip aside. Raises SliceError for a stop at a layer that is not there; MoveError: a point outside the
-    axis limits, or no safe place for the head while the table turns.
+    stops: where the print waits for the user. After the last part the table returns to level, for the next homing, and the tip
+    moves aside. Raises SliceError for a stop at a missing layer; MoveError for a point outside the axis limits, or without a safe
+    position of the head during a turn.
     """
     parts = {part.index: part for part in decomposition.parts}
     pieces = [piece for piece in sliced if any(len(layer) for layer in piece.layers)]
@@ -46,7 +45,7 @@ def plan(
     tip = Tip(profile, np.zeros(3), level(machine), join_hulls([]))
     printed: list[Printed] = []
     done: list[tuple[Part, SlicedPart]] = []
-    begins_level = bool(pieces) and parts[pieces[0].index].pose == tip.pose  # the line is on the plate as it was homed
+    begins_level = bool(pieces) and parts[pieces[0].index].pose == tip.pose  # the line is on the plate in its homed pose
     lanes = purge_lanes(decomposition.parts, pieces, profile) if begins_level else None
     stopped = stops_by_layer(stops, pieces)
     for piece in pieces:
@@ -73,8 +72,8 @@ def plan(
 
 
 def _print_layers(tip: Tip, part: Part, piece: SlicedPart, shift: Floats, stopped: Mapping[tuple[int, int], bool]) -> None:
-    """The layers of a part and the stops before them. shift: (3,) from the part's frame to the machine's; stopped: (part, layer)
-    before which the print waits -> whether for another filament."""
+    """Print the layers of a part with the stops before them. shift: (3,) from the part's frame to the machine's; stopped: (part,
+    layer) -> whether to change the filament before it."""
     for number, layer in enumerate(piece.layers, start=1):
         if (part.index, number) in stopped:
             _stop(tip, Pause(part.index, number, stopped[part.index, number]))
@@ -85,15 +84,15 @@ def _print_layers(tip: Tip, part: Part, piece: SlicedPart, shift: Floats, stoppe
 
 
 def _outline(part: Part, piece: SlicedPart, shift: Floats, machine: Machine) -> Printed:
-    """The hull of a printed part in the workpiece frame, half its widest bead around it."""
+    """The hull of a printed part in the workpiece frame, plus half its widest bead."""
     widest_mm = max(float(layer.width_mm.max(initial=0.0)) for layer in piece.layers)
     corners = hull(piece.points_mm, 0.0).points_mm + shift
     return hull(workpiece_points(machine, part.pose, corners), 0.5 * widest_mm)
 
 
 def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> float:
-    """Z of the way across to the first part, over the purge line; lanes: (n, 3) machine points of it.
-    Where the start block leaves the tip is not known: the first two travels stand for going up, then across."""
+    """Travel to the first part, over the purge line; returns Z of the crossing. lanes: (n, 3) machine points of the line. The
+    tip's position after the start block is unknown: the first two travels represent going up, then across."""
     machine, near = tip.profile.machine, target if lanes is None else lanes[0]
     most = machine.z.limits_mm[1]
     tip.at_mm = np.array([*near[:2], min(obstacle_top_mm(machine, None, tip.pose) + machine.lift_mm, most)])
@@ -117,12 +116,12 @@ def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None) -> f
 
 
 def _go_down(tip: Tip, target: Floats, across_z_mm: float) -> None:
-    """Up to a height, across to above a target, and down."""
+    """Travel up to a height, across to above a target, and down."""
     go(tip, [*tip.at_mm[:2], across_z_mm], [*target[:2], across_z_mm], target)
 
 
 def _turned(tip: Tip, pose: Pose, target: Floats | None, part: int) -> float:
-    """Retract, go to a stand over all that may be higher, and turn the table; Z of the way across to the target from there."""
+    """Retract, move to a stand above everything that may be higher, and turn the table; returns Z of the crossing to the target."""
     retract(tip)
     machine, turn = tip.profile.machine, Turn(tip.pose, pose, tip.at_mm, target)
     if tip.has_limbs:
@@ -143,8 +142,7 @@ def _turn(tip: Tip, pose: Pose) -> None:
 
 
 def _stop(tip: Tip, pause: Pause) -> None:
-    """Retract and go straight up, above all of table and cradle as far as Z allows: a firmware may then move the head aside.
-    The tip rises above all that may be higher."""
+    """Retract and rise as far above table, cradle and print as Z allows, for a firmware that may then move the head aside."""
     machine = tip.profile.machine
     retract(tip)
     z = max(float(tip.at_mm[2]), obstacle_top_mm(machine, None, tip.pose)) + machine.lift_mm
@@ -155,7 +153,7 @@ def _stop(tip: Tip, pause: Pause) -> None:
 
 
 def _finish(tip: Tip, part: int) -> None:
-    """Retract, bring the table back to level, and go aside: a hot tip drips where it stands, and the print is to be taken off."""
+    """Retract, turn the table back to level, and move aside: a hot tip oozes, and the print must be accessible."""
     machine, printed = tip.profile.machine, tip.printed
     retract(tip)
     home = level(machine)
@@ -169,9 +167,9 @@ def _finish(tip: Tip, part: int) -> None:
 
 
 def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Floats | None:
-    """(n, 3) machine points of the line, in one lane or folded into up to four, along the plate's edge; None: there is no room.
+    """(n, 3) machine points of the purge line along the plate's edge, in one to four lanes; None without space for it.
 
-    It keeps off everything that any part prints near the plate, and the head off the cradle.
+    It stays clear of everything that any part prints near the plate, and the head of the cradle.
     """
     machine, length_mm = profile.machine, profile.machine.purge_mm
     if length_mm <= 0.0:
@@ -191,7 +189,7 @@ def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Pr
 
 
 def has_purge(program: MachineProgram) -> bool:
-    """Whether a program prints the line."""
+    """Whether a program prints a purge line."""
     return bool((program.what == NUMBER[Kind.PURGE]).any())
 
 
@@ -203,7 +201,7 @@ def _low_strokes(parts: Sequence[Part], sliced: Sequence[SlicedPart], machine: M
         ends = np.cumsum(np.concatenate([np.diff(layer.starts) for layer in piece.layers])) - 1
         placed = workpiece_points(machine, part.pose, piece.points_mm + part_shift(machine, part.pose, part.base.offset_mm))
         low = np.minimum(placed[:-1, 2], placed[1:, 2]) < LOW_MM
-        low[ends[:-1]] = False  # nothing leads from a stroke's last point to the next stroke
+        low[ends[:-1]] = False  # a stroke's last point does not lead to the next stroke
         beads.append(np.stack([placed[:-1][low, :2], placed[1:][low, :2]], axis=1))
     return np.concatenate(beads)
 
@@ -227,7 +225,7 @@ def _lanes(machine: Machine, outward: Floats, count: int, length_mm: float, widt
 
 
 def _touches(beads: Floats, lanes: Floats, gap_mm: float) -> bool:
-    """Whether any bead meets the lanes' box grown by a gap."""
+    """Whether any bead meets the lanes' bounding box grown by a gap."""
     low, high = lanes.min(axis=0) - gap_mm, lanes.max(axis=0) + gap_mm
     begin, step = beads[:, 0], beads[:, 1] - beads[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,10 +1,10 @@
-"""Stand: where the tip stands while the table turns, during a pause and when the print is done, how high, and the ways there.
+"""Stand: position and height of the tip during a turn of the table, a pause and after the print, and the ways there.
 
-A park position is straight up along the nozzle, where the print stopped, and aside at a height above which nothing stands.
-A route of a turn: straight up, across to the stand, the table turns, across to above the next part's first point, straight down.
-For every stand the least safe height follows from separating directions in closed form; the stand with the quickest route is
-taken. Safe means that through the whole turn every body of the head keeps lift_mm (or clearance_mm, where that is more) from
-plate, cradle and print, swept: between two poses that are tried each reach is bounded by its greater end and the sagitta.
+A park position is straight up along the nozzle, and aside at a height above everything. A route of a turn: straight up, across to
+the stand, turn, across to above the next part's first point, straight down. For every stand the least safe height follows from
+separating directions in closed form; the stand with the fastest route is taken. Safe means that during the whole turn every body
+of the head keeps lift_mm (or clearance_mm, if greater) from plate, cradle and print, swept: between two sampled poses each reach
+is bounded by its greater end and the sagitta.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,9 +24,9 @@ from profiles.errors import MoveError
 from profiles.machine import Machine
 from slicer.estimate.timing import Speeds, move_times
 
-ASIDE_MM = 1.0  # free at the ends of the axes
-BESIDE_MM = 20.0  # from the outline of a finished print: what drips falls beside it, and a hand can reach it
-PARTS = 4  # number of pieces in which a way is tried when it is not clear as a whole
+ASIDE_MM = 1.0  # margin at the ends of the axes
+BESIDE_MM = 20.0  # from the outline of a finished print: ooze falls beside it, and a hand can reach it
+PARTS = 4  # number of pieces in which a way is tested when it is not clear as a whole
 STEP_DEG = 0.5
 MOST_STEPS = 1500
 STANDS = 7
@@ -37,7 +37,7 @@ COARSE = 16
 
 @dataclass(frozen=True)
 class Park:
-    """Axis positions, mm: the tip goes up to lift_mm and from there to stand_mm; the same place twice where it stays."""
+    """Axis positions, mm: the tip rises to lift_mm and moves to stand_mm; both equal if it stays there."""
 
     lift_mm: tuple[float, float, float]
     stand_mm: tuple[float, float, float]
@@ -46,9 +46,9 @@ class Park:
 def find_park_position(
     machine: Machine, printed: Printed, at_mm: Floats, pose: Pose, stands: Sequence[tuple[float, float]] = ()
 ) -> Park | None:
-    """Where to wait when the tip stands at at_mm (axis positions X Y Z); None when no way up is proved clear.
+    """A park position for a tip at at_mm (axis positions X Y Z); None when no way up is proved clear.
 
-    stands: X, Y of the places that may be chosen besides the corners of the axes; the nearest is.
+    stands: X, Y of possible places besides the corners of the axes; the nearest is taken.
     """
     x, y, z = (float(value) for value in at_mm)
     most = machine.z.limits_mm[1]
@@ -70,7 +70,7 @@ def find_park_position(
 
 
 def beside(machine: Machine, printed: Printed, at_mm: Floats, pose: Pose) -> list[tuple[float, float]]:
-    """X, Y beside a finished print, as far as the axes reach: straight out of its outline to each side, or where the tip is."""
+    """X, Y beside a finished print within the axes' reach: straight out of its outline to each side, or the tip's own if outside."""
     x, y = (float(value) for value in at_mm[:2])
     right, back, left, front = printed.reach(machine, pose, np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]))
     outline = ((-left, right), (-front, back))
@@ -91,16 +91,16 @@ def obstacle_top_mm(machine: Machine, printed: Printed | None, pose: Pose) -> fl
 
 
 def over_print_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
-    """Z at which the tip clears all that is printed, wherever it goes at a pose."""
+    """Z at which the tip clears the whole print at a pose."""
     return float(printed.reach(machine, pose, UP[None])[0]) + machine.clearance_mm
 
 
 def is_way_clear(
     machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None, parts: int = 1
 ) -> bool:
-    """True when each body of the head keeps its clearance from table, cradle and print while the tip goes from start to end.
+    """Whether each body of the head keeps its clearance from table, cradle and print while the tip moves from start to end.
 
-    The way is checked in `parts` pieces: a direction that separates body and solid is easier to find for a short piece.
+    The move is tested in `parts` pieces: a separating direction is easier to find for a short piece.
     """
     tried = directions(rotation(machine, pose) @ UP)
     shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
@@ -115,9 +115,9 @@ def is_way_clear(
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """A turn of the table on the way of the tip from one place to another, machine X Y Z; target_mm None: the turn is its end.
+    """A turn of the table while the tip goes from one place to another, machine X Y Z; target_mm None: the move ends with it.
 
-    least_z_mm: least Z of the ways across before and after the turn, where something printed may be higher than both places.
+    least_z_mm: least Z of the crossings before and after the turn, for prints higher than both places.
     """
 
     start: Pose
@@ -129,9 +129,9 @@ class Turn:
 
 @dataclass(frozen=True)
 class Route:
-    """The tip stands at X, Y of over_mm and at z_mm while the table turns, and crosses to the next part at across_z_mm.
+    """The tip waits at X, Y of over_mm and at z_mm during the turn, and crosses to the next part at across_z_mm.
 
-    seconds: for all moves of the way, the turn itself left out.
+    seconds: of all moves without the turn.
     """
 
     over_mm: tuple[float, float]
@@ -141,17 +141,18 @@ class Route:
 
 
 def poses_between(start: Pose, end: Pose, step_deg: float = STEP_DEG) -> list[Pose]:
-    """Poses from start to end, both included, both axes in proportion, step_deg apart (farther when they would be too many)."""
+    """Poses from start to end, both included, with both axes in proportion, step_deg apart (more if too many)."""
     tilt, turn = end.tilt_deg - start.tilt_deg, end.turn_deg - start.turn_deg
     count = min(max(1, ceil(hypot(tilt, turn) / step_deg)), MOST_STEPS)
     return [Pose(start.tilt_deg + tilt * k / count, start.turn_deg + turn * k / count) for k in range(count + 1)]
 
 
 def least_z(machine: Machine, tried: Floats, reach: Floats, over_mm: tuple[float, float], every: int = 1) -> float:
-    """Least Z from which on upward the tip may stand at X, Y while solids reach (p, s, k) along (k, 3) directions; else infinite.
+    """Least Z above which the tip may stand at X, Y while solids reach (p, s, k) along (k, 3) directions; inf if none.
 
-    Along a direction d that leans upward the gap grows with Z, so each direction gives a least Z of its own.
-    every: take only every nth of the short turns, which gives a lower bound."""
+    Along an upward direction the gap grows with Z, so each direction gives a least Z of its own. every: use only every nth of the
+    short turns, which gives a lower bound.
+    """
     need_mm = max(machine.lift_mm, machine.clearance_mm)
     least_mm = np.array([body.least(tried) for body in bodies(machine)]) + tried[:, :2] @ np.array(over_mm)
     return float(_least_z(reach, every, need_mm, least_mm, np.ascontiguousarray(tried[:, 2])))
@@ -159,8 +160,8 @@ def least_z(machine: Machine, tried: Floats, reach: Floats, over_mm: tuple[float
 
 @kernel
 def _least_z(reach: Floats, every: int, need_mm: float, least_mm: Floats, up: Floats) -> float:
-    """The greatest Z that a body, a solid and a short turn ask for, each of them the least over all directions; a direction that
-    asks for no more than is known already settles them."""
+    """Kernel of least_z: maximum over bodies, solids and short turns of the minimum over directions. A direction that requires no
+    more than the maximum so far settles its combination."""
     highest, first = -inf, 0
     for body in range(len(least_mm)):
         for p in range(0, len(reach), every):
@@ -180,8 +181,8 @@ def _least_z(reach: Floats, every: int, need_mm: float, least_mm: Floats, up: Fl
 
 
 def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> tuple[Floats, Floats]:
-    """What turns under the head between two poses, print included: (k, 3) directions, those of some poses' normals and a field as
-    far as they do not point down; and (p, s, k) reaches of s solids along them, in p short turns."""
+    """Reach of everything that turns below the head between two poses, including the print: (k, 3) directions, and (p, s, k)
+    reaches of s solids in p short turns. The directions are those of some poses' normals and a field, without downward ones."""
     turning = poses_between(start, end)
     fans = [directions(rotation(machine, pose) @ UP)[:27] for pose in turning[:: max(1, len(turning) // TRIED)]]
     around = np.radians(np.arange(0.0, 360.0, 15.0))
@@ -196,10 +197,7 @@ def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> tuple[F
 
 
 def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Speeds) -> Route:
-    """The quickest safe route of a turn; part: that comes after it.
-
-    Raises MoveError when no stand is safe inside the axis limits.
-    """
+    """The fastest safe route of a turn; part: the part after it. Raises MoveError when no stand is safe within the axis limits."""
     tried, reach = sweep(machine, printed, turn.start, turn.end)
     best: Route | None = None
     lowest = inf
@@ -222,7 +220,7 @@ def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Spe
 
 
 def _at(over: tuple[float, float], least_z: float, turn: Turn, machine: Machine, speeds: Speeds) -> Route:
-    """The route that stands at a place as low as it may; the print just left and the one to come are crossed with clearance."""
+    """The route with the lowest stand at a place, clear of the finished print and of the next part."""
     z = max(least_z, turn.least_z_mm[0], min(float(turn.at_mm[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
     across = z
     if turn.target_mm is not None:
@@ -232,7 +230,7 @@ def _at(over: tuple[float, float], least_z: float, turn: Turn, machine: Machine,
 
 
 def stands(machine: Machine, turn: Turn) -> Iterator[tuple[float, float]]:
-    """Places to stand: where the tip is, above the next first point, half way, then a lattice over X and Y."""
+    """Candidate stands: the tip's place, above the next first point, half way, then a lattice over X and Y."""
     here = turn.at_mm[:2]
     there = here if turn.target_mm is None else turn.target_mm[:2]
     yield from ((float(x), float(y)) for x, y in (here, there, 0.5 * (here + there)))
@@ -240,7 +238,7 @@ def stands(machine: Machine, turn: Turn) -> Iterator[tuple[float, float]]:
 
 
 def way_s(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float], machine: Machine, speeds: Speeds) -> float:
-    """Seconds of a route; it stops between its moves."""
+    """Seconds of a route, with stops between its moves."""
     before, after = _places(turn, over, z_mm)
     steps = np.zeros((len(before) + len(after) - 2, 6))
     steps[:, :3] = np.diff(np.array([*before, *after[1:]]), axis=0)
@@ -250,7 +248,7 @@ def way_s(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float], mach
 
 
 def _places(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float]) -> tuple[list[Floats], list[Floats]]:
-    """Where the tip goes: up to the first of z_mm and to `over`; from there, turned, to the second of them, across, and down."""
+    """Points of a route: up to the first of z_mm and to `over`; after the turn, to the second of them, across, and down."""
     at, target = turn.at_mm, turn.target_mm
     stand = np.array([*over, z_mm[0]])
     before = [at, np.array([*at[:2], z_mm[0]]), stand]
@@ -260,10 +258,10 @@ def _places(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float]) ->
 
 
 def _ways_clear(candidate: Route, turn: Turn, machine: Machine) -> bool:
-    """True when the ways to the stand, at the first pose, and from it, at the second, keep off table and cradle.
+    """Whether the ways to the stand, in the first pose, and from it, in the second, are clear of table and cradle.
 
-    The print need not be tested: in either pose the ways across lie above it, and nothing is under the head where the tip
-    goes straight up or down.
+    The print need not be tested: in both poses the crossings are above it, and nothing is below the head where the tip moves
+    vertically.
     """
     halves = _places(turn, candidate.over_mm, (candidate.z_mm, candidate.across_z_mm))
     ways = [(pose, a, b) for pose, places in zip((turn.start, turn.end), halves, strict=True) for a, b in pairwise(places)]

@@ -1,4 +1,4 @@
-"""Stops: layers before which the print waits for a person, or for another filament."""
+"""Stops: layers before which the print waits for the user, or for another filament."""
 
 import re
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ WRITTEN = re.compile(r"(\d{1,6}):(?:(\d{1,6})|(\d{1,6}(?:\.\d{1,6})?)mm)")
 
 @dataclass(frozen=True)
 class Stop:
-    """Before which layer of a part (both from 1), or at which height above its base plane; change: for another filament."""
+    """Layer of a part (both from 1), or height above its base plane, before which to stop; change: for another filament."""
 
     part: int
     layer: int | None
@@ -25,18 +25,18 @@ class Stop:
 
     @property
     def option(self) -> str:
-        """The name of the option that asks for it."""
+        """Name of its command-line option."""
         return "filament-change" if self.change else "pause"
 
     @property
     def at(self) -> str:
-        """The value of the option: PART:LAYER or PART:HEIGHTmm."""
+        """Value of the option: PART:LAYER or PART:HEIGHTmm."""
         height = "" if self.height_mm is None else f"{self.height_mm:.6f}".rstrip("0").rstrip(".")
         return f"{self.part}:{f'{height}mm' if self.layer is None else self.layer}"
 
 
 def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ...]:
-    """The stops of the options --pause and --filament-change. Raises SliceError where one has another form."""
+    """The stops of the options --pause and --filament-change. Raises SliceError for another form."""
     stops = []
     for text, change in (*((text, False) for text in pauses), *((text, True) for text in changes)):
         match = WRITTEN.fullmatch(text.strip())
@@ -49,12 +49,12 @@ def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ..
 
 
 def parts_in_words(count: int) -> str:
-    """Which numbers parts have: "1 to 3"."""
+    """The numbers of parts: "1 to 3"."""
     return "1 alone" if count == 1 else f"1 to {count}"
 
 
 def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
-    """Raise SliceError for a stop in a part that does not exist. count: the number of parts."""
+    """Raise SliceError for a stop in a part that does not exist. count: number of parts."""
     for stop in stops:
         if stop.part > count:
             raise SliceError(
@@ -63,10 +63,7 @@ def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
 
 
 def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:
-    """(part, layer) before which the print stops -> whether for another filament.
-
-    Raises SliceError for a part or a layer that is not there.
-    """
+    """(part, layer) before which the print stops -> whether for another filament. Raises SliceError for a missing part or layer."""
     return {(stop.part, _layer_of(stop, sliced)): stop.change for stop in stops}
 
 
