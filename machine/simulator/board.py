@@ -1,4 +1,4 @@
-"""The board of a simulated printer: its build options, clock, motion, heaters and fan, and the orders it is given."""
+"""Board of a simulated printer: its build options, clock, motion, heaters and fan, and the orders it receives."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,20 +12,20 @@ from machine.simulator.contact import ProbedTable
 from machine.simulator.motion import Motion, WordValues
 from profiles.machine import Machine
 
-# None: done, answered with ok; a text: its own ok; else the virtual times at which a slow command wants to look again.
+# None: done, answered with ok; a text: a different ok; else the virtual times at which a slow command continues.
 Work = Iterator[float] | str | None
 Command = Callable[["Board", "Order"], Work]
 
 NOZZLE_S, BED_S = 60.0, 240.0  # time constants of a 40 W hot end and a 300 W plate
-EVENTS = 10000  # kept where the moves are not all kept either
+EVENTS = 10000  # kept when moves are limited too
 ROOM_C = 20.0
 GUARD_S, GUARD_C = 40.0, 4.0  # Marlin's THERMAL_PROTECTION_PERIOD and _HYSTERESIS
-WATCH_S = 40.0  # Marlin's WATCH_TEMP_PERIOD: a heater that has a target must have become warmer by then
-CALM_C = 1.0  # as near to its target a heater counts as there
+WATCH_S = 40.0  # Marlin's WATCH_TEMP_PERIOD: a heater with a target must have become warmer by then
+CALM_C = 1.0  # a heater this near to its target has reached it
 
 
 class Order(NamedTuple):
-    """A command as words.split_command parts it into name and rest."""
+    """A command split into name and rest by words.split_command."""
 
     name: str
     rest: str
@@ -37,7 +37,7 @@ class Order(NamedTuple):
 
     @property
     def words(self) -> WordValues:
-        """Its words; a text that is shown has none."""
+        """Its words; empty for a displayed text."""
         return {} if self.name in MESSAGES else dict(read_words(self.rest))
 
     @property
@@ -54,44 +54,44 @@ class BuildOptions:
     emergency_parser: bool = True
     busy: bool = True
     autoreport: bool = True
-    rx_ring: int | None = None  # bytes of a UART's receive ring that overflows; None: USB, which waits
+    rx_ring: int | None = None  # bytes of a UART's receive ring, which may overflow; None: USB, which waits
     realtime: bool = False  # Marlin's REALTIME_REPORTING_COMMANDS
     geometry: bool = True  # its M115_GEOMETRY_REPORT
     waits: bool = False  # its NO_TIMEOUTS, `wait` every second when idle
     resend_ok: bool = True  # an `ok` follows each Resend (Smoothieware has none)
-    must_home: bool = False  # X Y Z are not moved before they are homed (Klipper, RRF, Marlin's NO_MOTION_BEFORE_HOMING)
-    home_start: bool = True  # after a restart it believes itself at its home positions as Marlin does, otherwise at 0 0 0
+    must_home: bool = False  # X Y Z do not move before homing (Klipper, RRF, Marlin's NO_MOTION_BEFORE_HOMING)
+    home_start: bool = True  # after a restart it assumes its home positions as Marlin does, otherwise 0 0 0
     checksums: bool = False  # lines without number and checksum are refused
-    queue: int | None = None  # Marlin's BUFSIZE, lines kept before the one at work is done; None: its default
+    queue: int | None = None  # Marlin's BUFSIZE, lines queued behind the current one; None: its default
 
 
 def build_options(machine: Machine, baud: int | None) -> BuildOptions:
-    """The usual build: USB without a baud rate, with one a UART whose ring is machine.receive_bytes."""
+    """The usual build: USB without a baud rate, else a UART whose ring is machine.receive_bytes."""
     return BuildOptions(rx_ring=machine.receive_bytes if baud else None)
 
 
 class Heater:
-    """Temperature as a closed formula of time since the last order."""
+    """A heater whose temperature is a closed formula of the time since the last order."""
 
     def __init__(self, name: str, limit_c: float, time_constant_s: float) -> None:
         self.name = name
         self.target_c = 0.0
         self._limit_c = limit_c
-        self._ceiling_c = 1.3 * limit_c + 50.0  # where full power would end: the limit is reached in finite time
+        self._ceiling_c = 1.3 * limit_c + 50.0  # final temperature at full power: the limit is reached in finite time
         self._time_constant_s = time_constant_s
         self._from_c, self._since_s = ROOM_C, 0.0
         self._failed = False
-        self.trip_s = inf  # when the firmware's guard will see that it does not heat
+        self.trip_s = inf  # when the firmware's protection detects that it does not heat
         self.trip = ""
 
     def set(self, target_c: float, now_s: float) -> None:
-        """A new target, deg C, kept between 0 and the limit as the firmware does."""
+        """Set a target, deg C, limited like the firmware does."""
         self._from_c, self._since_s = self.at(now_s), now_s
         self.target_c = min(max(target_c, 0.0), self._limit_c)
         self._guard(now_s)
 
     def fail(self, now_s: float) -> None:
-        """From now on it gives no heat whatever its target: a cartridge that fell out."""
+        """Stop heating whatever the target, like a cartridge that fell out."""
         self._from_c, self._since_s = self.at(now_s), now_s
         self._failed = True
         self._guard(now_s)
@@ -103,7 +103,7 @@ class Heater:
         return min(free, stop) if goal > self._from_c else max(free, stop)
 
     def reaches(self, value_c: float) -> float:
-        """The time at which the temperature passes value_c on its way, s; inf when it never does."""
+        """Time at which the temperature passes value_c, s; inf for never."""
         goal, stop = self._goal()
         low, high = sorted((self._from_c, stop))
         if not low <= value_c <= high or value_c == goal:
@@ -116,7 +116,7 @@ class Heater:
         return (self._ceiling_c if stop > self._from_c else ROOM_C), stop
 
     def _guard(self, now_s: float) -> None:
-        """When Marlin's thermal protection would stop a heater that gives no heat, and with which words."""
+        """Set when Marlin's thermal protection would stop a failed heater, and its message."""
         self.trip_s, self.trip = inf, ""
         if not self._failed or self.target_c <= ROOM_C:
             return
@@ -127,10 +127,9 @@ class Heater:
 
 
 class Board:
-    """Motion, heaters and fan of the printer. now_s is virtual; say() adds a line to the answers. kept_moves: kept on record,
-    None: all.
+    """Motion, heaters and fan of the printer. now_s is virtual; say() adds a line to the answers.
 
-    table: what a probe meets; None: the machine has no probe.
+    kept_moves: number of moves to record, None: all. table: the probed surface; None: the machine has no probe.
     """
 
     def __init__(
@@ -158,16 +157,16 @@ class Board:
         self.forget()
 
     def forget(self) -> None:
-        """The board restarts."""
+        """Reset the state, as by a restart of the board."""
         self.powered, self.must_home = True, self.build.must_home
         self.idle_after_s = self.rules.idle_after_s
-        self.awake_s = 0.0  # what is no move has kept the motors on until then
+        self.awake_s = 0.0  # the last time that something other than a move kept the motors on
         self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = self.homes = False
         self.report_every_s = self.position_every_s = 0.0
         self.report_s = self.position_s = inf
 
     def note(self, what: str, trouble: bool = False) -> None:
-        """Put an event on record; trouble: it is none that a program asks for."""
+        """Record an event; trouble: one that no program causes."""
         self.events.append((self.now_s, what))
         if trouble:
             self.troubles.append((self.now_s, what))
@@ -175,7 +174,7 @@ class Board:
             del self.events[: self._most_events]
 
     def refuse(self, text: str) -> None:
-        """Say that a command is not known."""
+        """Report an unknown command."""
         self.unknown += 1
         self.say(self.rules.unknown.format(text))
 
@@ -185,7 +184,7 @@ class Board:
         return self.rules.temperatures(nozzle.at(self.now_s), nozzle.target_c, bed.at(self.now_s), bed.target_c)
 
     def position(self) -> str:
-        """The answer to M114 as the firmware writes it."""
+        """The firmware's answer to M114."""
         motion = self.motion
         coordinates = dict(zip(motion.letters, motion.coordinates(), strict=True))
         steps = dict(zip(motion.letters, motion.counts(self.now_s), strict=False))
@@ -196,7 +195,7 @@ class Board:
 
     @property
     def idle_s(self) -> float:
-        """When the firmware lets its motors go if nothing moves before; inf: never."""
+        """When the firmware switches idle motors off; inf: never."""
         motion = self.motion
         if not motion.energised:
             return inf
@@ -205,9 +204,9 @@ class Board:
         return since_s + self.idle_after_s
 
     def idle(self) -> None:
-        """The idle time is over: motors off, and heaters where the firmware shuts down."""
+        """End of the idle time: motors off, and heaters if the firmware shuts down."""
         self.motion.planner.run(self.now_s)
-        if self.idle_s > self.now_s:  # a move that was planned has begun meanwhile
+        if self.idle_s > self.now_s:  # a planned move has begun meanwhile
             return
         self.let_go(range(self.rules.idle_axes))
         if self.rules.idle_shuts_down:
@@ -217,7 +216,7 @@ class Board:
             self.must_home = True
 
     def let_go(self, axes: Sequence[int]) -> None:
-        """Motors off."""
+        """Switch motors off."""
         self.motion.let_go(axes)
         self.note("motors off")
 
@@ -230,7 +229,7 @@ class Board:
 
 
 def wait_for_moves(board: Board) -> Iterator[float]:
-    """Until all planned moves are over."""
+    """Wait until all planned moves are over."""
     planner = board.motion.planner
     while (next_s := planner.next_s()) < inf:
         if next_s > board.now_s:

@@ -1,4 +1,4 @@
-"""The cable between host and simulated printer: carries bytes both ways and lets the faults of a script happen to them."""
+"""Cable between host and simulated printer: carries bytes both ways and injects the faults of a script."""
 
 import random
 from collections import deque
@@ -13,11 +13,11 @@ from machine.simulator.firmware import SimulatedFirmware
 
 ERROR = "Error:Heating failed, system stopped! Heater_ID: 0"
 GARBAGE_BYTES = 20
-LATE_S = 1e-9  # the firmware is asked this much late, because a clock in another unit is rounded
+LATE_S = 1e-9  # the firmware is called this much late, because a clock in another unit is rounded
 
 
 class _FaultQueue:
-    """The places where faults that count the same unit strike, in order."""
+    """Places at which faults with the same unit strike, in order."""
 
     def __init__(self, script: FaultScript, unit: Unit, to_host: bool | None = None) -> None:
         chosen = [k for k, fault in enumerate(script.faults) if fault.counted == unit and to_host in (None, fault.to_host)]
@@ -29,7 +29,7 @@ class _FaultQueue:
         return self._next is not None
 
     def before(self, end: int) -> Iterator[tuple[int, Fault]]:
-        """Places below `end` with their faults; they are used up."""
+        """Places below `end` with their faults, which are consumed."""
         while self._next is not None and self._next[0] < end:
             place, index = self._next
             self._next = next(self._strikes, None)
@@ -37,7 +37,7 @@ class _FaultQueue:
 
 
 class _Direction:
-    """One direction of the cable: bytes carried so far, the faults to come, and what is held back until a time."""
+    """One direction of the cable: number of bytes carried, pending faults, and bytes held back until a time."""
 
     def __init__(self, faults: _FaultQueue) -> None:
         self.faults = faults
@@ -50,7 +50,7 @@ class _Direction:
             self._held.append((self.open_s, data))
 
     def take(self, now_s: float) -> bytes:
-        """The bytes that have arrived by now; order is kept, so one late byte holds up all behind it."""
+        """The bytes that have arrived by now; a late byte delays all after it, for order is kept."""
         out = []
         while self._held and self._held[0][0] <= now_s:
             out.append(self._held.popleft()[1])
@@ -65,10 +65,10 @@ class _Direction:
 
 
 class Cable:
-    """exchange() is one turn: the host's bytes travel to the firmware, it works, its answers travel back.
+    """exchange() is one turn: the host's bytes reach the firmware, it works, its answers return.
 
-    now_s is the cable's own clock, in which delays, stalls and disconnections are counted; speed: how many seconds pass for the
-    firmware in one of it, inf: its clock jumps over every wait.
+    now_s is the cable's own clock, for delays, stalls and disconnections; speed: seconds of the firmware per second of it, inf:
+    the firmware's clock skips every wait.
     """
 
     def __init__(self, firmware: SimulatedFirmware, script: FaultScript | None = None, speed: float = inf) -> None:
@@ -88,19 +88,19 @@ class Cable:
             firmware.watch = self._watch
 
     def connected(self, now_s: float) -> bool:
-        """False while the cable is out."""
+        """Whether the cable is plugged in."""
         return now_s >= self._back_s
 
     def blocked(self, now_s: float) -> bool:
-        """Whether the printer reads nothing, so that the host's writing comes to a halt."""
+        """Whether the printer reads nothing."""
         return now_s < self._blocked_s
 
     def reads_nothing(self, now_s: float) -> bool:
-        """Whether the host's bytes are left where they are, so that its writing comes to a halt."""
+        """Whether the host's bytes are not read, so that its writes block."""
         return self._firmware.full or (self.blocked(now_s) and not self._firmware.has_ring)
 
     def clear(self) -> None:
-        """Nothing is on its way between two turns."""
+        """Do nothing: no bytes are under way between two turns."""
 
     def due_s(self, now_s: float) -> float:
         """When something happens without further bytes, on the cable's clock; inf: never."""
@@ -121,7 +121,7 @@ class Cable:
         return self._out.take(now_s) if self.connected(now_s) else b""
 
     def _work(self, now_s: float, until_s: float) -> None:
-        """Let the firmware work, then on what has arrived; while it is blocked its ring fills, if it has one."""
+        """Let the firmware work, then process what has arrived; while it is blocked only its ring, if any, fills."""
         if self.blocked(now_s):
             if self._firmware.has_ring:
                 self._firmware.receive(self._in.take(now_s))
@@ -133,7 +133,7 @@ class Cable:
         self._advance(now_s, until_s)
 
     def _advance(self, now_s: float, until_s: float) -> None:
-        """A fault at a line strikes before the line begins."""
+        """Advance the firmware; a fault at a line strikes before the line begins."""
         while True:
             answers = self._firmware.advance(until_s)
             if self.connected(now_s):
@@ -151,7 +151,7 @@ class Cable:
         return bool(self._struck)
 
     def _carry(self, data: bytes, direction: _Direction, now_s: float, until_s: float = inf) -> None:
-        """Hand bytes to a direction, damaged where a fault is due."""
+        """Pass bytes to a direction, damaged where a fault is due."""
         begin, direction.count, done = direction.count, direction.count + len(data), 0
         for strike, fault in direction.faults.before(direction.count):
             at = max(strike - begin, 0)
@@ -197,7 +197,7 @@ class Cable:
             self._carry(line if wanted is None else _damaged_ok(wanted, line), self._out, now_s)
 
     def _strike(self, fault: Fault, now_s: float) -> None:
-        """Let a fault happen that is no damage to passing bytes."""
+        """Inject a fault other than damage to passing bytes."""
         kind, until_s = fault.kind, now_s + fault.seconds
         if kind in ("reset", "silent reset"):
             self._firmware.reset(kind == "reset")
@@ -219,7 +219,7 @@ class Cable:
             self._out.put(self._spurious_bytes(fault))
 
     def _spurious_bytes(self, fault: Fault) -> bytes:
-        """Bytes that come to the host although the firmware has not sent them."""
+        """Bytes for the host that the firmware has not sent."""
         if fault.kind == "spurious resend":
             number = max(1, self._firmware.last_number - self._rng.randint(0, 8)) if fault.value is None else fault.value
             return b"Resend: %d\nok\n" % number
@@ -229,24 +229,24 @@ class Cable:
 
 
 def _damaged_ok(fault: Fault, line: bytes) -> bytes:
-    """The bytes of a damaged `ok` that arrive."""
+    """The remaining bytes of a damaged `ok`."""
     return {"swallow ok": b"", "truncate ok": b"o\n", "double ok": line + line}[fault.kind]
 
 
-ADAPTER_BYTES = 512  # what a USB adapter keeps (CH340, FTDI: 128 to 512)
+ADAPTER_BYTES = 512  # buffer of a USB adapter (CH340, FTDI: 128 to 512)
 
 
 class _Wire:
-    """One direction: bytes leave one after the other, each as long as the baud rate says."""
+    """One direction of a UART: bytes leave one by one at the baud rate."""
 
     def __init__(self, byte_s: float) -> None:
         self._byte_s = byte_s
         self._bytes = bytearray()
-        self._first_s = 0.0  # when the first of the bytes will have arrived
-        self._free_s = 0.0  # when the last byte of all has left
+        self._first_s = 0.0  # arrival of the first of the bytes
+        self._free_s = 0.0  # departure of the last byte
 
     def put(self, data: bytes, now_s: float) -> None:
-        """Bytes that are handed over at a time."""
+        """Add bytes at a time."""
         if data:
             if not self._bytes:
                 self._first_s = max(now_s, self._free_s) + self._byte_s
@@ -264,7 +264,7 @@ class _Wire:
         return arrived
 
     def clear(self) -> None:
-        """The bytes on their way are lost."""
+        """Drop the bytes under way."""
         self._bytes.clear()
         self._free_s = 0.0
 
@@ -272,7 +272,7 @@ class _Wire:
         return len(self._bytes)
 
     def line_s(self) -> float:
-        """When the next newline will have arrived, or the last byte where none comes; inf: nothing is on its way."""
+        """Arrival of the next newline, or of the last byte without one; inf: nothing is under way."""
         if not self._bytes:
             return inf
         end = self._bytes.find(b"\n")
@@ -280,12 +280,12 @@ class _Wire:
 
 
 class Uart:
-    """exchange() as of a Cable, at a baud rate: what arrives when depends on the bytes' own time, not on how often it is called.
+    """A cable at a baud rate; arrival times depend on the bytes' duration, not on how often exchange() is called.
 
-    Between two calls everything happens at the moment it would on a real line: the printer gets a line when its newline
-    has arrived, its answer sets out then, and an `ok` that waits for a free place of the planner when that is free. While
-    it says something it reads nothing (Marlin's TX_BUFFER_SIZE is 0), only its receive ring fills. Flow is not controlled: what
-    the ring (BuildOptions.rx_ring) cannot hold is lost.
+    Between two calls everything happens when it would on a real line: the printer gets a line when its newline has arrived, its
+    answer starts then, and an `ok` waiting for a free place of the planner when that is free. While it sends it reads nothing
+    (Marlin's TX_BUFFER_SIZE is 0), only its receive ring fills. There is no flow control: what exceeds the ring
+    (BuildOptions.rx_ring) is lost.
     """
 
     def __init__(self, cable: Cable, baud: int) -> None:
@@ -311,21 +311,21 @@ class Uart:
         return min(self._next_s(), self._out.line_s())
 
     def reads_nothing(self, now_s: float) -> bool:
-        """Whether an adapter's own buffer would take no more bytes of the host."""
+        """Whether an adapter's own buffer is full."""
         del now_s
         return len(self._in) >= ADAPTER_BYTES
 
     def _next_s(self) -> float:
-        """When the printer is next given something, or does something by itself."""
+        """When the printer next receives or sends something."""
         return max(self._now_s, self._sends_until_s, min(self._in.line_s(), self._cable.due_s(self._now_s)))
 
     def clear(self) -> None:
-        """Forget what is on its way: the cable is out."""
+        """Drop everything under way, when the cable is unplugged."""
         self._in.clear()
         self._out.clear()
 
     def _exchange_at(self, at_s: float) -> None:
-        """The printer gets what has arrived by a time and answers."""
+        """Deliver what has arrived by a time, and answer."""
         self._now_s = at_s
         if answers := self._cable.exchange(self._in.take(at_s), at_s):
             self._out.put(answers, at_s)

@@ -1,6 +1,6 @@
-"""The commands that the simulated printers know: one table for all firmwares, what each of them lacks stands in its rules.
+"""Commands of the simulated printers: one table for all firmwares; their rules list what each lacks.
 
-A command gets the board and the order, and works at once or as an iterator of the virtual times at which it looks again.
+A command receives the board and the order, and works at once or as an iterator of the virtual times at which it continues.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -16,20 +16,19 @@ from machine.simulator.motion import WordValues
 
 COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
 NEAR_C = 1.0  # Marlin's TEMP_WINDOW: a heater within it has arrived
-REPORT_S = 1.0  # Marlin reports temperatures so often while it waits for heat
+REPORT_S = 1.0  # Marlin's interval of temperature reports while it waits for heat
 CAPABILITIES = (
     "SERIAL_XON_XOFF BINARY_FILE_TRANSFER EEPROM VOLUMETRIC AUTOREPORT_POS AUTOREPORT_TEMP PROGRESS PRINT_JOB AUTOLEVEL Z_PROBE "
     "SOFTWARE_POWER EMERGENCY_PARSER HOST_ACTION_COMMANDS SDCARD REPORTING MOTION_MODES ARCS BABYSTEPPING CHAMBER_TEMPERATURE"
 )
-THERE = ("PRINT_JOB", "SOFTWARE_POWER", "HOST_ACTION_COMMANDS", "ARCS")  # beside those that the build decides
+THERE = ("PRINT_JOB", "SOFTWARE_POWER", "HOST_ACTION_COMMANDS", "ARCS")  # besides those that depend on the build
 ENDSTOP_MM = 0.01
 
 
 def command_of(board: Board, name: str) -> Command | None:
-    """The function of a command; None: the firmware does not know it. Names without a number are macros, which few firmwares
-    take.
+    """The function of a command or macro; None if the firmware does not know it.
 
-    HOME_AB and the like are macros of a machine's own.
+    HOME_AB and the like are macros that machines define.
     """
     if name[1:2].isdigit():
         return None if name in board.rules.lacks else COMMANDS.get(name)
@@ -40,7 +39,7 @@ def command_of(board: Board, name: str) -> Command | None:
 
 
 def move(board: Board, words: WordValues) -> Work:
-    """G0, G1; the caller has made sure of a free block."""
+    """Execute G0 or G1; the caller has ensured a free block."""
     motion = board.motion
     if board.must_home and (unhomed := motion.unhomed(words)) is not None:
         board.say(board.rules.unhomed.format(_coordinates(unhomed)))
@@ -59,7 +58,7 @@ def move(board: Board, words: WordValues) -> Work:
 
 
 def _pushes(board: Board, words: WordValues) -> bool:
-    """Whether its filament is pushed too; when the nozzle is too cold for it, that is said."""
+    """Whether filament is pushed; if the nozzle is too cold, the firmware says so."""
     if "E" not in words or board.cold_allowed or board.nozzle.at(board.now_s) >= COLD_C or not board.motion.pushes(words):
         return True
     for line in board.rules.cold:
@@ -74,7 +73,7 @@ def _coordinates(coordinates: Sequence[float]) -> str:
 
 
 def _run(board: Board, pieces: Sequence[Sequence[float]]) -> Iterator[float]:
-    """Piece after piece, each waiting for a free block."""
+    """Plan piece after piece, each waiting for a free block."""
     motion, halts = board.motion, board.motion.halts
     for piece in pieces:
         while not motion.planner.free(board.now_s):
@@ -147,7 +146,7 @@ def _seek_endstops(board: Board, axes: Sequence[int]) -> Iterator[float]:
 
 
 def _probe(board: Board, order: Order) -> Iterator[float]:
-    """G38.3: down to a Z or to contact, as Marlin's gcode/probe/G38.cpp and RepRapFirmware's straight probe do."""
+    """G38.3: down to a Z or to contact, as in Marlin's gcode/probe/G38.cpp and RepRapFirmware's straight probe."""
     if board.table is None:
         board.refuse(order.text)
         return
@@ -156,7 +155,7 @@ def _probe(board: Board, order: Order) -> Iterator[float]:
 
 
 def _probe_by_macro(board: Board, order: Order) -> Iterator[float]:
-    """PROBE, as klippy/extras/probe.py and homing.py word it; the probe's own offset in the configuration is 0."""
+    """PROBE, with the answers of klippy/extras/probe.py and homing.py; the configured probe offset is 0."""
     if board.table is None:
         board.refuse("PROBE")
         return
@@ -178,7 +177,7 @@ def _probe_by_macro(board: Board, order: Order) -> Iterator[float]:
 
 
 def _seek_contact(board: Board, target: list[float], feed_mm_s: float | None = None) -> Generator[float, None, bool]:
-    """Move down to a target or until the probe triggers; whether it did."""
+    """Move down to a target or until the probe triggers; returns whether it did."""
     motion, table = board.motion, board.table
     assert table is not None
     real = motion.at(board.now_s)
@@ -194,7 +193,7 @@ def _seek_contact(board: Board, target: list[float], feed_mm_s: float | None = N
 
 
 def _turn(board: Board, order: Order) -> Iterator[float]:
-    """MANUAL_STEPPER: SYNC=0 begins a turn that goes on together with the next one."""
+    """MANUAL_STEPPER: SYNC=0 starts a turn together with the next one."""
     machine, values = board.machine, order.values
     axes = {stepper_name(machine.tilt): (3, machine.tilt), stepper_name(machine.turn): (4, machine.turn)}
     index, axis = axes.get(values.get("STEPPER", ""), (0, None))
@@ -232,7 +231,7 @@ def _number(order: Order, key: str, default: float = 0.0) -> float:
 
 
 def _wait_for_person(board: Board, order: Order) -> Iterator[float]:
-    """M0, M1: until M108, or for P milliseconds or S seconds."""
+    """M0, M1: wait for M108, or for P milliseconds or S seconds."""
     yield from wait_for_moves(board)
     seconds = _seconds(order.words)
     until_s = board.now_s + seconds if seconds > 0 else inf
@@ -266,7 +265,7 @@ def _rest(board: Board, order: Order) -> Iterator[float]:
 
 
 def _setting(change: Callable[[Board, WordValues], None] | None = None) -> Command:
-    """A command that tells what it stands at when it has no words of its own; M409 of RepRapFirmware names a key in them."""
+    """A command that reports its setting when it has no words; M409 of RepRapFirmware names a key in them."""
 
     def run(board: Board, order: Order) -> Work:
         if not order.words or order.name == "M409":
@@ -320,7 +319,7 @@ def _set_target(board: Board, heater: Heater, target_c: float | None) -> None:
 
 
 def _wait_for_heat(board: Board, heater: Heater, cooling: bool = False) -> Iterator[float]:
-    """Until a heater is at its target; cooling: also when it is hotter."""
+    """Wait for a heater's target; cooling: also when it is hotter."""
     rising = heater.target_c > heater.at(board.now_s)
     if not rising and not cooling:
         return
@@ -347,7 +346,7 @@ def _heat_and_wait(board: Board, order: Order) -> Iterator[float]:
 
 
 def _wait_for_all(board: Board, order: Order) -> Iterator[float]:
-    """M116 (RepRapFirmware)."""
+    """M116 (RepRapFirmware): wait for all heaters."""
     for heater in (board.bed, board.nozzle):
         _set_target(board, heater, heater.target_c)
         yield from _wait_for_heat(board, heater)
@@ -390,7 +389,7 @@ def _fan(board: Board, order: Order) -> Work:
 
 
 def _power(board: Board, order: Order) -> Work:
-    """M80, M81: without the power supply nothing heats; what moves is planned and does not matter."""
+    """M80, M81: without power nothing heats; moves are still planned, without effect."""
     board.powered = order.name == "M80"
     if not board.powered:
         board.off()
@@ -399,7 +398,7 @@ def _power(board: Board, order: Order) -> Work:
 
 
 def _identify_firmware(board: Board, order: Order) -> Work:
-    """M115: name, capabilities, and the axes' reach, the fourth axis on named i, j whatever their words are."""
+    """M115: name, capabilities, and the axes' reach, from the fourth axis as i, j whatever their letters are."""
     rules, build = board.rules, board.build
     name = rules.identity.format(axes=5 if board.machine.tilts else 3)
     if rules.identity_in_ok:
@@ -423,7 +422,7 @@ def _area(board: Board) -> str:
 
 
 def _autoreport(board: Board, order: Order) -> Work:
-    """M155 temperatures, M154 the position, every S seconds; 0: no more."""
+    """M155 temperatures, M154 the position, every S seconds; 0: off."""
     every_s = max(0.0, order.words.get("S", 0.0))
     next_s = board.now_s + every_s if every_s else inf
     if order.name == "M155":
@@ -443,7 +442,7 @@ def _keep_alive(board: Board, order: Order) -> Work:
 
 
 def _number_lines(board: Board, order: Order) -> Work:
-    """A bare M110: its N is the number of the last line."""
+    """Bare M110: its N is the number of the last line."""
     if "N" in order.words:
         board.number = int(order.words["N"])
     return None
@@ -460,7 +459,7 @@ def _send_to_host(board: Board, order: Order) -> Work:
 
 
 def _report_endstops(board: Board, order: Order) -> Work:
-    """M119: X and Y end at their least, Z at its greatest."""
+    """M119: X and Y end at their minimum, Z at its maximum."""
     board.say("Reporting endstop status")
     real = board.motion.at(board.now_s)
     for axis, (letter, side) in enumerate((("x", 0), ("y", 0), ("z", 1))):
@@ -474,7 +473,7 @@ def _nothing(board: Board, order: Order) -> Work:
     return None
 
 
-COMMANDS: dict[str, Command] = {  # beside G0 and G1, which wait for a free block
+COMMANDS: dict[str, Command] = {  # besides G0 and G1, which wait for a free block
     "G2": _arc,
     "G3": _arc,
     "G4": _dwell,

@@ -1,6 +1,6 @@
-"""Contact: what stands on the table of a true machine, which may differ from its profile, and the probe that senses it.
+"""Contact: the plate and ball of a true machine, which may differ from its profile, and the probe that senses them.
 
-A probe stops the tip on its way down, with the noise of a probe.
+A probe stops the tip on its way down, with noise.
 """
 
 import random
@@ -23,7 +23,7 @@ class TrueBall:
 
 
 def plate_z(machine: Machine, pose: Pose, x: float, y: float) -> float:
-    """Z at which a tip that comes down at X Y meets the plate; -inf beside it."""
+    """Z at which a tip lowered at X Y meets the plate; -inf beside it."""
     normal = rotation(machine, pose) @ UP
     middle = machine_points(machine, pose, np.zeros((1, 3)))[0]
     if normal[2] < 1e-3:
@@ -34,17 +34,16 @@ def plate_z(machine: Machine, pose: Pose, x: float, y: float) -> float:
 
 
 def ball_z(machine: Machine, ball: TrueBall, pose: Pose, x: float, y: float, flat_mm: float = 0.0) -> float:
-    """Z at which a tip meets the ball, -inf beside it; for a tip with a flat end of radius flat_mm: its nearer edge touches
-    first."""
+    """Z at which a tip meets the ball, -inf beside it. A flat end of radius flat_mm touches with its nearer edge."""
     centre = machine_points(machine, pose, np.array([ball.centre_mm]))[0]
     aside = max(hypot(x - centre[0], y - centre[1]) - flat_mm, 0.0)
     return float(centre[2]) + sqrt(ball.radius_mm**2 - aside**2) if aside < ball.radius_mm else -inf
 
 
 class ProbedTable:
-    """The plate of a true machine, with a ball on it or none, and what senses it.
+    """The plate of a true machine, with or without a ball, and its probe.
 
-    offset_mm: from the nozzle's tip to what touches; flat_mm: radius of its flat end. noise_mm: one sigma of a contact's height.
+    offset_mm: from the nozzle's tip to the contact; flat_mm: radius of its flat end. noise_mm: one sigma of a contact's height.
     """
 
     def __init__(
@@ -62,13 +61,13 @@ class ProbedTable:
         self._random = random.Random(seed)
 
     def surface_z(self, x: float, y: float, tilt_deg: float, turn_deg: float) -> float:
-        """Z at which what touches, coming down at X Y, meets plate or ball; -inf where it meets neither."""
+        """Z at which the contact, lowered at X Y, meets plate or ball; -inf for neither."""
         pose = Pose(tilt_deg, turn_deg)
         plate = plate_z(self.machine, pose, x, y)
         return plate if self.ball is None else max(plate, ball_z(self.machine, self.ball, pose, x, y, self.flat_mm))
 
     def stop_z(self, positions: list[float], low_mm: float) -> float:
-        """Z of the nozzle's tip when the probe stops a move down to low_mm: nan where it triggers at no time."""
+        """Z of the nozzle's tip when the probe stops a move down to low_mm; nan if it never triggers."""
         x, y, z, tilt, turn = positions
         met = self.surface_z(x + self.offset_mm[0], y + self.offset_mm[1], tilt, turn) - self.offset_mm[2]
         met += self._random.gauss(0.0, self.noise_mm) if self.noise_mm else 0.0

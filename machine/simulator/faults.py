@@ -1,4 +1,4 @@
-"""Fault scripts: what goes wrong on a serial line and in a printer, where or how often, the same at every run of a seed."""
+"""Fault scripts: reproducible faults of a serial line and a printer, at given places or by chance with a seed."""
 
 import random
 from collections.abc import Callable, Iterator, Mapping
@@ -26,17 +26,17 @@ KINDS = BYTE_KINDS + OK_KINDS + MOMENT_KINDS
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault, once at a place or again and again by chance."""
+    """A fault, once at a place or repeatedly by chance."""
 
     kind: Kind
-    # Bytes count from 0 in their direction, answers (lines the printer says) and lines (that the firmware begins) from 1.
+    # Bytes count from 0 in their direction, answers (the printer's lines) and lines (begun by the firmware) from 1.
     at: int | None = None
-    to_host: bool = False  # in the answers' bytes instead of the commands'
-    value: int | None = None  # which bit is flipped, or the line wrongly asked for; None: the seed decides
+    to_host: bool = False  # in the bytes of answers instead of commands
+    value: int | None = None  # the bit to flip, or the line requested wrongly; None: by the seed
     chance: float = 0.0  # instead of `at`, the probability at each place
-    unit: Unit | Literal[""] = ""  # what `at` counts, "": the kind's own (units_of)
-    seconds: float = inf  # how long a delay, a stall (nothing said), a block (nothing read), a disconnection lasts
-    text: str = ""  # what is said instead of the kind's own words
+    unit: Unit | Literal[""] = ""  # unit of `at`, "": the kind's own (units_of)
+    seconds: float = inf  # duration of a delay, a stall (nothing said), a block (nothing read), a disconnection
+    text: str = ""  # message instead of the kind's own
 
     def __post_init__(self) -> None:
         if (self.at is None) == (self.chance == 0.0):
@@ -44,20 +44,19 @@ class Fault:
 
     @property
     def counted(self) -> Unit:
-        """The unit that `at` counts, and at each of which `chance` applies."""
+        """The unit of `at`, and of the places of `chance`."""
         return self.unit or units_of(self.kind)[0]
 
 
 @dataclass(frozen=True)
 class FaultScript:
-    """The faults of a run; the seed decides everything that is left to chance."""
+    """The faults of a run; the seed determines everything left to chance."""
 
     faults: tuple[Fault, ...] = ()
     seed: int = 0
 
     def strikes(self, index: int) -> Iterator[int]:
-        """The places where the fault of this index strikes, rising; those of a chance lie as far apart as a geometric law throws
-        them."""
+        """Places where the fault of this index strikes, rising; those by chance have geometrically distributed distances."""
         fault = self.faults[index]
         first = 0 if fault.counted == "byte" else 1
         if fault.at is not None:
@@ -70,14 +69,14 @@ class FaultScript:
 
 
 def units_of(kind: Kind) -> tuple[Unit, ...]:
-    """The units that the place of such a fault may count, the usual one first."""
+    """The possible units of a fault's place, the usual one first."""
     if kind in BYTE_KINDS:
         return ("byte",)
     return ("answer",) if kind in OK_KINDS else ("line", "byte", "answer")
 
 
 def read_script(path: Path) -> FaultScript:
-    """The script in a TOML file: `seed` and [[fault]] tables. Raises PrinterError for a file that is none."""
+    """The script in a TOML file: `seed` and [[fault]] tables. Raises PrinterError for an invalid file."""
     try:
         document = read_toml(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -141,7 +140,7 @@ def _wrong(where: str, key: str, value: Any, allowed: str) -> PrinterError:
     return PrinterError(f"{where}: {key} is {'missing' if value is None else repr(value)}: {allowed} is allowed")
 
 
-# Keys of a fault in a file: the kinds that have them beside place and direction; whether a value will do; what is allowed.
+# Keys of a fault in a file: the kinds that have them, besides place and direction; validity of a value; what is allowed.
 VALUES: tuple[tuple[str, tuple[Kind, ...], Callable[[Any], bool], str], ...] = (
     ("byte", (), lambda value: _is_whole(value, 0), "a whole number from 0 up"),
     ("answer", (), lambda value: _is_whole(value, 1), "a whole number from 1 up"),

@@ -1,7 +1,7 @@
-"""A firmware without I/O: bytes in, bytes out, time is virtual and handed in.
+"""Simulated firmware without I/O: bytes in, bytes out, with virtual time as an argument.
 
-Its rules are those of the machine's dialect (machine.firmware), Marlin's awkward ones above all: line numbers and
-checksums with its exact words, a repeat of the last line swallowed in silence, `ok` = taken, withheld while the planner is full.
+It follows the rules of the machine's dialect (machine.firmware), above all Marlin's awkward ones: line numbers and checksums with
+its exact messages, a repeat of the last line silently dropped, `ok` = accepted, withheld while the planner is full.
 """
 
 from collections import deque
@@ -20,16 +20,16 @@ from profiles.machine import Machine
 
 BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
 UNREAD_LINES = 20
-CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
-IDLE_S = 1.0  # Marlin's NO_TIMEOUTS: `wait` is said so often
+CHATTER_S = 3600.0  # of a longer wait only the last hour is reported: a jump over years must not fill the memory
+IDLE_S = 1.0  # interval of `wait` with Marlin's NO_TIMEOUTS
 MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_IDLE
 
 
 class SimulatedFirmware:
-    """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile.
+    """receive() delivers bytes, advance() lets time pass and returns the printer's output.
 
-    kept_moves: how many stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
-    table: what its probe meets, None: it has none.
+    kept_moves: number of moves to record, None: all. watch: gets each line's count before it begins; True: advance() returns
+    first. table: the surface for its probe, None: no probe.
     """
 
     def __init__(
@@ -52,14 +52,14 @@ class SimulatedFirmware:
         self._queue: deque[tuple[str, str, str, str]] = deque()  # label of the answer; text; its name and rest
         self._wake_s: float | None = None
         self._work: Iterator[float] | None = None
-        self._waits = False  # the program itself waits for the command at work
+        self._waits = False  # the program itself waits for the current command
         self._taken = self._watched = 0
         self.watch: Callable[[int], bool] | None = None
-        self._reason = ""  # for which it has stopped
+        self._reason = ""  # of a stop
         self.dead = False
 
     def receive(self, data: bytes) -> None:
-        """Bytes arrive on the line."""
+        """Receive bytes on the line."""
         if self.dead and not self._rules.after_kill:
             return
         if self._reads_bytes:
@@ -73,16 +73,16 @@ class SimulatedFirmware:
 
     @property
     def has_ring(self) -> bool:
-        """Whether bytes arrive in a ring that overflows; over USB the host waits instead."""
+        """Whether bytes arrive in a ring that may overflow; over USB the host waits instead."""
         return self._build.rx_ring is not None
 
     @property
     def full(self) -> bool:
-        """Over USB: nothing more is read until there is room again."""
+        """Whether reading is suspended (USB) until there is space."""
         return not self.has_ring and len(self._receiver) >= UNREAD_LINES
 
     def advance(self, until_s: float = inf) -> bytes:
-        """Work until a virtual time; with inf until there is nothing to do, the clock jumping over all waits."""
+        """Work until a virtual time; with inf until nothing is left to do, skipping all waits."""
         board, lines = self.board, self._receiver.lines
         while not self.dead:
             if lines:
@@ -114,17 +114,17 @@ class SimulatedFirmware:
         return said.encode("ascii", "replace")
 
     def next_s(self) -> float:
-        """The virtual time at which something happens without further bytes; inf when nothing will."""
+        """The virtual time of the next event without further bytes; inf for none."""
         if self.dead:
             return inf
         board = self.board
         due_s = min(board.report_s, board.position_s, board.nozzle.trip_s, board.bed.trip_s, board.idle_s)
         if self._wake_s is None:
             return board.now_s if self._queue or len(self._receiver) else min(due_s, self._wait_s)
-        return min(self._wake_s, due_s, inf if board.waits_for_heat else self._busy_s)  # no busy while it tells temperatures
+        return min(self._wake_s, due_s, inf if board.waits_for_heat else self._busy_s)  # no busy while it reports temperatures
 
     def reset(self, banner: bool = True) -> None:
-        """The board restarts: counter, queues, position and temperatures are lost."""
+        """Restart the board: counter, queues, position and temperatures are lost."""
         board = self.board
         board.note("reset")
         board.off()
@@ -139,7 +139,7 @@ class SimulatedFirmware:
 
     @property
     def last_number(self) -> int:
-        """Number of the last numbered line that was taken."""
+        """Number of the last accepted line."""
         return self._receiver.last
 
     def record(self) -> Record:
@@ -147,13 +147,13 @@ class SimulatedFirmware:
         return record_of(self.board, self._taken, self._receiver.lost_bytes)
 
     def kill(self, error: str) -> None:
-        """The firmware stops for ever with its own words, heaters off."""
+        """Stop for good with the firmware's message, heaters off."""
         own = self._rules.heater_fault
         self.board.note(error, trouble=True)
         self._shut_down(() if own else (f"Error:{error}",), own)
 
     def _stop_at_once(self) -> None:
-        """M112."""
+        """Execute M112."""
         report = ("echo:M112 Shutdown",) if self._rules.urgent == "bytes" else ()
         self.board.note("M112")
         self._shut_down(report, "Shutdown due to M112 command")
@@ -169,7 +169,7 @@ class SimulatedFirmware:
         self._forget()
 
     def _answer_waiting(self) -> None:
-        """The command at work ends with its ok, those behind it are refused."""
+        """Acknowledge the current command and refuse those behind it."""
         waiting = [text for _, text, _, _ in self._queue]
         if self._work is not None:
             self._said.append("ok")
@@ -184,7 +184,7 @@ class SimulatedFirmware:
         self._watched = self._taken
 
     def _answer_dead(self) -> None:
-        """A firmware on a computer of its own still answers when it has stopped the machine: no, and ok."""
+        """Answer after a stop, as a firmware on a separate computer does: a refusal, and ok."""
         while len(self._receiver):
             if isinstance(taken := self._receiver.take(), tuple):
                 self._refuse(taken[1])
@@ -214,7 +214,7 @@ class SimulatedFirmware:
                 self._wake_s = board.now_s
 
     def _fetch(self) -> None:
-        """Move lines from the receive ring into the queue while it has room.
+        """Move lines from the receive ring into the queue while it has space.
 
         Without an emergency parser Marlin looks for its orders here: a line is seen when it enters the queue.
         """
@@ -232,7 +232,7 @@ class SimulatedFirmware:
                     self._act_at_once(text)
 
     def _run(self) -> None:
-        """Begin or go on with the oldest line of the queue."""
+        """Begin or continue the oldest line of the queue."""
         board = self.board
         label, text, name, rest = self._queue[0]
         if self._work is None:
@@ -276,7 +276,7 @@ class SimulatedFirmware:
         return answer
 
     def _finish(self, label: str, answer: str | None = None) -> None:
-        """Answer the oldest line of the queue; B counts it as still there, so it is one too low (TFT #2819)."""
+        """Answer the oldest line of the queue; B still counts it, so it is one too low (TFT #2819)."""
         self._queue.popleft()
         self._taken += 1
         self._busy_s = inf
@@ -297,7 +297,7 @@ class SimulatedFirmware:
             self._wake_s = wake_s
 
     def _pass(self, to_s: float) -> None:
-        """Let the clock run, saying on the way what is due."""
+        """Let the clock run, with due reports on the way."""
         board = self.board
         while not self.dead:
             sleeps, nozzle_s, bed_s = self._wake_s is not None, board.nozzle.trip_s, board.bed.trip_s
@@ -313,7 +313,7 @@ class SimulatedFirmware:
             board.now_s = max(board.now_s, to_s)
 
     def _report_due(self, due_s: float, busy_s: float, trip_s: float) -> None:
-        """Say what is due now."""
+        """Report what is due now."""
         board = self.board
         if due_s == trip_s:
             heater, index = (board.nozzle, "0") if board.nozzle.trip_s == trip_s else (board.bed, "bed")

@@ -1,4 +1,4 @@
-"""The moving half of a simulated printer: coordinates and their modes, limits, the kinematics, moves for the planner."""
+"""Motion of a simulated printer: coordinates and their modes, limits, kinematics, and moves for the planner."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import ceil, hypot, inf, pi, sqrt
@@ -13,20 +13,20 @@ from mdp.pose import Pose, rotation, shift
 from profiles.machine import Machine
 from slicer.estimate.timing import axis_accelerations, axis_speeds
 
-FIRST_FEED = 25.0  # mm/s until a program gives an F: Marlin's 1500 mm/min
+FIRST_FEED = 25.0  # mm/s before the first F: Marlin's 1500 mm/min
 TINY_MM = 1e-9
-SLACK = 1e-6  # a coordinate printed with few decimals may stand this far outside a limit
-SLIP_MM = 0.4  # and deg: a motor without current is turned by hand or weight, and catches at another step
-HARD_MM = 2.0  # from a soft limit to where the axis meets its end
+SLACK = 1e-6  # tolerance of limits for coordinates with few decimals
+SLIP_MM = 0.4  # and deg: a motor without current is moved by hand or weight, and catches at another step
+HARD_MM = 2.0  # from a soft limit to the axis's hard stop
 ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SEGMENTS
-SEGMENTS_PER_S = 200.0  # into which the firmware cuts a turn that it follows
-STEPS = (80.0, 80.0, 400.0, 80.0, 80.0)  # a mm or degree, for M114's Count
+SEGMENTS_PER_S = 200.0  # of a turn that the firmware follows
+STEPS = (80.0, 80.0, 400.0, 80.0, 80.0)  # per mm or degree, for M114's Count
 
 WordValues = Mapping[str, float]  # by letter
 
 
 class TcpKinematics:
-    """X Y Z tilt turn either way; the rotation of the pose asked for last is kept, for most moves stay at theirs."""
+    """Conversion of X Y Z tilt turn both ways; the rotation of the last pose is cached, for most moves keep theirs."""
 
     def __init__(self, machine: Machine) -> None:
         self._machine = machine
@@ -40,7 +40,7 @@ class TcpKinematics:
         return [a * x + b * y + c * z + s for (a, b, c), s in zip(self._rotation, self._shift, strict=True)] + list(tip[3:5])
 
     def tip(self, positions: Axes) -> list[float]:
-        """The tip's place on the table at these positions of the axes."""
+        """Position of the tip relative to the table at these positions of the axes."""
         self._turn(positions[3], positions[4])
         x, y, z = (p - s for p, s in zip(positions[:3], self._shift, strict=True))
         columns = zip(*self._rotation, strict=True)
@@ -55,10 +55,10 @@ class TcpKinematics:
 
 
 class Motion:
-    """Axes X Y Z tilt turn E. position: what the firmware believes, in its own coordinates; with modes.offset the program's.
+    """Axes X Y Z tilt turn E. position: the firmware's belief, in its own coordinates; plus modes.offset the program's.
 
-    While the firmware follows the table (TCP) it is the tip's on the table, else the axes'. What the axes really do differs by an
-    offset after a reset, or when following is switched at a turned table; `executed` has the real moves.
+    With TCP it is the tip's position relative to the table, else the axes'. The true axes differ by an offset after a reset, or
+    when TCP is switched with a turned table; `executed` has the true moves.
     """
 
     def __init__(
@@ -80,14 +80,14 @@ class Motion:
         self.planner = Planner(self.executed.add, rules.blocks, rules.min_segment_s)
         self._machine, self._note = machine, note
         self._tcp = TcpKinematics(machine)
-        # Where the axes stand when all planned blocks are over, filament as a running total.
+        # Positions of the axes when all planned blocks are over, filament as a running total.
         self._real = [*machine.home[:3], machine.tilt.zero_deg, machine.turn.zero_deg, 0.0] if self._starts_at_home else [0.0] * 6
         self._offset = [0.0] * 5
         self.clamped = self.halts = 0
         self.forget()
 
     def forget(self) -> None:
-        """The board restarts: the axes stay where they are, the firmware believes them at home or zero and knows its defaults."""
+        """Reset the firmware's state by a restart: the axes stay, the firmware assumes home or zero and its defaults."""
         machine = self._machine
         self.position = [*machine.home, 0.0] if self._starts_at_home else [0.0] * 6
         self.modes = Modes(self._axes, feed=60.0 * FIRST_FEED)
@@ -100,10 +100,10 @@ class Motion:
         self.speeds: list[float] = axis_speeds(machine).tolist()
         self.accelerations: list[float] = axis_accelerations(machine).tolist()
         self.jerk_mm_s = machine.junction_speed_mm_s
-        self._printing = self._travelling = inf  # mm/s2 set by M204 for X Y Z; inf: what the axes allow
+        self._printing = self._travelling = inf  # mm/s² set by M204 for X Y Z; inf: the axes' limits
 
     def target(self, words: WordValues, extrude: bool = True) -> list[float]:
-        """The end of a G0 or G1, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
+        """The end of a G0 or G1, whose F is applied; without `extrude` (cold nozzle) the filament stays."""
         destination = self._wanted(words)
         if self.soft_limits:
             self._clamp(destination)
@@ -113,7 +113,8 @@ class Motion:
         return destination
 
     def _clamp(self, destination: list[float]) -> None:
-        """Marlin stops at soft limits without a word, on axes that were homed; on others what the program meant is counted."""
+        """Clip at the soft limits; Marlin does so silently, and only on homed axes: on others the program's coordinates are
+        counted."""
         homed, everywhere, offset = self.homed, not self._starts_at_home, self.modes.offset
         for axis, (low, high) in enumerate(self.limits):
             limited = everywhere or axis in homed
@@ -136,7 +137,7 @@ class Motion:
         return abs(self._wanted(words)[5] - self.position[5]) > TINY_MM
 
     def unhomed(self, words: WordValues) -> list[float] | None:
-        """The program's coordinates of a target that moves X, Y or Z before they are homed; None for any other."""
+        """The program's coordinates of a target that moves X, Y or Z before homing; None for any other."""
         wanted = [axis for axis, letter in enumerate(self.letters[:3]) if letter in words and axis not in self.homed]
         return [p + s for p, s in zip(self._wanted(words), self.modes.offset, strict=True)] if wanted else None
 
@@ -153,7 +154,7 @@ class Motion:
 
     @property
     def feed_mm_s(self) -> float:
-        """The feed rate of F, before M220; deg/s where only the table turns."""
+        """The feed rate of F, before M220; deg/s if only the table turns."""
         return self.modes.feed / 60.0
 
     def pieces(self, target: Sequence[float]) -> list[list[float]]:
@@ -178,7 +179,7 @@ class Motion:
         return [[x, y, *others] for (x, y), others in zip(chords(begin, finish, centre, sweep, count), rest, strict=True)]
 
     def reach(self, destination: Sequence[float], now_s: float, feed_mm_s: float | None = None) -> None:
-        """Plan one straight move, at the speed that F asks for or at a given one."""
+        """Plan one straight move, at the speed of F or a given one."""
         here, real = self.position, self._real
         x, y, z, tilt, turn = self._tcp.positions(destination) if self.follows else destination[:5]
         from_x, from_y, from_z, from_tilt, from_turn = self._offset
@@ -201,7 +202,7 @@ class Motion:
         return _length(here, destination) / (self.feed_mm_s * self.feed_share)
 
     def _meet_ends(self, end: list[float]) -> None:
-        """An axis that is driven against its end stays there, and the firmware does not know."""
+        """Stop an axis that is driven against its hard stop, without the firmware's knowledge."""
         for axis, (low, high) in enumerate(self.limits):
             if not low - HARD_MM <= end[axis] <= high + HARD_MM:
                 stopped = min(max(end[axis], low - HARD_MM), high + HARD_MM)
@@ -210,7 +211,7 @@ class Motion:
                 self._note(f"{self.letters[axis]} driven against its end", True)
 
     def home(self, axes: Sequence[int]) -> float:
-        """Put axes at their home positions (X Y least, Z greatest, table level); returns how long it takes, s."""
+        """Put axes at their home positions (X Y minimum, Z maximum, table level); returns the duration, s."""
         self.homed.update(axes)
         self.energised = True
         travel_s = max((abs(self._home[a] - self._real[a]) / self.speeds[a] for a in axes), default=0.0)
@@ -222,7 +223,7 @@ class Motion:
         return 2.0 * travel_s + 1.0
 
     def let_go(self, axes: Sequence[int]) -> None:
-        """Motors go off: the axes do not stay where they were, and the firmware does not know."""
+        """Switch motors off: the axes slip, without the firmware's knowledge."""
         self.energised = False
         real = self._real[:]
         for axis in axes:
@@ -232,14 +233,15 @@ class Motion:
         self._real = real
 
     def follow(self, on: bool) -> None:
-        """G43.4, G49: the position stays, as in the firmware that knows them; a turned table is believed elsewhere then."""
+        """G43.4, G49: coordinates stay, as in firmwares without knowledge of the change; a turned table then has a wrong
+        position."""
         if on != self.follows:
             self.follows = on
             positions = self._tcp.positions(self.position) if on else self.position[:5]
             self._offset = [r - p for r, p in zip(self._real, positions, strict=False)]
 
     def accelerate(self, words: WordValues) -> None:
-        """M204: P for moves that push filament, T for those that do not, S for both; what is not above 0 changes nothing."""
+        """M204: P for moves with filament, T for those without, S for both; values not above 0 change nothing."""
         scale = self.modes.unit_mm
         for letter, value in words.items():
             if value > 0 and letter in "PS":
@@ -274,16 +276,16 @@ class Motion:
         )
 
     def rename(self, words: WordValues) -> None:
-        """G92: the position of the axes gets these coordinates."""
+        """G92: give the axes' position these coordinates."""
         for axis, coordinate in self.modes.named(words.items()):
             self.set_coordinate(axis, coordinate)
 
     def set_coordinate(self, axis: int, coordinate: float) -> None:
-        """Call the position of one axis by another coordinate."""
+        """Give the position of one axis another coordinate."""
         self.modes.offset[axis] = coordinate - self.position[axis]
 
     def halt(self, now_s: float) -> None:
-        """Stop at once: later blocks never happen, the one under way ends where it is."""
+        """Stop at once: later blocks are dropped, the current one ends where it is."""
         self.planner.run(now_s)
         cut = self.planner.under_way()
         planned, planned_s = (cut.end, cut.duration_s) if cut is not None else ((), 0.0)
@@ -297,12 +299,12 @@ class Motion:
             self._believe()
 
     def _believe(self) -> None:
-        """Work out the position from where the axes stand."""
+        """Compute the position from the axes."""
         positions = [r - o for r, o in zip(self._real, self._offset, strict=False)]
         self.position[:5] = self._tcp.tip(positions) if self.follows else positions
 
     def at(self, now_s: float) -> list[float]:
-        """The real position of the axes now, X Y Z tilt turn."""
+        """The true position of the axes now, X Y Z tilt turn."""
         self.planner.run(now_s)
         return list(self.planner.at(now_s, self._real))[:5]
 
@@ -321,6 +323,6 @@ def _evenly(here: Sequence[float], target: Sequence[float], count: int) -> list[
 
 
 def _length(a: Sequence[float], b: Sequence[float]) -> float:
-    """The length that F measures: the way of X Y Z; when they stand still that of the rotary axes; else the filament."""
+    """The length that F measures: of X Y Z; of the rotary axes if those are at rest; else of the filament."""
     x, y, z, tilt, turn, filament = (q - p for p, q in zip(a, b, strict=True))
     return sqrt(x * x + y * y + z * z) or hypot(tilt, turn) or abs(filament)

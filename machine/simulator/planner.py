@@ -1,7 +1,7 @@
-"""The planner of a simulated printer: blocks that wait for their turn, each as fast as those behind it let the machine stop.
+"""Planner of a simulated printer: queued blocks, each as fast as those behind it let the machine stop.
 
-The rules are those of the dry run's timeline (constant acceleration, a speed change at corners that no axis exceeds), but the
-planner knows only the blocks that have come: a block that begins without a successor ends at a standstill, as in Marlin.
+The rules are those of the dry run's timeline (constant acceleration, a speed change at corners that no axis exceeds), but only
+queued blocks are known: a block that begins without a successor ends at a standstill, as in Marlin.
 """
 
 from array import array
@@ -16,8 +16,8 @@ from machine.firmware.marlin import FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S
 TINY = 1e-9
 
 Axes = Sequence[float]  # X Y Z tilt turn E
-ROW = 15  # numbers of a move: 6 where it begins, 6 where it ends, feed, begin, duration
-EXTRUDES_MM = 1e-9  # differences of running filament totals below this are rounding
+ROW = 15  # numbers of a move: 6 for its beginning, 6 for its end, feed, start time, duration
+EXTRUDES_MM = 1e-9  # smaller differences of running filament totals are rounding
 
 
 @dataclass(slots=True)
@@ -32,7 +32,7 @@ class Block:
     measure: int
     cruise: float
     acceleration: float
-    corner2: float = 0.0  # squares of the greatest speed at its begin, and of the planned one
+    corner2: float = 0.0  # squares of the greatest and the planned speed at its beginning
     entry2: float = 0.0
     v0: float = 0.0
     v1: float = 0.0
@@ -42,7 +42,7 @@ class Block:
     end_s: float = 0.0
 
     def settle(self, begin_s: float, v0: float, next2: float) -> None:
-        """Fix the block's speeds when it begins; next2: square of the speed at which its successor may begin."""
+        """Fix the block's speeds when it begins; next2: square of the greatest entry speed of its successor."""
         a, length = self.acceleration, self.length
         most2 = v0 * v0 + 2.0 * a * length
         v1 = sqrt(next2 if next2 < most2 else most2)
@@ -56,7 +56,7 @@ class Block:
         self.end_s = begin_s + duration_s
 
     def share(self, now_s: float) -> float:
-        """The share of the way that lies behind it, 0 to 1."""
+        """Fraction of the block completed, 0 to 1."""
         t, a, length = now_s - self.begin_s, self.acceleration, self.length
         if t >= self.duration_s:
             return 1.0
@@ -75,7 +75,7 @@ class Block:
 
 
 class ExecutedMoves:
-    """The moves that have begun. kept_moves: how many moves stay in `rows` at least (twice as many at most); None: all.
+    """The moves that have begun. kept_moves: least number of moves in `rows` (at most twice as many); None: all.
 
     moves, strokes, pushed_mm, moving_s: sums over all of them; strokes push filament while another axis moves.
     """
@@ -87,7 +87,7 @@ class ExecutedMoves:
         self.pushed_mm = self.moving_s = 0.0
 
     def add(self, block: Block) -> None:
-        """A block begins."""
+        """Add a block that begins."""
         rows = self.rows
         start, end, duration_s = block.start, block.end, block.duration_s
         rows.extend((*start, *end, block.feed, block.begin_s, duration_s))
@@ -96,7 +96,7 @@ class ExecutedMoves:
             del rows[: -self._most // 2]
 
     def cut(self, block: Block, planned: Sequence[float], planned_s: float) -> None:
-        """The block that began last ends early: it has its new end and duration; planned: those it had before."""
+        """Correct the newest block, which ended early, to its new end and duration; planned: those before."""
         base = len(self.rows) - ROW
         self._count(block.start, planned, planned_s, -1)
         if list(block.start) == list(block.end):  # it had only just begun
@@ -117,36 +117,36 @@ class ExecutedMoves:
 
 
 class Planner:
-    """Blocks come with add(); run() begins those whose time has come and hands them to `begun`.
+    """Blocks are added by add(); run() begins those whose time has come and passes them to `begun`.
 
-    underruns: how often it ran dry although the machine need not have stopped; slowed: blocks made slower since few waited;
-    ended_s: when the newest block ended that is over.
+    underruns: how often it ran dry although the machine need not have stopped; slowed: blocks slowed down for lack of queued
+    ones; ended_s: end of the newest finished block.
     """
 
     def __init__(self, begun: Callable[[Block], None], blocks: int, min_segment_s: float) -> None:
         self._begun, self._blocks, self._min_segment_s = begun, blocks, min_segment_s
         self._waiting: deque[Block] = deque()
         self._current: Block | None = None
-        self._last: Block | None = None  # the one that ended last, while nothing has made the machine wait
+        self._last: Block | None = None  # the one that ended last, unless something has made the machine wait
         self._gate_s = 0.0
         self.ended_s = 0.0
         self.underruns = self.slowed = 0
 
     def free(self, now_s: float) -> int:
-        """Free places."""
+        """Number of free places."""
         current = self._current
         if current is None or current.end_s <= now_s:
             self.run(now_s)
         return self._blocks - len(self._waiting) - (self._current is not None)
 
     def next_s(self) -> float:
-        """When the block under way ends or the first one begins; inf: nothing is planned."""
+        """When the current block ends or the first one begins; inf: nothing is planned."""
         if self._current is not None:
             return self._current.end_s
         return self._gate_s if self._waiting else inf
 
     def run(self, now_s: float) -> None:
-        """Begin and end what begins and ends until a time."""
+        """Begin and end blocks up to a time."""
         while True:
             current = self._current
             if current is not None:
@@ -164,7 +164,7 @@ class Planner:
             self._begun(block)
 
     def add(self, block: Block, jerk: float, now_s: float) -> None:
-        """Queue a block; jerk: the speed an axis may change at once at a corner, mm/s."""
+        """Queue a block; jerk: speed change allowed to an axis at a corner, mm/s."""
         waiting = self._waiting
         queued = self._blocks - self.free(now_s)
         if 2 <= queued < self._blocks // 2 + 1:
@@ -181,12 +181,12 @@ class Planner:
         self._look_back()
 
     def barrier(self, now_s: float) -> None:
-        """The program itself waits here: a machine that stands still now has not run dry."""
+        """Note that the program itself waits: a machine at rest has not run dry."""
         self.run(now_s)
         self._last = None
 
     def ahead(self) -> list[Block]:
-        """Blocks that have not begun, timed as if nothing more came; they stay as they are."""
+        """Copies of the blocks that have not begun, timed as if nothing followed."""
         begin_s, v0 = self._gate_s, 0.0
         if self._current is not None:
             begin_s, v0 = self._current.end_s, self._current.v1
@@ -202,9 +202,9 @@ class Planner:
         return self._current
 
     def halt(self, now_s: float) -> Axes | None:
-        """Stop at once, forget what waits; where the axes are then, None when nothing was planned.
+        """Stop at once and drop the queue; returns the position of the axes, None when nothing was planned.
 
-        The block under way is cut short: its end and duration are changed.
+        The current block is cut short: its end and duration change.
         """
         self.run(now_s)
         cut, self._current, self._last, self.ended_s = self._current, None, None, now_s
@@ -222,14 +222,14 @@ class Planner:
         return self._waiting[0].start if self._waiting else idle
 
     def _slow_down(self, block: Block, queued: int) -> None:
-        """Marlin's SLOWDOWN: time for the host to send more."""
+        """Slow a block down as Marlin's SLOWDOWN does, which gives the host time to send more."""
         seconds = block.length / block.cruise
         if seconds < self._min_segment_s:
             block.cruise = block.length / (seconds + 2.0 * (self._min_segment_s - seconds) / queued)
             self.slowed += 1
 
     def _look_back(self) -> None:
-        """Raise the entry speeds of waiting blocks from the newest back, as far as that changes anything."""
+        """Raise the entry speeds of queued blocks from the newest back, while that changes anything."""
         following2 = 0.0
         for block in reversed(self._waiting):
             entry2 = following2 + 2.0 * block.acceleration * block.length
@@ -252,7 +252,7 @@ def corner2(before: Block, after: Block, jerk: float) -> float:
 
 
 def block_of(start: Axes, end: Axes, feed: float, speeds: Axes, accelerations: Axes, most_mm_s2: float) -> Block | None:
-    """A block from place to place; None when nothing moves. most_mm_s2: acceleration set for moves of X Y Z."""
+    """A block between positions; None when nothing moves. most_mm_s2: acceleration for moves of X Y Z."""
     deltas = list(map(sub, end, start))
     x, y, z, tilt, turn, filament = deltas
     length, measure = sqrt(x * x + y * y + z * z), 0
@@ -265,7 +265,7 @@ def block_of(start: Axes, end: Axes, feed: float, speeds: Axes, accelerations: A
     direction = [0.0] * 6
     cruise, acceleration = feed, inf
     for axis, delta in enumerate(deltas):
-        if delta:  # most moves leave half of the axes where they are
+        if delta:  # most moves leave half of the axes at rest
             direction[axis] = share = delta / length
             share = abs(share)
             if cruise * share > speeds[axis]:

@@ -1,4 +1,4 @@
-"""The receiving half of a simulated firmware: bytes become commands by line numbers and checksums, or urgent orders at once."""
+"""Receiver of a simulated firmware: bytes become commands by line numbers and checksums, or urgent orders at once."""
 
 import re
 from collections import deque
@@ -7,20 +7,20 @@ from machine.firmware.firmware import SimulationRules
 from machine.link.protocol.framing import checksum
 
 HALF_BYTES = 1024
-MISSING = "Missing checksum"  # as OctoPrint's virtual printer says it with forceChecksum; nothing follows
-CHECKSUM_BYTES = 128  # bytes that the checksum is folded from at once
+MISSING = "Missing checksum"  # message of OctoPrint's virtual printer with forceChecksum; nothing follows
+CHECKSUM_BYTES = 128  # bytes folded at once for the checksum
 MOVE = re.compile(rb"N([0-9]+) (G[01] [^*;]*)\*([0-9]{1,3})")  # nearly every line
 DIGITS = re.compile(rb"\s*([-+]?\d+)")
-ORDER_BYTES = 96  # of a line more is not looked at
+ORDER_BYTES = 96  # more of a line is ignored
 ORDER = re.compile(rb"\s*(?:N-?\d+\s*)?(?:(M(?:108|112|410|876)|[SPR]000)(?!\d))")
 SIGNS = (b"M1", b"M4", b"M8", b"000")
 
 
 class Receiver:
-    """rx_ring: bytes of a receive ring that overflows, None: whatever comes is kept. longest: characters kept of a line;
-    insists: lines without number and checksum are refused.
+    """Receives lines. rx_ring: bytes of a receive ring that may overflow, None: unlimited. longest: characters kept of a line;
+    insists: refuse lines without number and checksum.
 
-    last: number of the last numbered line that was taken; lines: those that have come and wait.
+    last: number of the last accepted line; lines: those waiting.
     """
 
     def __init__(self, rules: SimulationRules, longest: int, rx_ring: int | None, insists: bool = False) -> None:
@@ -34,7 +34,7 @@ class Receiver:
         return len(self.lines)
 
     def receive(self, data: bytes) -> list[bytes]:
-        """Bytes arrive; the lines that they end."""
+        """Receive bytes; returns the lines that they complete."""
         if self._rx_ring is not None:
             waiting = len(self._half) + sum(len(line) + 1 for line in self.lines) - self._read
             fitting = data[: max(0, self._rx_ring - 1 - waiting)]
@@ -42,13 +42,13 @@ class Receiver:
             data = fitting
         *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
         self.lines.extend(lines)
-        if len(self._half) > HALF_BYTES:  # a line without end: what is too long for a command is not kept
+        if len(self._half) > HALF_BYTES:  # an endless line: bytes beyond a command's length are dropped
             self._half = self._half[:CHECKSUM_BYTES]
         return lines
 
     def urgent_orders(self, data: bytes) -> list[str]:
-        """What an emergency parser reads: the orders that stand at the begin of lines which end in these bytes; numbers and
-        checksums are not looked at."""
+        """Orders that an emergency parser finds at the beginning of lines completed by these bytes, without checking numbers and
+        checksums."""
         scanned = self._urgent_half + data
         end = scanned.rfind(b"\n") + 1
         self._urgent_half = scanned[end:][:ORDER_BYTES]
@@ -57,7 +57,7 @@ class Receiver:
         return [order[1].decode() for line in scanned[:end].splitlines() if (order := ORDER.match(line))]
 
     def forget(self) -> None:
-        """The board restarts or has stopped: what has come is thrown away."""
+        """Discard what has come, by a restart or stop of the board."""
         self._drop()
         self._urgent_half = b""
 
@@ -67,11 +67,11 @@ class Receiver:
         self._read = 0
 
     def idle(self) -> None:
-        """The main loop has taken what there is: the half line is put together elsewhere, the ring is empty."""
+        """Empty the ring: the main loop has taken the unfinished line into another buffer."""
         self._read = len(self._half)
 
     def take(self) -> tuple[str, str] | str | None:
-        """The oldest line: its label for ADVANCED_OK and its command, or what is wrong with it; None: nothing to do."""
+        """The oldest line: its label for ADVANCED_OK and its command, or its error; None: nothing to do."""
         self._read = 0
         line = self.lines.popleft()
         if (move := MOVE.fullmatch(line)) and self._rules.numbers == "resend" and len(line) <= self._longest:
@@ -103,21 +103,21 @@ class Receiver:
         return label, line.decode("ascii", "replace").rstrip()
 
     def ask_again(self, complaint: str, ok: bool) -> list[str]:
-        """The answer to a bad line; all that has come behind it is thrown away, unless it merely lacks a checksum."""
+        """The answer to a bad line; everything received after it is discarded, unless it merely lacks a checksum."""
         if complaint == MISSING:
             return [f"Error: {MISSING}"]
         self._drop()
         return [f"Error:{complaint}, Last Line: {self.last}", f"Resend: {self.last + 1}", *(["ok"] if ok else [])]
 
     def _strip_number(self, line: bytes) -> bytes:
-        """The command of a numbered line where nothing is asked for again; b"": it is dropped without a word."""
+        """The command of a numbered line for a firmware without resends; b"": it is silently dropped."""
         star = line.rfind(b"*")
         if self._rules.numbers == "drop" and (b"\x7f" in line or (star >= 0 and not _checksum_matches(line, star))):
             return b""
         return (line[1:star] if star >= 0 else line[1:]).lstrip(b"-+0123456789").lstrip(b" ")
 
     def _complaint(self, line: bytes) -> str | None:
-        """The error of a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
+        """The error of a numbered line; "" for a repeat that Marlin drops silently, None when it is accepted."""
         star = line.rfind(b"*")
         renumbers = b"M110" in line
         second = line.find(b"N", line.find(b"M110")) if renumbers else 0
@@ -134,6 +134,6 @@ class Receiver:
 
 
 def _checksum_matches(line: bytes, star: int) -> bool:
-    """Whether the checksum behind the star is right; a CRC of five digits (RepRapFirmware) is believed."""
+    """Whether the checksum after the star is right; a CRC of five digits (RepRapFirmware) is trusted."""
     digits = DIGITS.match(line, star + 1)
     return (0 if digits is None else int(digits[1])) == checksum(line[:star]) or (digits is not None and len(digits[1]) == 5)

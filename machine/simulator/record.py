@@ -1,4 +1,4 @@
-"""The record of a simulated print: every executed move, what the heaters did, and the plastic laid on the workpiece."""
+"""Record of a simulated print: every executed move, the heaters' events, and the plastic on the workpiece."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from profiles.machine import Machine
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """n executed moves in order, those still planned included; homing is an event, no move."""
+    """n executed moves in order, including those still planned; homing is an event, not a move."""
 
     machine: Machine
     start: Floats  # (n, 6) machine X Y Z mm, tilt turn deg, filament mm (running total)
@@ -25,29 +25,29 @@ class Record:
     feed_mm_s: Floats  # (n,) as programmed
     begin_s: Floats  # (n,) of the virtual clock
     duration_s: Floats  # (n,)
-    first: int  # how many moves before these are not kept
-    moves: int  # count of all moves,
+    first: int  # number of earlier moves that were not kept
+    moves: int  # number of all moves,
     strokes: int  # of all strokes,
     pushed_mm: float  # filament of the strokes,
     moving_s: float  # time of all moves
     events: tuple[tuple[float, str], ...]  # (virtual s, what)
-    troubles: tuple[tuple[float, str], ...]  # those events that no program asks for
+    troubles: tuple[tuple[float, str], ...]  # events that no program causes
     nozzle_target_c: float  # at the end
     bed_target_c: float
     fan: float
     clamped: int  # coordinates outside the soft limits
-    unknown: int  # commands not understood
+    unknown: int  # unknown commands
     lines: int
     lost_bytes: int  # dropped by a full receive ring
     underruns: int  # how often the planner ran dry in mid-motion
-    slowed: int  # moves slowed down since the host sent too few
+    slowed: int  # moves slowed down because the host sent too few
 
     def happened(self, what: str) -> bool:
-        """Whether an event that begins so is on record."""
+        """Whether an event that begins with this text is on record."""
         return any(text.startswith(what) for _, text in self.events)
 
     def deposited(self, filament_diameter_mm: float = 1.75) -> tuple[Floats, Floats]:
-        """Strokes: (n, 2, 3) segments in the workpiece frame and (n,) volumes mm3, of moves that push filament while moving."""
+        """Strokes: (n, 2, 3) segments in the workpiece frame and (n,) volumes, mm³, of moves that push filament while moving."""
         pushed = self.end[:, 5] - self.start[:, 5]
         strokes = (pushed > EXTRUDES_MM) & (self.start[:, :5] != self.end[:, :5]).any(axis=1)
         begin, end = (workpiece_path(self.machine, points[strokes, :5]) for points in (self.start, self.end))
@@ -56,7 +56,7 @@ class Record:
 
 
 def record_of(board: Board, lines: int, lost_bytes: int) -> Record:
-    """The record of a printer's board as it stands."""
+    """The present record of a printer's board."""
     planner, moves = board.motion.planner, deepcopy(board.motion.executed)
     for block in planner.ahead():
         moves.add(block)

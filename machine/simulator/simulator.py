@@ -1,6 +1,6 @@
-"""A simulated printer on a real pseudo-terminal: the firmware in a thread, reached through a device path like any printer.
+"""Simulated printer on a real pseudo-terminal: the firmware in a thread, reached through a device path like any printer.
 
-Where there are no pseudo-terminals it listens on a TCP port of this computer. A terminal or a server is what the host opens.
+Without pseudo-terminals it listens on a TCP port of this computer. The host opens a Terminal or a Server.
 """
 
 import os
@@ -31,18 +31,16 @@ TERMINALS = ("/dev/pts/", "/dev/tty")
 
 
 class SimulatedPrinter:
-    """`with SimulatedPrinter(machine) as printer:` open printer.path with pyserial, look at printer.record afterwards.
+    """`with SimulatedPrinter(machine) as printer:` open printer.path with pyserial, then examine printer.record.
 
-    speed: virtual seconds in a real one; inf never sleeps, the clock jumps over every wait. faults: what goes wrong; after a
-    disconnection the terminal is gone (reading fails) and comes back at a new printer.path, or behind the same symbolic link.
-    at: the path of that link, or a TCP port number of this computer (0: a free one) instead of a terminal; path is then a
-    socket:// address.
-    baud: every byte takes the time of 10 bits, both ways, and what a ring of machine.receive_bytes cannot hold is lost (build
-    of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path
-    with means nothing. kept_moves: how many moves the record holds at least, None: all (120 bytes a move).
-    table: what its probe meets, None: it has none.
-    Without pseudo-terminals path is a socket:// address, too. Raises PortError for a link or port that is taken, and for a link
-    where there are no terminals.
+    speed: virtual seconds per real second; inf never sleeps and skips every wait. faults: to inject; after a disconnection the
+    terminal is gone (reading fails) and returns at a new printer.path, or behind the same symbolic link. at: path of that link,
+    or a TCP port number of this computer (0: a free one) instead of a terminal; path is then a socket:// address. baud: every
+    byte takes the time of 10 bits, both ways, and what exceeds a ring of machine.receive_bytes is lost (explicit builds define it
+    themselves); None: USB, as fast as the system, and the host waits. The rate at which a host opens the path has no effect.
+    kept_moves: least number of recorded moves, None: all (120 bytes each). table: surface for its probe, None: no probe. Without
+    pseudo-terminals path is a socket:// address, too. Raises PortError for a link or port that is taken, and for a link on a
+    system without terminals.
     """
 
     def __init__(
@@ -59,7 +57,7 @@ class SimulatedPrinter:
     ) -> None:
         if not speed > 0:
             raise ValueError(f"speed is {speed:g}: it must be above 0")
-        # `busy:` must come in real time, or a slow simulation would look dead to the sender.
+        # `busy:` must come in real time, or the sender would give a slow simulation up.
         self._firmware = SimulatedFirmware(
             machine, build or build_options(machine, baud), BUSY_S * min(1.0, speed), kept_moves, table
         )
@@ -95,7 +93,7 @@ class SimulatedPrinter:
 
     @property
     def path(self) -> str:
-        """The path to open; another one after a disconnection."""
+        """The path to open; it may change after a disconnection."""
         return self._terminal.path
 
     @property
@@ -133,7 +131,7 @@ class SimulatedPrinter:
             self._terminal.close()
 
     def _pause_s(self, now_s: float) -> float | None:
-        """The time until something happens though the host is silent, s; None: for ever."""
+        """Time until something happens without the host, s; None: for ever."""
         due_s = self._line.due_s(now_s)
         return None if due_s == inf else max(0.0, due_s - (monotonic() - self._began_s))
 
@@ -144,7 +142,7 @@ class SimulatedPrinter:
 
 
 class Terminal:
-    """A raw pseudo-terminal. link: a symbolic link to keep on its path; PortError when something else is there."""
+    """A raw pseudo-terminal. link: a symbolic link to keep on its path. Raises PortError when something else is there."""
 
     def __init__(self, link: Path | None = None) -> None:
         if link is not None and (link.exists() or link.is_symlink()) and not _leads_to_a_terminal(link):
@@ -154,23 +152,24 @@ class Terminal:
         self._device = self.path = ""
 
     def open(self) -> None:
-        """Open it; after close() again, at another path unless a link leads to it. PortError where there are none."""
+        """Open the terminal; after close() the path changes, unless a link leads to it. Raises PortError on systems without
+        terminals."""
         try:
             import tty
 
             self._master, self._slave = os.openpty()
         except (ImportError, AttributeError, OSError) as error:
             raise PortError(f"the simulated printer needs a pseudo-terminal, which this system does not give ({error})") from None
-        # Raw: no echo, no change of newlines. The own slave end stays open, so that the terminal outlives each host.
+        # Raw: no echo, no conversion of newlines. The slave end stays open, so that the terminal outlives each host.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self._device = os.ttyname(self._slave)
         if self._link is not None:
             self._make_link(self._link)
-        self.path = str(self._link or self._device)  # at once: another thread may look
+        self.path = str(self._link or self._device)  # at once: another thread may read it
 
     def close(self) -> None:
-        """The cable is out: a host's next reading or writing fails."""
+        """Unplug the cable: the host's next read or write fails."""
         if self._master < 0:
             return
         self._unlink()
@@ -179,7 +178,7 @@ class Terminal:
         self._master = self._slave = -1
 
     def readable_ends(self) -> list[int]:
-        """Descriptors that become readable when the host says something."""
+        """Descriptors that become readable when the host sends."""
         return [self._master] if self._master >= 0 else []
 
     def writable_ends(self) -> list[int]:
@@ -194,7 +193,7 @@ class Terminal:
             return b""
 
     def write(self, data: bytes) -> int:
-        """Write to the host; returns how many bytes the terminal took."""
+        """Write to the host; returns the number of bytes accepted."""
         try:
             return os.write(self._master, data)
         except BlockingIOError:
@@ -218,14 +217,14 @@ class Terminal:
 def terminals_exist() -> bool:
     """Whether this system has pseudo-terminals; Windows has none."""
     try:
-        import tty  # noqa: F401 - not there without termios
+        import tty  # noqa: F401 - missing without termios
     except ImportError:
         return False
     return hasattr(os, "openpty")
 
 
 def _leads_to_a_terminal(link: Path) -> bool:
-    """Whether it is a link to a terminal, of which perhaps nothing is left."""
+    """Whether a path is a link to a terminal, perhaps a dead one."""
     return link.is_symlink() and os.readlink(link).startswith(TERMINALS)
 
 
@@ -239,7 +238,7 @@ class Server:
             raise PortError(f"TCP port {number} cannot be listened on: {reason(error)}") from None
         self._server.setblocking(False)
         self._host: socket.socket | None = None
-        self._others: deque[socket.socket] = deque()  # that are turned away
+        self._others: deque[socket.socket] = deque()  # to be refused
         self._open = False
         self.path = f"socket://localhost:{self._server.getsockname()[1]}"
 
@@ -248,7 +247,7 @@ class Server:
         self._open = True
 
     def close(self) -> None:
-        """The host is cut off."""
+        """Cut the host off."""
         self._open = False
         self._hang_up()
 
@@ -258,7 +257,7 @@ class Server:
         self._server.close()
 
     def readable_ends(self) -> list[int]:
-        """Descriptors that become readable when a host comes or says something."""
+        """Descriptors that become readable when a host connects or sends."""
         if not self._open:
             return []
         hosts = [*self._others, *([] if self._host is None else [self._host])]
@@ -269,7 +268,7 @@ class Server:
         return [] if self._host is None else [self._host.fileno()]
 
     def read(self) -> bytes:
-        """The bytes that the host has written; a host that comes or goes writes nothing."""
+        """The bytes that the host has written; empty when a host connects or leaves."""
         try:
             if self._host is None:
                 self._host, _ = self._server.accept()
@@ -287,7 +286,7 @@ class Server:
         return data
 
     def _turn_away(self) -> None:
-        """Tell other hosts, as soon as they ask something, that the printer is taken."""
+        """Report to other hosts, as soon as they send a query, that the printer is taken."""
         with suppress(OSError):
             host, _ = self._server.accept()
             host.setblocking(False)
@@ -303,7 +302,7 @@ class Server:
             self._others.popleft().close()
 
     def write(self, data: bytes) -> int:
-        """Write to the host; returns how many bytes the connection took; without a host they are lost."""
+        """Write to the host; returns the number of bytes accepted; without a host they are lost."""
         try:
             return len(data) if self._host is None else self._host.send(data)
         except BlockingIOError:
@@ -316,4 +315,4 @@ class Server:
         for gone in [*([] if self._host is None else [self._host]), *self._others]:
             gone.close()
         self._host = None
-        self._others.clear()  # the next one to come has the printer for itself
+        self._others.clear()  # the next one to connect gets the printer
