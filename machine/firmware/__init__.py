@@ -1,7 +1,8 @@
-"""Firmwares: what is sent to each, how it answers and how it is simulated; one line of the table each.
+"""Firmwares: the dialect of each, its answers and its simulation; one line of the table each.
 
-`dialect_of(machine)` is what is written for a machine, `simulation_of(machine)` how its firmware is simulated, `identify(text)`
-the firmware of an answer to M115. `firmware` has what a byte and a numbered line cost on the serial line, and its rates.
+`dialect_of(machine)` is the dialect written for a machine, `simulation_of(machine)` the simulation of its firmware,
+`identify(text)` the firmware of an answer to M115. `firmware` has the overhead of bytes and numbered lines on the serial line,
+and its rates.
 """
 
 from machine.firmware.dialect import Dialect
@@ -23,22 +24,21 @@ def dialects() -> dict[str, Dialect]:
 
 
 def dialect_of(machine: Machine) -> Dialect:
-    """The dialect that is written for a machine."""
+    """The dialect of a machine."""
     return dialects()[machine.dialect]
 
 
 def firmware_of(machine: Machine) -> Firmware:
-    """The firmware that a machine's dialect is written for."""
+    """The firmware of a machine's dialect."""
     return next(firmware for firmware in FIRMWARES if machine.dialect in firmware.dialects)
 
 
 def simulation_of(machine: Machine) -> SimulationRules:
-    """The rules by which a machine's firmware is simulated; one that opens files itself has no rules of its own and is taken for
-    Marlin."""
+    """The rules that simulate a machine's firmware; Marlin's for one without rules, which opens files itself."""
     return firmware_of(machine).simulated or SIMULATED
 
 
 def identify(identity: str) -> Firmware | None:
-    """The firmware of a FIRMWARE_NAME line, None for an unknown one; forks keep the name of what they were forked from."""
+    """The firmware of a FIRMWARE_NAME line, None for an unknown one; forks keep the name of their origin."""
     folded = identity.lower()
     return next((firmware for firmware in FIRMWARES if any(sign in folded for sign in firmware.signs)), None)

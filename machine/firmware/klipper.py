@@ -1,10 +1,9 @@
 """Klipper: its own SET_ commands, and two ways to turn a [manual_stepper].
 
-Since Klipper3d/klipper#6888 such a stepper can be registered as a letter of G1 (GCODE_AXIS); until then, and in older
-versions for good, MANUAL_STEPPER turns it. A registered stepper cannot be homed, so the start block comes before that.
-
-N and * are stripped and ignored (klippy/gcode.py). A macro may work for minutes without a word, and the pseudo-terminal loses
-nothing: when the program behind it dies the port closes. M114 names X Y Z E only, whatever steppers turn the table.
+Since Klipper3d/klipper#6888 such a stepper can be registered as a letter of G1 (GCODE_AXIS); in older versions MANUAL_STEPPER
+turns it. A registered stepper cannot be homed, so the start block comes first. N and * are stripped and ignored
+(klippy/gcode.py). A macro may run silently for minutes, and the pseudo-terminal loses nothing: when the program behind it dies
+the port closes. M114 names only X Y Z E, whatever steppers turn the table.
 """
 
 from collections.abc import Mapping
@@ -62,12 +61,12 @@ COMMANDS = {
 
 STEPPERS = Dialect(
     firmware="Klipper with MANUAL_STEPPER",
-    longest_line=120,  # it keeps more; the stream's checksum is made for no longer ones
+    longest_line=120,  # it keeps more, but the stream's checksum supports no longer ones
     nozzle="SET_HEATER_TEMPERATURE HEATER=extruder TARGET={}",
     nozzle_wait="M109 S{}",
     fan_on="M106 S{}",
     progress="M73 P{} R{}",
-    acceleration="SET_VELOCITY_LIMIT ACCEL={}",  # M204 P T would take the lesser of the two for all moves
+    acceleration="SET_VELOCITY_LIMIT ACCEL={}",  # M204 P T would use the smaller of the two for all moves
     pressure_advance="SET_PRESSURE_ADVANCE ADVANCE={}",
     pause="PAUSE",
     filament_change="PAUSE",
@@ -104,18 +103,18 @@ AXES = replace(
 
 
 def stepper_name(axis: RotaryAxis) -> str:
-    """The name of the [manual_stepper] of a rotary axis."""
+    """The name of a rotary axis's [manual_stepper]."""
     return axis.stepper or f"stepper_{axis.letter.lower()}"
 
 
 def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
-    """`X:1.000 Y:2.000 Z:3.000 E:0.000`."""
+    """Klipper's report, `X:1.000 Y:2.000 Z:3.000 E:0.000`."""
     del steps
     return " ".join(f"{letter}:{coordinates[letter]:.3f}" for letter in "XYZE")
 
 
 def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, bed_target_c: float) -> str:
-    """`B:20.0 /0.0 T0:20.0 /0.0`."""
+    """Klipper's report, `B:20.0 /0.0 T0:20.0 /0.0`."""
     return f"B:{bed_c:.1f} /{bed_target_c:.1f} T0:{nozzle_c:.1f} /{nozzle_target_c:.1f}"
 
 
@@ -130,7 +129,7 @@ SIMULATED = SimulationRules(
     identity_in_ok=True,
     banner=("// Klipper state: Ready",),
     numbers="ignore",
-    answers_blank=True,  # klippy/gcode.py, _process_commands: whatever a line holds, it is acknowledged
+    answers_blank=True,  # klippy/gcode.py, _process_commands: any line is acknowledged
     queue_lines=20,
     blocks=100,  # its toolhead looks 2 s ahead, whatever number of moves that is
     urgent="lines",
@@ -145,8 +144,8 @@ SIMULATED = SimulationRules(
     out_of_range="!! Move out of range: {}",
     heater_fault="Heater extruder not heating at expected rate",
     kill=("// Klipper state: Shutdown",),
-    # klippy/gcode.py, _respond_error and cmd_default: the next command is answered with the reason, not M105 and what is known
-    # without a printer; klippy/klippy.py, message_shutdown.
+    # klippy/gcode.py, _respond_error and cmd_default: the next command is answered with the reason, except M105 and commands that
+    # work without a printer; klippy/klippy.py, message_shutdown.
     after_kill=(
         "// {}",
         "// Once the underlying issue is corrected, use the",
@@ -161,15 +160,14 @@ SIMULATED = SimulationRules(
     temperatures=temperature_report,
     while_heating="",
     lacks=UNKNOWN,
-    # klippy/extras/idle_timeout.py: timeout 600, TURN_OFF_HEATERS and M84; stepper_enable.py, motor_off: homing is forgotten.
+    # klippy/extras/idle_timeout.py: timeout 600, TURN_OFF_HEATERS and M84; stepper_enable.py, motor_off: homing is lost.
     idle_after_s=600.0,
     idle_axes=5,
     idle_shuts_down=True,
 )
 
-# klippy/extras/probe.py, cmd_PROBE: down to position_min of stepper_z, there is no other limit. Since 2026 it answers where
-# the bed is, z_offset subtracted ("Result: at %.3f,%.3f estimate contact at z=%.6f"), before where the tip was ("Result is
-# z=%.6f").
+# klippy/extras/probe.py, cmd_PROBE: down to position_min of stepper_z without another limit. Since 2026 it reports the bed's
+# position, z_offset subtracted ("Result: at %.3f,%.3f estimate contact at z=%.6f"), before that the tip's ("Result is z=%.6f").
 # klippy/extras/homing.py: "No trigger on probe after full movement", "Probe triggered prior to movement".
 PROBING = ProbingRules(
     command="PROBE PROBE_SPEED={speed:.1f} SAMPLES=1",
@@ -189,7 +187,7 @@ KLIPPER = Firmware(
         resends=False,
         silence_s=1800.0,
         revival="send FIRMWARE_RESTART by tiltprint console",
-        # toolhead.py, dwell: it moves the print time that idle_timeout.py counts from; M105 and M400 do not.
+        # toolhead.py, dwell: it moves the print time from which idle_timeout.py counts; M105 and M400 do not.
         keep_awake="G4 P1",
     ),
     simulated=SIMULATED,

@@ -1,13 +1,13 @@
 """LinuxCNC and grblHAL, controllers of milling machines: filament is a plain axis in absolute millimetres, and G0 ignores F, so
 travels are G1.
 
-LinuxCNC: heaters and fan are user M-codes whose value is the P word. M104, M106, M107, M109, M140 and M190 are scripts of the
-machine (its own codes are M100 to M199). M428 and M429 switch xyzac-trt-kins as the sample configuration does; a file ends with
-M2. The interpreter ends a program at a code that it does not know and that the machine has not remapped, at a word without a
-number, and at an E that no command uses (rs274ngc/interp_array.cc, interp_check.cc).
+LinuxCNC: heaters and fan are user M-codes with the value in the P word. M104, M106, M107, M109, M140 and M190 are scripts of the
+machine (its own codes are M100 to M199). M428 and M429 switch xyzac-trt-kins as in the sample configuration; a file ends with M2.
+The interpreter ends a program at a code that is unknown and not remapped, at a word without a number, and at an E that no command
+uses (rs274ngc/interp_array.cc, interp_check.cc).
 
-grblHAL has no E word. M851 and M850 switch its A/C kinematics, whose places count from the turn axis. Fans come with a plug-in
-that knows on and off; M104, M109, M140 and M190 need a plug-in of the machine's own.
+grblHAL has no E word. M851 and M850 switch its A/C kinematics, whose positions are relative to the turn axis. Fans need a plug-in
+that only switches on and off; M104, M109, M140 and M190 need a plug-in of the machine.
 """
 
 from dataclasses import replace
@@ -28,7 +28,7 @@ COMMANDS = {
     **{
         f"M{code}": Command("a script of the machine's own", heats="any")
         for code in range(100, 200)
-        if code not in (104, 106, 107, 109, 140, 190)  # scripts, too, but what they do is known
+        if code not in (104, 106, 107, 109, 140, 190)  # scripts with a known effect
     },
 }
 

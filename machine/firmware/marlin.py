@@ -1,8 +1,8 @@
-"""Marlin 2.1, and the firmwares that print what is written for it.
+"""Marlin 2.1, and other firmwares that print its dialect.
 
-Rotary axes are the words of AXIS4_NAME and AXIS5_NAME; M73, M486 and arcs are build options it may lack.
-TCP (G43.4, G49) exists in the fork DerAndere1/Marlin, branch Marlin2ForPipetBot, only. Its F on mixed moves counts X Y Z.
-Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
+Rotary axes are the words of AXIS4_NAME and AXIS5_NAME; M73, M486 and arcs are optional in builds. TCP (G43.4, G49) exists only in
+the fork DerAndere1/Marlin, branch Marlin2ForPipetBot. Its F on mixed moves counts X Y Z. Line numbers, checksums and `ok` as in
+gcode/queue.cpp, bugfix-2.1.x of 2024-09.
 """
 
 from collections.abc import Iterable, Mapping
@@ -44,7 +44,7 @@ COMMANDS = {
 
 DIALECT = Dialect(
     firmware="Marlin",
-    longest_line=95,  # MAX_CMD_SIZE 96 with the closing zero: a longer line loses its checksum
+    longest_line=95,  # MAX_CMD_SIZE 96 with the final zero: a longer line loses its checksum
     nozzle="M104 S{}",
     nozzle_wait="M109 S{}",
     fan_on="M106 S{}",
@@ -64,19 +64,19 @@ DIALECT = Dialect(
     commands=COMMANDS,
 )
 
-# Configuration_adv.h and module/planner.h, bugfix-2.1.x of 2024-09, which the dry run's planner and the simulated one share.
+# Configuration_adv.h and module/planner.h, bugfix-2.1.x of 2024-09, used by the planners of dry run and simulation.
 BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # planned moves, and commands read ahead of them
 PLANNED_BLOCKS = BLOCK_BUFFER_SIZE - 1  # one place of its ring stays empty
-MIN_SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME: a shorter move is stretched while few wait
+MIN_SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME: a shorter move is stretched while few are queued
 FIRST_MOVE_DELAY_S, FIRST_MOVE_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE: an idle machine waits this long for this many
 
-# gcode/control/M17_M18_M84.cpp: the idle time after which manage_inactivity (MarlinCore.cpp) lets the motors go; 0: never.
+# gcode/control/M17_M18_M84.cpp: the idle time after which manage_inactivity (MarlinCore.cpp) switches motors off; 0: never.
 MOTORS_STAY_ON = "M84 S0"
 
 # MarlinSettings::report in module/settings.cpp and the M..._report functions of gcode/config and gcode/control (Marlin 2.1): M503
-# puts `echo:` before every line and a heading before each; asked one by one M92, M201, M203, M204, M205 and M211 tell the line
-# alone, two places behind the point, axes by the letters of their words.
-STEPS_E = 93.0  # a mm of filament
+# puts `echo:` before every line and a heading before each; single queries M92, M201, M203, M204, M205 and M211 answer with the
+# line only, two decimals, axes by their letters.
+STEPS_E = 93.0  # per mm of filament
 HEADINGS = {
     "M92": "Steps per unit",
     "M203": "Max feedrates (units/s)",
@@ -88,7 +88,7 @@ HEADINGS = {
 
 
 def settings_report(command: str, settings: SimulatedSettings) -> list[str]:
-    """The lines that answer a command without words; [] for one that tells nothing."""
+    """The lines that answer a command without words; [] for one without such an answer."""
     lines = _lines(settings)
     if command == "M503":
         told = ("echo:; Linear Units:", "echo:  G21 ; (mm)")
@@ -142,8 +142,8 @@ SIMULATED = SimulationRules(
     idle_axes=3,
 )
 
-# gcode/probe/G38.cpp, bugfix-2.1.x: G38.3 stops on contact or at its target and says nothing; G38.2 would report an error.
-# G30 goes down to Z_PROBE_LOW_POINT whatever is expected, so it is not used. M114 tells hundredths of a mm.
+# gcode/probe/G38.cpp, bugfix-2.1.x: G38.3 stops on contact or at its target and sends nothing; G38.2 would report an error. G30
+# always goes down to Z_PROBE_LOW_POINT, so it is not used. M114 reports hundredths of a mm.
 PROBING = ProbingRules(command="G38.3 Z{low:.3f} F{feed:.0f}", needs="Marlin built with G38_PROBE_TARGET")
 
 MARLIN = Firmware(
@@ -155,7 +155,7 @@ MARLIN = Firmware(
     probing=PROBING,
 )
 
-# These print what is written for Marlin. Repetier: `ok 12` names the line, nothing reports the free places: its own host counts
+# Firmwares that print Marlin's dialect. Repetier: `ok 12` names the line, nothing reports the free places: its own host counts
 # characters against the receive buffer. M84 S sets the idle time of its motors as Marlin's does (Commands.cpp,
 # STEPPER_INACTIVE_TIME 360). Smoothieware: no ok follows its Resend.
 REPETIER = Firmware(name="Repetier-Firmware", signs=("repetier",), line=LineRules(places=16, keep_awake=MOTORS_STAY_ON))

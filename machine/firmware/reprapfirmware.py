@@ -1,7 +1,7 @@
-"""RepRapFirmware 3: the words are those of M584 (A C, B C or U V); fans count 0 to 1, M568 sets a tool's temperature.
+"""RepRapFirmware 3: axis letters are those of M584 (A C, B C or U V); fans count 0 to 1, M568 sets a tool's temperature.
 
-Mainline has no TCP, so coordinates are the table's. Line numbers are parsed but not checked for sequence, a bad checksum is
-dropped in silence (GCodeBuffer/StringParser.cpp, 3.6); USB loses nothing.
+Mainline has no TCP, so X Y Z are axis positions. Line numbers are parsed but not checked for sequence, a bad
+checksum is silently dropped (GCodeBuffer/StringParser.cpp, 3.6); USB loses nothing.
 """
 
 import json
@@ -44,7 +44,7 @@ COMMANDS = {
 
 DIALECT = Dialect(
     firmware="RepRapFirmware",
-    longest_line=120,  # it keeps more; the stream's checksum is made for no longer ones
+    longest_line=120,  # it keeps more, but the stream's checksum supports no longer ones
     nozzle="M568 P0 S{}",
     nozzle_wait="M109 S{}",
     fan_on="M106 P0 S{}",
@@ -71,15 +71,15 @@ KEY = re.compile(r'K"([^"]*)"')
 
 
 def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
-    """`X:1.000 Y:2.000 E:0.000 E0:0.0 Count 80 160 Machine 1.000 2.000 Bed comp 0.000`."""
+    """RepRapFirmware's report, `X:1.000 Y:2.000 E:0.000 E0:0.0 Count 80 160 Machine 1.000 2.000 Bed comp 0.000`."""
     named = " ".join(f"{letter}:{value:.3f}" for letter, value in coordinates.items())
     counts, bare = " ".join(map(str, steps.values())), " ".join(f"{coordinates[letter]:.3f}" for letter in steps)
     return f"{named} E0:{coordinates['E']:.1f} Count {counts} Machine {bare} Bed comp 0.000"
 
 
 def settings_report(command: str, settings: SimulatedSettings) -> list[str]:
-    """M409: a key of the object model as one line of JSON (Platform/Platform.cpp, its tables of axes and extruders): speed and
-    jerk a minute."""
+    """Answer to M409: a key of the object model as one line of JSON (Platform/Platform.cpp, its tables of axes and extruders);
+    speed and jerk per minute."""
     key = KEY.search(command)
     if not command.startswith("M409") or key is None:
         return []
@@ -119,8 +119,8 @@ SIMULATED = SimulationRules(
     lacks=frozenset({"M503", "M154", "M155", "M113", "M876", "M900"}),
 )
 
-# GCodes/GCodes4.cpp, 3.6, straightProbe0 to 3: G38.3 stops on contact or at its target, at the speed of M558 F, and says nothing;
-# where the probe has triggered before, it does not move. G30 S-1 ("Stopped at height") knows no lowest Z, so it is not used.
+# GCodes/GCodes4.cpp, 3.6, straightProbe0 to 3: G38.3 stops on contact or at its target, at the speed of M558 F, and sends
+# nothing; if the probe has triggered before, it does not move. G30 S-1 ("Stopped at height") has no lowest Z, so it is not used.
 PROBING = ProbingRules(command="G38.3 Z{low:.3f}", needs="a Z probe set up with M558")
 
 REPRAPFIRMWARE = Firmware(
