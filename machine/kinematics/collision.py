@@ -1,8 +1,8 @@
-"""Collision: the distances of the head's bodies from table, cradle and print, by separating directions.
+"""Collision: distances of the head's bodies from table, cradle and print, by separating directions.
 
 The distance of two convex bodies is the greatest gap over all unit directions d, where the gap is the least d . x of the one
 minus the greatest d . x of the other. Trying some directions gives a lower bound of the distance: a verdict "clear" is always
-right. A move along a line is tried as the convex body it sweeps: one direction must part both ends from the obstacle.
+right. A straight move is tested as the convex body it sweeps: one direction must separate both ends from the obstacle.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ REFINEMENTS = 40
 
 
 def table_reach(machine: Machine, pose: Pose) -> "Reach":
-    """(k,) greatest d . x over the table's plate at a pose, in the frame of X Y Z, asked for (k, 3) directions."""
+    """(k,) greatest d . x over the table's plate at a pose, in the frame of X Y Z, for (k, 3) directions."""
     table = machine.table
     if table.size_mm is not None:
         x, y = (0.5 * size for size in table.size_mm)
@@ -41,7 +41,7 @@ def _plate_reach(table: Table, normal: Floats, centre: Floats, tried: Floats) ->
 
 
 def _reach_of_cradle(machine: Machine, box: CradleBox, pose: Pose) -> "Reach":
-    """The reach of a body of the cradle, which tilts with the table and does not turn with it."""
+    """The reach of a body of the cradle, which tilts with the table but does not turn."""
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
     return partial(_corner_reach, machine_points(machine, tilted, corners(box.min_mm, box.max_mm)))
 
@@ -53,7 +53,7 @@ def _corner_reach(points: Floats, tried: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Printed:
-    """The print on the table: the corners of its convex hull, workpiece frame, and how far beads reach outside them."""
+    """The print on the table: the corners of its convex hull, workpiece frame, and the extent of beads outside them."""
 
     points_mm: Floats
     bead_mm: float
@@ -67,7 +67,7 @@ class Printed:
 
 
 def hull(points_mm: Floats, bead_mm: float) -> Printed:
-    """The hull of (n, 3) workpiece points, the centres of beads that reach bead_mm to each side."""
+    """The hull of (n, 3) workpiece points, the centres of beads that extend bead_mm to each side."""
     corners = np.zeros((0, 3))
     if len(points_mm) > 3:
         corners = np.asarray(Manifold.hull_points(points_mm).to_mesh64().vert_properties)[:, :3]
@@ -75,12 +75,12 @@ def hull(points_mm: Floats, bead_mm: float) -> Printed:
 
 
 def join_hulls(pieces: list[Printed]) -> Printed:
-    """Several printed pieces as one: the hull of their hulls, for no direction reaches farther than it."""
+    """Several printed pieces as one: the hull of their hulls, which has the same reach in all directions."""
     points = [piece.points_mm for piece in pieces]
     return hull(np.vstack([np.zeros((0, 3)), *points]), max((piece.bead_mm for piece in pieces), default=0.0))
 
 
-Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) how far a solid reaches along each
+Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) reach of a solid along each
 
 
 def solids(machine: Machine, pose: Pose, printed: Printed | None = None) -> list[tuple[str, Reach]]:
@@ -93,7 +93,7 @@ def solids(machine: Machine, pose: Pose, printed: Printed | None = None) -> list
 
 
 def swing_mm(machine: Machine, printed: Printed) -> float:
-    """Greatest distance of a point of table, cradle and print from either rotary axis, at most."""
+    """Upper bound of the distance of a point of table, cradle and print from either rotary axis."""
     between = float(np.linalg.norm(np.array(machine.tilt.point_mm) - np.array(machine.turn.point_mm)))
     reach = float(np.hypot(machine.table.radius_mm, machine.table.thickness_mm))
     reach = max(reach, float(np.linalg.norm(printed.points_mm, axis=1).max(initial=0.0)) + printed.bead_mm)
@@ -103,7 +103,7 @@ def swing_mm(machine: Machine, printed: Printed) -> float:
 
 
 def sweep_gaps(body: Body, start: Floats, end: Floats, tried: Floats, reach: Floats) -> Floats:
-    """(n,) lower bounds of the distance of a body from an obstacle while the tip goes from (n, 3) start to (n, 3) end."""
+    """(n,) lower bounds of the distance of a body from an obstacle while the tip moves from (n, 3) start to (n, 3) end."""
     return gaps_of(swept(start, end, tried), body.least(tried) - reach)
 
 
@@ -119,9 +119,9 @@ def gaps_of(least: Floats, margin: Floats) -> Floats:
 
 
 def refined_gap(body: Body, start: Floats, end: Floats, normal: Floats, reach: Reach) -> float:
-    """The distance of one swept body from a solid, improved from the best tried direction by ever smaller steps.
+    """The distance of one swept body from a solid, improved from the best tried direction by pattern search.
 
-    normal: the table's. The gap is a concave function of the direction, so going uphill cannot get stuck.
+    normal: the table's. The gap is a concave function of the direction, so that the search cannot get stuck.
     """
     tried = directions(normal)
     step, best, gap = 0.2, tried[0], -np.inf

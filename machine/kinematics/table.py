@@ -1,4 +1,4 @@
-"""A table that tilts and turns under a head that moves along X Y Z: where a point of the workpiece is in the machine.
+"""Table that tilts and turns below a head with axes X Y Z: conversion between workpiece and machine coordinates.
 
 tip = tilt_point + R_tilt (turn_point + R_turn w - tilt_point), X Y Z = tip + tool: LinuxCNC's xyzac-trt-kins for any two axes.
 """
@@ -18,19 +18,19 @@ Point = tuple[float, float, float]
 
 
 def machine_points(machine: Machine, pose: Pose, workpiece_mm: Floats) -> Floats:
-    """(n, 3) X Y Z positions at which the tip touches the (n, 3) workpiece points, the table standing at a pose."""
+    """(n, 3) X Y Z positions at which the tip touches (n, 3) workpiece points, with the table in a pose."""
     points: Floats = workpiece_mm @ rotation(machine, pose).T + shift(machine, pose)
     return points
 
 
 def workpiece_points(machine: Machine, pose: Pose, machine_mm: Floats) -> Floats:
-    """(n, 3) workpiece points under the tip when X Y Z are (n, 3) machine_mm and the table stands at a pose."""
+    """(n, 3) workpiece points under the tip at X Y Z of (n, 3) machine_mm, with the table in a pose."""
     points: Floats = (machine_mm - shift(machine, pose)) @ rotation(machine, pose)
     return points
 
 
 def part_shift(machine: Machine, pose: Pose, base_offset_mm: float) -> Floats:
-    """(3,) what to add to part coordinates to get X Y Z: part and machine frame differ by this translation only."""
+    """(3,) translation from part coordinates to X Y Z, the only difference between the two frames."""
     moved: Floats = shift(machine, pose) + np.array([0.0, 0.0, base_offset_mm])
     return moved
 
@@ -41,7 +41,7 @@ def workpiece_path(machine: Machine, axes: Floats) -> Floats:
 
 
 def workpiece_segments(machine: Machine, start: Floats, end: Floats, rows: Indices) -> Floats:
-    """(m, 2, 3) places under the tip where (m,) of the moves begin and end; start, end: (n, 5) X Y Z tilt turn."""
+    """(m, 2, 3) points under the tip where (m,) of the moves begin and end; start, end: (n, 5) X Y Z tilt turn."""
     return _segments(start, end, rows, _chain(machine))
 
 
@@ -62,7 +62,7 @@ def _path(axes: Floats, chain: Floats) -> Floats:
 
 @kernel
 def _segments(start: Floats, end: Floats, rows: Indices, chain: Floats) -> Floats:
-    """Most moves begin where the one before them has ended."""
+    """Kernel of workpiece_segments; most moves begin at the end of the one before."""
     out, angles = np.empty((len(rows), 2, 3)), table(2, 3)
     for k in range(len(rows)):
         row = rows[k]
@@ -77,7 +77,7 @@ def _segments(start: Floats, end: Floats, rows: Indices, chain: Floats) -> Float
 
 @no_nrt
 def goes_on(start: Floats, end: Floats, row: int) -> bool:
-    """Whether a row begins where the one before it has ended, on all five axes."""
+    """Whether a row begins at the end of the one before, on all five axes."""
     same = row > 0
     for axis in range(5):
         same = same and start[row, axis] == end[row - 1, axis]
@@ -86,7 +86,7 @@ def goes_on(start: Floats, end: Floats, row: int) -> bool:
 
 @no_nrt
 def _place(rows: Floats, row: int, chain: Floats, angles: Floats, is_first: bool) -> Point:
-    """The workpiece point of one of (n, 5) rows; angles: (2, 3) last place, deg, of both rotary axes, its cosine and sine."""
+    """The workpiece point of one of (n, 5) rows; angles: (2, 3) cached angle, deg, cosine and sine of both rotary axes."""
     axes = rows[row]  # sliced in here, where no references are counted
     for axis in range(2):
         if is_first or axes[3 + axis] != angles[axis, 0]:
@@ -99,7 +99,7 @@ def _place(rows: Floats, row: int, chain: Floats, angles: Floats, is_first: bool
 
 @no_nrt
 def _about(middle: Floats, axis: Floats, angle: Floats, point: Point) -> Point:
-    """A point turned about an axis through a middle, seen from there; angle: (3,) with its cosine and sine at the end."""
+    """A point rotated about an axis through a centre, relative to that; angle: (3,) with its cosine and sine at the end."""
     cosine, sine = angle[1], angle[2]
     x, y, z = point[0] - middle[0], point[1] - middle[1], point[2] - middle[2]
     if sine == 0.0 and cosine == 1.0:
@@ -113,10 +113,10 @@ def _about(middle: Floats, axis: Floats, angle: Floats, point: Point) -> Point:
 
 
 def origin_mm(machine: Machine) -> Floats:
-    """(3,) the workpiece origin as a following firmware calls it.
+    """(3,) the workpiece origin in the coordinates of a following firmware.
 
-    LinuxCNC and Marlin: where X Y Z stand there with the table level, for their kinematics change nothing at tilt 0, turn 0.
-    grblHAL: zero, the turn axis on the table.
+    LinuxCNC and Marlin: X Y Z there with the table level, for their kinematics change nothing at tilt 0, turn 0. grblHAL: zero,
+    the turn axis on the table.
     """
     if dialect_of(machine).follow_from_turn_axis:
         return np.zeros(3)
@@ -124,7 +124,7 @@ def origin_mm(machine: Machine) -> Floats:
 
 
 def followed_places(machine: Machine, pose: Pose, points_mm: Floats) -> Floats:
-    """(n, 3) places on the table for (n, 3) axis positions at a pose."""
+    """(n, 3) positions relative to the table for (n, 3) axis positions at a pose."""
     places: Floats = workpiece_points(machine, pose, points_mm) + origin_mm(machine)
     return places
 
