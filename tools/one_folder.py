@@ -1,12 +1,12 @@
-"""One folder: tiltprint with its own Python and all libraries, for a Linux that has no Python.
+"""One folder: tiltprint with its own Python and all libraries, for a Linux without Python.
 
     python tools/one_folder.py -o dist/tiltprint-linux [--wheel FILE.whl]
 
-Copies the Python that runs this script, without what no program needs, installs the wheel (built first where none is given) and
-its libraries into it, lays the system's libraries that its modules are linked to beside it, and compiles the kernels.
-`tiltprint` in the folder starts the program; the folder may be moved. LICENSES has the licence texts of all that is bundled. It
-runs where the C library is as new as here, or newer. The program starts interpreters of its own (the workbench's workers, prints,
-compilers), so it is a Python in a folder and not a program that PyInstaller or Briefcase freeze: those have none to start.
+Copies the Python that runs this script, without unneeded parts, installs the wheel (built first by default) and its libraries
+into it, adds the system libraries to which its modules are linked, and compiles the kernels. `tiltprint` in the folder starts the
+program; the folder may be moved. LICENSES has the licence texts of everything bundled. It runs with a C library as new as here,
+or newer. The program starts interpreters of its own (the workbench's workers, prints, compilers), so it is a Python in a folder
+and not a program frozen by PyInstaller or Briefcase, which has none to start.
 """
 
 import argparse
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 VERSION = f"python{sys.version_info.major}.{sys.version_info.minor}"
 LEFT_OUT = ["test", "idlelib", "tkinter", "turtledemo", "lib2to3", "ensurepip", "_tkinter*", "_test*", "site-packages"]
 LEFT_OUT += ["__pycache__", "config-*", "*.a"]
-# What every Linux has, and has its own of.
+# Libraries that every Linux has in its own version.
 SYSTEM = re.compile(r"^(linux-vdso|ld-linux|lib(c|m|dl|rt|util|pthread|resolv|nsl)\.so)")
 LICENCE = re.compile(r"(?i)(^|/)(licen[cs]e|copying|notice|authors)[^/]*$")
 LAUNCHER = f"""#!/bin/sh
@@ -70,7 +70,7 @@ def _wheel(folder: Path) -> Path:
 
 
 def _copy_python(folder: Path) -> None:
-    """The interpreter and the standard library, where it finds itself: by lib/pythonX.Y/os.py beside bin."""
+    """Copy the interpreter and the standard library; it finds itself by lib/pythonX.Y/os.py beside bin."""
     base = Path(sys.base_prefix)
     (folder / "bin").mkdir(parents=True)
     shutil.copy2(Path(sys.executable).resolve(), folder / "bin" / VERSION)
@@ -80,7 +80,7 @@ def _copy_python(folder: Path) -> None:
 
 
 def _copy_libraries(folder: Path) -> None:
-    """The system's libraries that Python and its modules are linked to, found from where they lie."""
+    """Copy the system libraries to which Python and its modules are linked."""
     native = folder / "lib" / "native"
     native.mkdir()
     modules = [folder / "bin" / VERSION, *sorted((folder / "lib" / VERSION / "lib-dynload").glob("*.so"))]
@@ -102,7 +102,7 @@ def _linked(module: Path) -> Iterator[Path]:
 
 
 def _write_licences(folder: Path, packages: Path) -> None:
-    """The licence texts of Python and of every package, and a list of them."""
+    """Write the licence texts of Python and of every package, and a list of them."""
     licences, rows = folder / "LICENSES", []
     licences.mkdir()
     for text in sorted({*Path(sysconfig.get_path("stdlib")).glob("LICENSE*"), *Path(sys.base_prefix).glob("LICENSE*")}):

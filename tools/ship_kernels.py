@@ -1,10 +1,10 @@
-"""Ship kernels: lay compiled kernels beside the packages, so that a first run need not compile for a minute.
+"""Ship kernels: put compiled kernels beside the packages, so that a first run need not compile for a minute.
 
     python tools/ship_kernels.py -o dist      a wheel of this checkout with kernels
-    PYTHON tools/ship_kernels.py              the packages that this PYTHON imports get them
+    PYTHON tools/ship_kernels.py              adds kernels to the packages that this PYTHON imports
 
 They fit the Python, numba and llvmlite that run this script, on processors of the same kind (mdp.kernels.cache); with others the
-program compiles as it does without them. What lies in the folder that NUMBA_CACHE_DIR names is not compiled again.
+program compiles as without them. Kernels in the folder NUMBA_CACHE_DIR are not compiled again.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = ("profiles", "mdp", "slicer", "machine", "pyproject.toml", "README.md", "LICENSE")
-# Beside the bundles of a first run: what calls the kernels of some models and settings only.
+# In addition to the bundles of a first run: runs that call kernels of some models and settings only.
 RUNS = (
     "print demo:tree --port sim --set machine.arcs=true",
     "export demo:figure -o a.gcode --set process.adaptive_cusp_mm=0.05 --set process.seam=random --set search.simplify_faces=500"
@@ -29,7 +29,7 @@ RUNS = (
 
 
 def main() -> None:
-    """Make the wheel, or ship with the packages that are imported here."""
+    """Make the wheel, or add kernels to the packages that are imported here."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("-o", "--out", type=Path, metavar="FOLDER", help="make a wheel there")
     given = options.parse_args()
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def _wheel(copy: Path, out: Path) -> str:
-    """The wheel of a copy of the checkout, which stays as it is."""
+    """The wheel of a copy of the checkout, which is not changed."""
     for name in PROJECT:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "compiled"))
@@ -58,7 +58,7 @@ def _wheel(copy: Path, out: Path) -> str:
 
 
 def _compile() -> None:
-    """Compile by doing what calls the kernels; what is in the cache already is not compiled again."""
+    """Compile by running everything that calls kernels; cached ones are not compiled again."""
     from machine.cli.cli import main as tiltprint
     from machine.pipeline.compilers import wait_for
     from machine.pipeline.precompile import BUNDLES
@@ -77,7 +77,7 @@ def _compile() -> None:
 
 
 def _fine_model() -> None:
-    """A mesh of more than 20,000 faces."""
+    """Call the kernels for meshes of more than 20,000 faces."""
     import manifold3d as m3
 
     from mdp.cost.hidden import hidden_shares
@@ -87,7 +87,7 @@ def _fine_model() -> None:
 
 
 def _limb() -> None:
-    """Cut off while others stand beside it, which travels pass over."""
+    """Call the kernels for a limb that is cut off while others stand beside it, over which travels pass."""
     import numpy as np
 
     from mdp.clearance import StandingColumns

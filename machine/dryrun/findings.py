@@ -90,6 +90,6 @@ def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:
 
 
 def unless_own(program: ParsedProgram, first: int, last: int) -> tuple[Severity, str]:
-    """Severity of a missing command, and words to add: a machine's own macro before rows first to last may have done it unseen."""
+    """Severity of a missing command, and words to add: a machine's macro before rows first to last may have done it unseen."""
     names = [event.letters for event in program.events if event.code == OWN and first <= event.row <= last]
     return ("warning", f", unless {names[0]} does that") if names else ("error", "")

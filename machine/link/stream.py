@@ -1,4 +1,4 @@
-"""Stream: send a program to a printer: checked first, fed as fast as the window allows, to a barrier at the end or a safe stop."""
+"""Stream: send a program to a printer: checked first, fed as fast as the window allows, to a final barrier or a safe stop."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -200,7 +200,7 @@ class _Print:
         return last_known(reports.temperature, self.medium.now_s() - reports.temperature_s)
 
     def _shut_down(self, timeout_s: float, alive: bool = True, waits: bool = True) -> Heaters:
-        """Switch the heaters off and lift the tip if the printer responds and knows its position; waits: for the end of homing."""
+        """Switch the heaters off and lift the tip if the printer responds and knows its position; waits: for homing to end."""
         exchange, feed = self.exchange, self.feed
         try:
             heaters = self._guard.switch_off(timeout_s, waits)

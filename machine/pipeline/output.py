@@ -208,7 +208,7 @@ def program_beside(journal: Path) -> Path:
 
 
 def check_roles(read: Iterable[Role], written: Iterable[Role]) -> None:
-    """Raise OutputError for a file that is read and written, or written twice. Names of one file through links are the same file."""
+    """Raise OutputError for a file that is read and written, or written twice. Links to one file are the same file."""
     known: dict[object, str] = {}
     for role, path in read:
         if path is not None and (same := _identity(path)) is not None:

@@ -200,7 +200,7 @@ def _within(room: Zone, part: Part) -> Part:
 
 
 def _with_place_settings(part: Part, model: Decomposition, given: Sequence[PartSettings]) -> Part:
-    """A model's first part, printed as one with the others', with its own settings as a modifier of its room. Raises PlanError."""
+    """A model's first part, printed as one with the others', with its settings as a modifier of its room. Raises PlanError."""
     process = {key: value for own in given if own.part == 1 for key, value in own.process.items()}
     for key in process:
         if key not in OF_A_PLACE + SPEEDS_OF_A_PLACE:

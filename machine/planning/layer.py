@@ -197,7 +197,7 @@ class Laid(NamedTuple):
 
 @kernel
 def trail_after(laid: Laid, first: int, end: int, before: Floats, wipe_mm: float) -> Floats:
-    """Path (n, 3) of a wipe of wipe_mm after some of a layer's strokes; before: the path before them, empty after a retraction."""
+    """Path (n, 3) of a wipe of wipe_mm after some strokes of a layer; before: the path before them, empty once retracted."""
     from_here = end - 1
     while from_here > first and not _suffices(laid, from_here, wipe_mm):
         from_here -= 1
@@ -348,7 +348,7 @@ def _ways(points_mm: Floats, flat_mm: Floats, starts: Indices, area_mm2: Floats,
 
 @kernel
 def _coasted(strokes: Moves, flat_mm: Floats, coasts: Mask, coast_mm: float) -> Moves:
-    """The strokes, some of which push nothing over their last coast_mm; steps are split where that begins. flat_mm: as in _ways."""
+    """The strokes, some of which push nothing over their last coast_mm, where a step is split. flat_mm: as in _ways."""
     out, done = Moves(table(len(strokes.ways) + len(coasts), 4), strokes.rows), longs(2, 0)
     first = 0
     for k in range(len(coasts)):

@@ -121,7 +121,7 @@ def _go_down(tip: Tip, target: Floats, across_z_mm: float) -> None:
 
 
 def _turned(tip: Tip, pose: Pose, target: Floats | None, part: int) -> float:
-    """Retract, move to a stand above everything that may be higher, and turn the table; returns Z of the crossing to the target."""
+    """Retract, move to a stand above everything that may be higher, and turn the table; returns Z of the next crossing."""
     retract(tip)
     machine, turn = tip.profile.machine, Turn(tip.pose, pose, tip.at_mm, target)
     if tip.has_limbs:

@@ -70,7 +70,7 @@ def find_park_position(
 
 
 def beside(machine: Machine, printed: Printed, at_mm: Floats, pose: Pose) -> list[tuple[float, float]]:
-    """X, Y beside a finished print within the axes' reach: straight out of its outline to each side, or the tip's own if outside."""
+    """X, Y beside a finished print within the axes' reach: straight out to each side, or the tip's own if outside."""
     x, y = (float(value) for value in at_mm[:2])
     right, back, left, front = printed.reach(machine, pose, np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]))
     outline = ((-left, right), (-front, back))
@@ -197,7 +197,7 @@ def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> tuple[F
 
 
 def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Speeds) -> Route:
-    """The fastest safe route of a turn; part: the part after it. Raises MoveError when no stand is safe within the axis limits."""
+    """The fastest safe route of a turn before a part. Raises MoveError when no stand is safe within the axis limits."""
     tried, reach = sweep(machine, printed, turn.start, turn.end)
     best: Route | None = None
     lowest = inf

@@ -63,7 +63,7 @@ def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
 
 
 def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:
-    """(part, layer) before which the print stops -> whether for another filament. Raises SliceError for a missing part or layer."""
+    """(part, layer) before which the print stops -> whether for another filament. Raises SliceError if it does not exist."""
     return {(stop.part, _layer_of(stop, sliced)): stop.change for stop in stops}
 
 

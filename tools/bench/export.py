@@ -1,8 +1,8 @@
 """Whole commands: `python tools/bench/export.py MODEL ... [--height 60] [--support] [--do export|decompose|simulate|print]`.
 
-Measured is a fresh process from start to end with compiled kernels. `export` runs in turns with PrusaSlicer's command on the same
-mesh with the same settings, where that is installed; our command includes the dry run. The other commands run alone, so use
-`--beside COMMIT`. The model `box` is a cuboid of 20 x 20 x 10 mm, which shows what the start takes.
+Measures a fresh process from start to end with compiled kernels. `export` runs in turns with PrusaSlicer's command on the same
+mesh with the same settings, if that is installed; tiltprint's command includes the dry run. The other commands run alone, so use
+`--beside COMMIT`. The model `box` is a cuboid of 20 x 20 x 10 mm, which shows the start-up time.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from tools.bench.harness import OURS, Used, heading, options_of, row
 
 
 def bench(given: argparse.Namespace) -> None:
-    """Print one row a model."""
+    """Print one row per model."""
     heading("model", "core s", "wall s", "memory MB", "lines", "PrusaSlicer core s", "wall s", "lines", "core ratio", "wall")
     for model in given.models:
         mesh = mesh_of(m3.Manifold.cube((20.0, 20.0, 10.0))) if model == "box" else harness.standing(model, given.height)
@@ -32,7 +32,7 @@ def bench(given: argparse.Namespace) -> None:
             commands = [[*OURS, given.do, file, *further, *(f"--set={setting}" for setting in (*same, *given.set))]]
             if given.do == "export" and (prusa := harness.prusa_command(file, theirs, given.support)) is not None:
                 commands.append(prusa)
-            harness.command(commands[0])  # compiles what is not compiled yet
+            harness.command(commands[0])  # compiles missing kernels
             own, *other = harness.in_turns(commands, given.runs)
             lines = [out.read_bytes().count(b"\n") if out.exists() else None for out in (ours, theirs)]
         theirs_used = other[0] if other else Used(nan, nan, nan)

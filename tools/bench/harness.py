@@ -1,7 +1,7 @@
 """Shared by all benches: options, tables, timing, whole commands, PrusaSlicer as the rival, and runs beside an older commit.
 
 Every bench takes `--beside COMMIT`: it runs `--turns` times with this checkout and, in turn, with the packages of that commit.
-Compare only runs of one call, as other work on the computer changes all times.
+Compare only runs of one call, for other work on the computer changes all times.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from mdp.read import read_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 OURS = (sys.executable, "-c", "import sys; from machine.cli.start import main; sys.exit(main())")
-# Settings that make both slicers lay the same beads.
+# Settings for the same beads from both slicers.
 SAME = (
     "process.layer_height_mm=0.2", "process.first_layer_height_mm=0.2", "process.walls=3", "process.top_layers=4",
     "process.bottom_layers=4", "process.infill_density=0.2", "process.infill_pattern=grid", "process.support=none",
@@ -40,7 +40,7 @@ PRUSA_SAME = (
 ) + " ".join(f"--{kind}extrusion-width 0.45" for kind in WIDTHS)
 OUR_SUPPORT, PRUSA_SUPPORT = "process.support=auto", ("--support-material", "--support-material-style", "snug")
 
-# Runs a command in a small process of its own, because a child process begins with the resident memory of its parent.
+# Runs a command in a small process of its own, for a child process begins with the resident memory of its parent.
 METER = """import resource, subprocess, sys
 code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -52,7 +52,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, order=True)
 class Used:
-    """What some work took: core seconds (user and system), seconds of wall time, and greatest resident memory of a process."""
+    """Resources of some work: core seconds (user and system), wall seconds, and greatest resident memory of a process."""
 
     core_s: float
     wall_s: float
@@ -60,7 +60,7 @@ class Used:
 
 
 def options_of(doc: str, models: bool = True) -> argparse.ArgumentParser:
-    """The options that all benches have; models: whether it takes models."""
+    """Options of all benches; models: whether the bench takes models."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     if models:
         parser.add_argument("models", nargs="*", default=["demo:figure", "demo:tree", "demo:bracket", "demo:lattice"])
@@ -73,7 +73,7 @@ def options_of(doc: str, models: bool = True) -> argparse.ArgumentParser:
 
 
 def run(parser: argparse.ArgumentParser, bench: Callable[[argparse.Namespace], None]) -> None:
-    """Run a bench, or the same command by turns with this checkout and an older one."""
+    """Run a bench, or the same command in turns with this checkout and an older one."""
     given = parser.parse_args()
     if given.beside is None:
         bench(given)
@@ -91,7 +91,7 @@ def run(parser: argparse.ArgumentParser, bench: Callable[[argparse.Namespace], N
 
 @contextmanager
 def older_checkout(commit: str) -> Iterator[Path]:
-    """A work tree of a commit with the tools of this one."""
+    """A work tree of a commit with the tools of this checkout."""
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
         git = ["git", "-C", str(ROOT), "worktree"]
@@ -105,19 +105,19 @@ def older_checkout(commit: str) -> Iterator[Path]:
 
 
 def heading(*columns: str) -> None:
-    """Begin a table in Markdown."""
+    """Begin a Markdown table."""
     print(f"\n| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)
 
 
 def row(*cells: object) -> None:
-    """A row of the table; a number has two decimals, None and nan stand for what was not measured."""
+    """Print a row of the table; numbers have two decimals, None and nan mean not measured."""
     texts = (f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in cells)
     texts = ("-" if text in ("None", "nan") else text for text in texts)
     print(f"| {' | '.join(texts)} |", flush=True)
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, Used]:
-    """The result of a call in this process, and what it took. The memory is the greatest of the process so far."""
+    """Result of a call in this process, and its resources; the memory is the maximum of the process so far."""
     core, wall = process_time(), perf_counter()
     result = work()
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -125,13 +125,13 @@ def timed(work: Callable[[], Result]) -> tuple[Result, Used]:
 
 
 def least(work: Callable[[], object], runs: int) -> Used:
-    """What a call takes when it is warm: the run of least core seconds."""
+    """Resources of a warm call: the run with the fewest core seconds."""
     work()
     return min(timed(work)[1] for _ in range(runs))
 
 
 def command(words: Sequence[str | Path]) -> Used:
-    """What a whole command takes in processes of its own. Ends the bench where the command fails."""
+    """Resources of a whole command in processes of its own. Ends the bench if the command fails."""
     begun = perf_counter()
     done = subprocess.run([sys.executable, "-c", METER, *map(str, words)], capture_output=True, text=True, check=False)
     if done.returncode:
@@ -141,7 +141,7 @@ def command(words: Sequence[str | Path]) -> Used:
 
 
 def in_turns(commands: Sequence[Sequence[str | Path]], runs: int) -> list[Used]:
-    """The least of each command, run in turns."""
+    """Least resources of each command, run in turns."""
     used = [[command(words) for words in commands] for _ in range(runs)]
     return [min(column) for column in zip(*used, strict=True)]
 
@@ -153,7 +153,7 @@ def standing(model: str, height_mm: float) -> Mesh:
 
 
 def prusa_command(model: Path, out: Path, support: bool, further: str = "") -> list[str | Path] | None:
-    """PrusaSlicer's command for a model with the same settings; None where it is not installed."""
+    """PrusaSlicer's command for a model with the same settings; None if it is not installed."""
     own = PRUSA_SUPPORT if support else ("--no-overhangs",)
     found = shutil.which("prusa-slicer")
     return found and [found, *PRUSA_SAME.split(), *further.split(), *own, "-o", out, model]

@@ -1,8 +1,7 @@
-"""The serial link: `python tools/bench/link.py [terminal] [sim] [virtual]` (without a name: all of them).
+"""Serial link: `python tools/bench/link.py [terminal] [sim] [virtual]` (by default all of them).
 
-terminal: lines a second over a pseudo-terminal. sim: the same as `print --port sim` streams, with its serial log, the machine's
-limits and the progress display; `--file` streams a program of yours. virtual: the share of a UART's bandwidth that is used, in
-virtual time.
+terminal: lines per second over a pseudo-terminal. sim: as streamed by `print --port sim`, with its serial log, the machine's
+limits and the progress display; `--file` streams another program. virtual: fraction of a UART's bandwidth used, in virtual time.
 """
 
 import argparse
@@ -28,25 +27,26 @@ RESTING = "G1 F12000 X100.00000 Y100.00000 Z10.00000 A0.00000 C0.0000000"
 
 
 def program(n: int) -> list[str]:
-    """n moves of the usual length, heated."""
+    """A heated program of n typical moves."""
     moves = [f"G1 X{20 + i % 60}.{i % 1000:03d} Y{10 + i % 50}.517 E0.03214 F2400" for i in range(n)]
     return ["G21", "G90", "M83", "M104 S210", "M109 S210", *moves, "M104 S0"]
 
 
 def resting(n: int) -> list[str]:
-    """n lines that are LINE_BYTES long on the wire and move nothing, so that only the line counts."""
+    """n lines of LINE_BYTES on the wire that move nothing, so that only the line counts."""
     return [_padded(number) for number in range(4, 4 + n)]
 
 
 def _padded(number: int) -> str:
-    """M115, M105 and M155 come before number 4; the checksum has one to three digits."""
+    """A line of LINE_BYTES for a number from 4, after M115, M105 and M155; its checksum has one to three digits."""
     whole = LINE_BYTES - len(frame(number, ""))
     lengths = (length for length in range(whole - 2, whole + 3) if len(frame(number, RESTING[:length])) == LINE_BYTES)
     return RESTING[: next(lengths, whole)]
 
 
 def used(lines: list[str], baud: int, build: BuildOptions) -> tuple[float, float, int, int]:
-    """Lines a second, share of the bandwidth used from the first to the last line, resends and lost bytes over a paced UART."""
+    """Lines per second, fraction of the bandwidth used between the first and the last line, resends and lost bytes over a paced
+    UART."""
     sent, times = [0], []
     printer = VirtualPrinter(load().machine, build, baud=baud)
 
@@ -61,13 +61,13 @@ def used(lines: list[str], baud: int, build: BuildOptions) -> tuple[float, float
 
 
 def over_the_terminal(lines: list[str], build: BuildOptions) -> Used:
-    """A whole print, greeting included."""
+    """Stream a whole print, including the greeting."""
     with SimulatedPrinter(load().machine, build=build) as printer:
         return timed(lambda: print_lines(lines, printer.path, 250000))[1]
 
 
 def as_print_does(lines: list[str]) -> Used:
-    """The same for the built-in printer."""
+    """Stream a program to the built-in printer like `print --port sim`."""
     profile = load()
     usb = profile.model_copy(update={"machine": profile.machine.model_copy(update={"receive_bytes": USB_BYTES})})
     with TemporaryDirectory() as folder, SimulatedPrinter(profile.machine, build=BuildOptions(queue=QUEUE)) as printer:
@@ -79,7 +79,7 @@ def as_print_does(lines: list[str]) -> Used:
 
 
 def bench(given: argparse.Namespace) -> None:
-    """Print the tables that are asked for."""
+    """Print the requested tables."""
     what, lines = given.what or PARTS, program(given.lines)
     streams = {}
     if "terminal" in what:

@@ -1,9 +1,9 @@
-"""Models in parts beside one piece: `python tools/bench/parts.py FILE_OR_FOLDER ... [--every N] [--orient] [--log FILE]`.
+"""Models in parts compared with one piece: `python tools/bench/parts.py FILE_OR_FOLDER ... [--every N] [--orient] [--log FILE]`.
 
-Both are printed with support and dry-run: as the program cuts the model where it stands, and in one piece straight up. With
-`--orient` the program also chooses the orientation, and the piece lies in its best single orientation. One row a model: parts,
-time and filament over those of one piece, support of both, area that needs support and area that gets none, seams, and what the
-dry run reports. `--log` appends each row at once and skips the models that the file has.
+Both are printed with support and dry-run: in parts as the program cuts the standing model, and in one piece upright. With
+`--orient` the program also chooses the orientation, and the single piece has its best one. One row per model: parts, time and
+filament relative to one piece, support of both, area that needs support and area without it, seams, and findings of the dry run.
+`--log` appends each row at once and skips models already in the file.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def bench(given: argparse.Namespace) -> None:
 
 
 def summary(rows: list[str]) -> str:
-    """Time and filament of the models that were cut, over those of one piece."""
+    """Time and filament of the models that were cut, relative to one piece."""
     parsed = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
     cut = [row for row in parsed if row[1].isdigit() and int(row[1]) > 1 and row[2]]
     if not cut:
@@ -53,7 +53,7 @@ def summary(rows: list[str]) -> str:
 
 
 def cells(file: Path, profile: Profile, orient: bool) -> list[str]:
-    """One model's cells behind its name."""
+    """A model's cells after its name."""
     try:
         mesh = mesh_of(file, profile)
         search = partial(decompose, name=file.name, profile=profile, request=SearchRequest(price=pricing(profile)))

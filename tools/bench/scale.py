@@ -1,8 +1,8 @@
-"""How cost grows with a model: `python tools/bench/scale.py DRAGON KITTEN [--faces 5000,20000,...]`.
+"""Growth of cost with a model's size: `python tools/bench/scale.py DRAGON KITTEN [--faces 5000,20000,...]`.
 
 Prints the tables of docs/scale.md, which tools/docs/draw_scale.py draws: `decompose --as-is` of the first model with its faces
-divided by Loop's scheme and simplified; `export --as-is` of demo:tree in 1 to 6 parts by plans, and of the second model in a
-single part in layers of several heights. Every command is a process of its own, warm; the least of some runs counts.
+subdivided by Loop's scheme and simplified; `export --as-is` of demo:tree in 1 to 6 parts by plans, and of the second model in a
+single part with several layer heights. Every command is a warm process of its own; the least of several runs counts.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from tools.bench.harness import OURS, command, heading, in_turns, options_of, ro
 
 PARTS = range(1, 7)
 HEIGHTS_MM = (0.1, 0.15, 0.2, 0.3)
-ENOUGH = 1.25  # times the faces that are wanted
+ENOUGH = 1.25  # times the requested faces
 
 
 def bench(given: argparse.Namespace) -> None:
@@ -36,7 +36,7 @@ def bench(given: argparse.Namespace) -> None:
 
 
 def faces_table(model: Path, counts: Sequence[int], folder: Path, runs: int) -> None:
-    """One row a number of faces: reading and searching."""
+    """Print one row per number of faces: reading and searching."""
     heading("faces", "core s", "memory MB", "parts")
     whole, _ = read_mesh(model)
     file, figures = folder / "model.stl", folder / "figures.json"
@@ -49,7 +49,7 @@ def faces_table(model: Path, counts: Sequence[int], folder: Path, runs: int) -> 
 
 
 def with_faces(mesh: Mesh, count: int) -> Mesh:
-    """The shape with about `count` faces: divided until there are more, then simplified by the least tolerance."""
+    """The shape with about `count` faces: subdivided until there are more, then simplified with the least tolerance."""
     while ENOUGH * len(mesh.faces) < count:
         mesh = Mesh.from_trimesh(mesh.to_trimesh().subdivide_loop(1))
     tolerance_mm = 1e-3
@@ -59,7 +59,8 @@ def with_faces(mesh: Mesh, count: int) -> Mesh:
 
 
 def export_table(first: str, exports: Iterable[tuple[object, str | Path, int, list[str]]], folder: Path, runs: int) -> None:
-    """One row an export by a plan: slicing, planning, dry run, without a search. exports: first cell, model, parts, options."""
+    """Print one row per export by a plan: slicing, planning, dry run, without a search. exports: first cell, model, parts,
+    options."""
     heading(first, "core s", "memory MB", "layers", "lines")
     plan, gcode, figures = folder / "plan.toml", folder / "out.gcode", folder / "figures.json"
     for cell, model, parts, options in exports:

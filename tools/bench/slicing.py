@@ -1,10 +1,10 @@
-"""Slicing beside PrusaSlicer: `python tools/bench/slicing.py MODEL ... [--height 60] [--support] [--layers 12]`.
+"""Slicing compared with PrusaSlicer: `python tools/bench/slicing.py MODEL ... [--height 60] [--support] [--layers 12]`.
 
-A model stands as a single part. Both programs get the same layers, line widths, walls, infill and speeds; PrusaSlicer prints with
-Arachne walls. One reader measures both G-code texts. Columns: core seconds (ours: mesh to G-code, warm; PrusaSlicer's: the whole
-command); minutes by one time estimate; filament; retractions; metres of travel, of outer and of inner walls; and for a number of
-layers the area of beads outside the true section and the area within 1.2 mm of the outline that no bead covers, both in percent
-of that band; the metres of beads narrower than 0.25 mm.
+The model is a single part. Both programs get the same layers, line widths, walls, infill and speeds; PrusaSlicer prints with
+Arachne walls. One reader measures both G-code texts. Columns: core seconds (tiltprint: mesh to G-code, warm; PrusaSlicer: the
+whole command); minutes by one time estimate; filament; retractions; metres of travel, of outer and of inner walls; for some
+layers the area of beads outside the true section and the area without a bead within 1.2 mm of the outline, both in percent of
+that band; metres of beads narrower than 0.25 mm.
 """
 
 import argparse
@@ -49,7 +49,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class Print:
-    """A G-code text that was read, where it puts the origin of the mesh, and the core seconds that it took to make."""
+    """A parsed G-code text, the position of the mesh's origin in it, and the core seconds to make it."""
 
     program: ParsedProgram
     origin_mm: Floats
@@ -57,7 +57,7 @@ class Print:
 
 
 def bench(given: argparse.Namespace) -> None:
-    """Print one row a model and slicer."""
+    """Print one row per model and slicer."""
     profile = load(settings=[*harness.SAME, *([harness.OUR_SUPPORT] if given.support else []), *given.set])
     heading(*COLUMNS)
     for model in given.models:
@@ -68,7 +68,7 @@ def bench(given: argparse.Namespace) -> None:
 
 
 def ours(mesh: Mesh, profile: Profile, runs: int) -> Print:
-    """Our program."""
+    """tiltprint's program."""
 
     def made() -> list[str]:
         whole = undivided("bench", mesh, profile)
@@ -80,7 +80,7 @@ def ours(mesh: Mesh, profile: Profile, runs: int) -> Print:
 
 
 def theirs(mesh: Mesh, profile: Profile, support: bool, runs: int) -> Print | None:
-    """PrusaSlicer's program for the same mesh, where it is installed."""
+    """PrusaSlicer's program for the same mesh; None if it is not installed."""
     with tempfile.TemporaryDirectory() as folder:
         model, out = Path(folder) / "model.stl", Path(folder) / "model.gcode"
         model.write_bytes(stl(mesh))
@@ -93,7 +93,7 @@ def theirs(mesh: Mesh, profile: Profile, support: bool, runs: int) -> Print | No
 
 
 def figures(laid: Print, mesh: Mesh, profile: Profile, layers: int) -> Sequence[object]:
-    """The cells behind the slicer's name."""
+    """The cells after the slicer's name."""
     program = laid.program
     length_mm = np.hypot(*(program.end - program.start)[:, :2].T)
     extrudes = program.kind == MoveKind.EXTRUDE

@@ -1,10 +1,10 @@
 """One print, stage by stage: `python tools/bench/stages.py MODEL ... [--machine NAME] [--keep FOLDER]`.
 
-Reading, one evaluation of all candidates of the search (`gains` and `sweep` of every direction), the search (as the model
-stands), slicing, planning, writing G-code, parsing it and the dry run each run in this process: core and wall seconds, the
-kernels being loaded. `--gcode FILE` times the parsing and the parts of the dry run for a program that is there. A long program:
-`--set process.scale=2 --set process.layer_height_mm=0.1 --set process.infill_density=1 demo:figure`. `--keep` writes the G-code
-of each model.
+Reading, one evaluation of all candidates of the search (`gains` and `sweep` of every direction), the search (without a change of
+orientation), slicing, planning, writing G-code, parsing it and the dry run each run in this process: core and wall seconds with
+loaded kernels. `--gcode FILE` measures parsing and the parts of the dry run for an existing program. A long program: `--set
+process.scale=2 --set process.layer_height_mm=0.1 --set process.infill_density=1 demo:figure`. `--keep` writes the G-code of each
+model.
 """
 
 import argparse
@@ -36,7 +36,7 @@ from tools.checks.harness import mesh_of
 
 
 def bench(given: argparse.Namespace) -> None:
-    """Print a table a model or program."""
+    """Print a table per model or program."""
     profile = load(machine=given.machine, settings=given.set)
     quick = load(machine=given.machine, settings=["process.layer_height_mm=0.3", "process.scale=0.5"])
     with redirect_stdout(StringIO()):
@@ -63,7 +63,7 @@ def stage(name: str, work: Callable[[], Result]) -> Result:
 
 
 def print_in_stages(model: str, profile: Profile) -> list[str]:
-    """The G-code of a model."""
+    """Print a model in stages; returns its G-code."""
     mesh = stage("read", lambda: mesh_of(locate(model), profile))
     stage("evaluate all candidates", lambda: evaluate(mesh, profile))
     request = SearchRequest(price=pricing(profile))
@@ -74,7 +74,7 @@ def print_in_stages(model: str, profile: Profile) -> list[str]:
 
 
 def evaluate(mesh: Mesh, profile: Profile) -> None:
-    """Evaluate every plane of every direction once, as a search begins."""
+    """Evaluate every plane of every direction once, as at the beginning of a search."""
     limits = bounds_of(directions(profile.search), mesh, profile, plate_disc(mesh, profile.search))
     angle_deg, step_mm = profile.process.self_supporting_angle_deg, profile.search.offset_step_mm
     remainder = Remainder(mesh, risky_upright(mesh, angle_deg, profile.search.count_platform_faces))
@@ -83,7 +83,7 @@ def evaluate(mesh: Mesh, profile: Profile) -> None:
 
 
 def check_in_stages(lines: list[str], profile: Profile) -> None:
-    """Parse a program, run the dearest checks of the dry run one by one, then the whole dry run."""
+    """Parse a program, run the most expensive checks of the dry run one by one, then the whole dry run."""
     program = stage("parse G-code", lambda: parse_gcode(lines, profile.machine))
     deposited = beads_of(program, np.flatnonzero(program.kind == MoveKind.EXTRUDE), profile)
     contacts = stage("dry run: plastic under every move", lambda: replay(program, deposited, profile))

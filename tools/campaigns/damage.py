@@ -1,10 +1,10 @@
-"""Damage campaign: seeded damage to model files and G-code; every file must be read or refused with a sentence, soon.
+"""Damage campaign: seeded damage to model files and G-code; every file must be read or refused with a sentence, in time.
 
     python tools/campaigns/damage.py [--models 600] [--programs 600] [--first 0] [--jobs 2] [--more FOLDER ...]
 
-Models: those that ship, written by trimesh in six formats, and those of the folders of --more; programs: of one that ships,
-exported for five machines, and the .gcode files of --more. Each damaged file is read in a process of its own (a program is
-dry-run as well) that may take 20 s and 2 GB. Exits with 1 where one crashed, hung or took more memory, naming its number.
+Models: the shipped ones, written by trimesh in six formats, and those in the folders of --more; programs: of a shipped model,
+exported for five machines, and the .gcode files of --more. Each damaged file is read (a program also dry-run) in a process of its
+own limited to 20 s and 2 GB. Exits with 1 if one crashed, hung or exceeded the memory, naming its number.
 """
 
 import os
@@ -40,7 +40,7 @@ from tools.campaigns.harness import counts, options_of, table, trials
 MOST_S, MOST_BYTES = 20, 2 * 2**30
 DEMOS = ("bracket", "figure", "lattice", "tree")
 MACHINES = ("generic_ac", "gen5x", "linuxcnc_xyzac", "trident_5axis", "fractal5pro")
-LINES = 2500  # of a program: its head and a stretch from anywhere
+LINES = 2500  # of a program: its head and a random stretch
 NUMBER = re.compile(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
 NASTY = [b"nan", b"inf", b"-inf", b"1e999", b"-1", b"0", b"4294967296", b"9" * 40, b"1e-310", b"1e300"]
 NASTY += [b"--1", b"1.2.3", b"", b"\x00"]
@@ -49,7 +49,7 @@ CODES = {0: READ, 1: REFUSED, 3: CRASHED}
 
 
 def renumber(content: bytes, dice: random.Random) -> bytes:
-    """Some numbers are others that readers stumble over."""
+    """Replace some numbers by ones that are hard for readers."""
     places = list(NUMBER.finditer(content[:200_000]))
     for match in sorted(dice.sample(places, min(len(places), dice.choice([1, 2, 10]))), key=lambda number: -number.start()):
         content = content[: match.start()] + dice.choice(NASTY) + content[match.end() :]
@@ -57,7 +57,7 @@ def renumber(content: bytes, dice: random.Random) -> bytes:
 
 
 def flip(content: bytes, dice: random.Random) -> bytes:
-    """Some bytes are others."""
+    """Replace some bytes."""
     changed = bytearray(content)
     for _ in range(dice.choice([1, 3, 30, 300])):
         changed[dice.randrange(len(changed))] = dice.randrange(256)
@@ -65,7 +65,7 @@ def flip(content: bytes, dice: random.Random) -> bytes:
 
 
 def one_damage(content: bytes, dice: random.Random) -> bytes:
-    """A file that is cut short, changed, or of which a stretch is missing, repeated, elsewhere, or of one byte."""
+    """A file that is truncated or changed, or with a stretch missing, repeated, moved, or filled with one byte."""
     begin = dice.randrange(len(content))
     before, stretch, after = content[:begin], content[begin : begin + dice.choice([1, 4, 50, 1000, 20000])], content[begin:]
     after = after[len(stretch) :]
@@ -84,7 +84,7 @@ def one_damage(content: bytes, dice: random.Random) -> bytes:
 
 
 def damaged(content: bytes, dice: random.Random) -> bytes:
-    """A file with one to three damages; of an archive sometimes what is packed in it."""
+    """A file with one to three damages; for an archive sometimes in its content."""
     if content[:2] == b"PK" and dice.random() < 0.7:
         return _repacked(content, dice)
     for _ in range(dice.choice([1, 1, 2, 3])):
@@ -102,7 +102,7 @@ def _repacked(content: bytes, dice: random.Random) -> bytes:
 
 
 def model_seeds(folders: Sequence[Path]) -> list[tuple[str, bytes]]:
-    """(suffix, content) of whole model files."""
+    """(suffix, content) of intact model files."""
     seeds = [
         (file.suffix.lower(), file.read_bytes())
         for folder in folders
@@ -119,7 +119,7 @@ def model_seeds(folders: Sequence[Path]) -> list[tuple[str, bytes]]:
 
 
 def program_seeds(folders: Sequence[Path], scratch: Path) -> list[tuple[str, bytes]]:
-    """(suffix, content) of whole G-code files."""
+    """(suffix, content) of intact G-code files."""
     for machine in MACHINES:
         if tiltprint(["export", "demo:bracket", "--parts", "2", "--machine", machine, "-o", str(scratch / f"{machine}.gcode")]):
             raise SystemExit(f"demo:bracket cannot be exported for {machine}")
@@ -128,14 +128,14 @@ def program_seeds(folders: Sequence[Path], scratch: Path) -> list[tuple[str, byt
 
 
 def excerpt(content: bytes, dice: random.Random) -> bytes:
-    """The head of a program, a stretch from anywhere, and its last lines."""
+    """The head of a program, a random stretch, and its last lines."""
     lines = content.splitlines(keepends=True)
     begin = dice.randrange(len(lines))
     return b"".join([*lines[:400], *lines[begin : begin + LINES], *lines[-400:]])
 
 
 def read_program(file: Path) -> None:
-    """As `tiltprint simulate` reads a program."""
+    """Read a program like `tiltprint simulate`."""
     lines = read_gcode_lines(file)
     profile, _ = read_embedded_profile(lines, load(), frozenset())
     dry_run(lines, profile)
@@ -143,7 +143,7 @@ def read_program(file: Path) -> None:
 
 @dataclass(frozen=True)
 class Trial:
-    """What became of one damaged file, after how long, and what was said."""
+    """Outcome of one damaged file, its duration, and the message."""
 
     number: int
     suffix: str
@@ -153,7 +153,7 @@ class Trial:
 
 
 def trial(seeds: list[tuple[str, bytes]], read: Callable[[Path], object], scratch: Path, number: int) -> Trial:
-    """Damage one of the seeds as its number says, and read it in a process of its own."""
+    """Damage one of the seeds, determined by the number, and read it in a process of its own."""
     dice = random.Random(number)
     suffix, content = dice.choice(seeds)
     file, said = scratch / f"{number}{suffix}", scratch / f"{number}.txt"
@@ -172,7 +172,7 @@ def trial(seeds: list[tuple[str, bytes]], read: Callable[[Path], object], scratc
 
 
 def _try(read: Callable[[Path], object], file: Path, told: Path) -> int:
-    """The exit code; what is said goes to a file."""
+    """Read a file; returns the exit code, and writes the message to a file."""
     with told.open("w") as said:
         os.dup2(said.fileno(), 2)
         try:
@@ -180,7 +180,7 @@ def _try(read: Callable[[Path], object], file: Path, told: Path) -> int:
         except UserError as error:
             said.write(plain_lines(str(error)))
             return 1
-        except BaseException:  # noqa: BLE001 - whatever it is, it is what is looked for
+        except BaseException:  # noqa: BLE001 - every error is a result here
             traceback.print_exc(file=said)
             return 3
     return 0

@@ -2,9 +2,9 @@
 
     python tools/campaigns/faults.py [--scripts 1000] [--first 0] [--lines 2000] [--jobs 2]
 
-A print must end in exactly the program's strokes, each once and in order, or with the error that belongs to its faults, the
-machine safe: heaters off by the printer's own account, nothing moving; or, where nobody can reach the printer any more, with a
-message that says so. Sender and printer share a virtual clock: a print takes a second, and is the same at every run.
+A print must end with exactly the program's strokes, each once and in order, or with the error that matches its faults and a safe
+machine: heaters off by the printer's own report, nothing moving; or, if the printer is unreachable, with a message that says so.
+Sender and printer share a virtual clock: a print takes a second and is reproducible.
 """
 
 import random
@@ -27,15 +27,15 @@ from tools.campaigns.harness import options_of, trials
 from tools.campaigns.harness import table as grouped
 
 PROFILE = load()
-# Firmwares that never ask for a line again, over a line that loses no bytes of theirs.
+# Firmwares without resends, over a line that loses none of their bytes.
 NEVER = ("drop", "flip", "duplicate", "delay", "spurious resend", "silent reset")  # of USB: a board that restarts is gone
 TRUSTING = {5: load(settings=["machine.dialect=klipper"]), 13: load(settings=["machine.dialect=reprapfirmware"])}
 HEAT = ["M104 S200", "M109 S200", "G92 E0", "M83"]
 COLD = ["M104 S0", "M140 S0", "M107"]
-MOST_S = 7200.0  # twenty times what a print takes; a host that needs more hangs
-AFTER_S = 900.0  # watched after the end
+MOST_S = 7200.0  # twenty times the duration of a print; a host that needs more hangs
+AFTER_S = 900.0  # observation after the end
 OF_THE_LINE = ("too noisy", "torn line", "asks for line", "restarted without a word", "has been silent")
-# What an error may say, by the kinds of faults in its script.
+# Possible words of an error, by the kinds of faults in its script.
 WORDS: dict[str, tuple[str, ...]] = {
     "error": ("Heating failed",),
     **dict.fromkeys(("reset", "silent reset"), ("restarted", "stands at")),
@@ -51,7 +51,7 @@ UNREACHABLE = "may still be on"
 
 @dataclass(frozen=True)
 class Trial:
-    """One print: the kinds of its faults, the error it ended with ("": none), and what must not be about that."""
+    """One print: the kinds of its faults, its error ("": none), and what is wrong about that."""
 
     seed: int
     dialect: str
@@ -63,7 +63,7 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """The group of the table it belongs to."""
+        """Its group in the table."""
         deadly = [kind for kind in self.kinds if kind not in (*HEALED, "delay")]
         if self.dialect != "marlin":
             return f"{self.dialect}: all but lost bytes"
@@ -73,7 +73,7 @@ class Trial:
 
 
 def program(lines: int) -> list[str]:
-    """Heating and a number of strokes, no two alike."""
+    """Heating and a number of strokes, all different."""
     strokes = [
         f"G1 X{20 + k % 60}.{k % 1000:03d} Y{30 + k % 41}.5 E0.{10000 + k:05d} F6000"
         for k in range(lines - len(HEAT) - len(COLD))
@@ -87,7 +87,7 @@ def wanted(lines: Iterable[str]) -> np.ndarray:
 
 
 def script(seed: int, lines: int) -> FaultScript:
-    """One to twelve faults of up to four kinds; a third of the scripts holds what can be healed, a tenth faults by chance."""
+    """One to twelve faults of up to four kinds; a third of the scripts only has curable ones, a tenth faults by chance."""
     rng = random.Random(seed)
     if seed % 16 in TRUSTING:
         safe = [kind for kind in KINDS if kind not in NEVER]
@@ -107,7 +107,7 @@ def build_options(seed: int) -> BuildOptions:
 
 
 def trial(seed: int, lines: int) -> Trial:
-    """Print once and judge."""
+    """Print once and judge the result."""
     text, faults = program(lines), script(seed, lines)
     profile = TRUSTING.get(seed % 16, PROFILE)
     baud = None if profile is not PROFILE else (None, None, 250000, 115200)[seed % 4]
@@ -146,7 +146,8 @@ def judged(text: list[str], faults: FaultScript, printer: VirtualPrinter, error:
 
 
 def order(record: Record, strokes: np.ndarray, whole: bool) -> list[str]:
-    """Whether the executed strokes are the program's, each once and in order; the last may be cut short by a stop."""
+    """What is wrong with the executed strokes, which must be the program's, each once and in order; a stop may shorten the
+    last."""
     pushed = record.end[:, 5] - record.start[:, 5]
     got = np.column_stack([record.end[:, :2], pushed])[pushed > 1e-9]
     if whole and len(got) != len(strokes):
@@ -160,7 +161,7 @@ def order(record: Record, strokes: np.ndarray, whole: bool) -> list[str]:
 
 
 def table(trials: list[Trial]) -> str:
-    """A row for every group of scripts."""
+    """Table with a row for every group of scripts."""
     columns = {
         "scripts": len,
         "exact": lambda mine: sum(not (trial.wrong or trial.error) for trial in mine),
@@ -172,7 +173,7 @@ def table(trials: list[Trial]) -> str:
 
 
 def reasons(trials: list[Trial]) -> str:
-    """How often prints were stopped with which words."""
+    """Counts of the messages with which prints were stopped."""
     words = Counter(re.sub(r"[\d.]+|N\d+", "#", trial.error.partition(";")[0])[:90] for trial in trials if trial.error)
     return "\n".join(f"{count:5d}  {text}" for text, count in words.most_common())
 

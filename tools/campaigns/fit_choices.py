@@ -1,12 +1,12 @@
-"""The book of choices, tools/campaigns/choices.jsonl: what judges mark as best, acceptable and wrong, and the weights of a cost
-from it.
+"""Book of choices, tools/campaigns/choices.jsonl: alternatives that judges mark as best, acceptable or wrong, and cost weights
+fitted to it.
 
 `python tools/campaigns/fit_choices.py add LIST.csv OFFERS.jsonl VERDICTS.csv...` measures the alternatives of
 tools/campaigns/offer_parts.py and adds them to the book; a file of verdicts has lines of sheet, the letters that are best,
-acceptable and wrong, and a reason. `fit` fits weights to all pairs that a judge marks differently, as Bradley and Terry (1952)
-do: the chance that one alternative is preferred is logistic in the difference of their costs, as shares of the model's surface.
-It says how many pairs the weights of the profile (`--set KEY=VALUE`) and the fitted ones order as the judges do, each tenth of
-the sources of models left out in turn, and how the judges mark what the profile takes of each sheet.
+acceptable and wrong, and a reason. `fit` fits weights to all pairs that a judge marks differently, by the model of Bradley and
+Terry (1952): the probability that one alternative is preferred is logistic in the difference of their costs, relative to the
+model's surface. It reports how many pairs the weights of the profile (`--set KEY=VALUE`) and the fitted ones order as the judges
+do, with cross-validation over tenths of the models' sources, and how the judges mark the profile's choice on each sheet.
 """
 
 import argparse
@@ -50,12 +50,12 @@ from tools.campaigns.offer_parts import sheet_name
 
 BOOK = Path(__file__).parent / "choices.jsonl"
 MARKS = ("best", "acceptable", "wrong")
-# What the cost of an alternative is made of: mm2, mm, seconds and metres; then numbers from 0 to 1, shares of the surface.
+# Terms of an alternative's cost: mm², mm, seconds and metres; then numbers from 0 to 1, relative to the surface.
 COSTS = ("support_mm2", "seam_mm", "hidden_seam_mm", "stairs_mm2", "cuts", "time_s", "filament_m")
 SHARES = ("narrow", "unsteady", "turned", "axis_askew", "unsound")
-NEVER = 1.0  # of the surface: what the search does not take
+NEVER = 1.0  # of the surface: never chosen by the search
 RIDGE, ROUNDS, FOLDS = 1e-3, 3000, 10
-DIGITS = 9  # of what the book says of orientations and planes
+DIGITS = 9  # of orientations and planes in the book
 
 
 def main() -> None:
@@ -74,7 +74,7 @@ def main() -> None:
 
 
 def add_to_book(models: Path, offers: Path, verdicts: Sequence[Path], profile: Profile) -> None:
-    """Measure what is offered and add it to the book with what the judges say; sheets that are in it get further verdicts."""
+    """Measure the alternatives and add them to the book with their verdicts; known sheets get further verdicts."""
     with models.open() as table:
         files = {sheet_name(row): Path(row["file"]) for row in csv.DictReader(table)}
     known, said = {entry["sheet"]: entry for entry in read_lines(BOOK)}, [read_verdicts(file) for file in verdicts]
@@ -96,12 +96,12 @@ def add_to_book(models: Path, offers: Path, verdicts: Sequence[Path], profile: P
 
 
 def cuts_of(entry: dict[str, Any]) -> list[int]:
-    """How many cuts each alternative of a sheet has."""
+    """Number of cuts of each alternative of a sheet."""
     return [len(alternative["planes"]) for alternative in entry["alternatives"].values()]
 
 
 def read_verdicts(file: Path) -> dict[str, dict[str, Any]]:
-    """What a judge, named by the file, says of each sheet: the mark of each letter, and why."""
+    """Verdicts of a judge, who is named by the file, by sheet: the mark of each letter, and the reason."""
     said: dict[str, dict[str, Any]] = {}
     for row in csv.reader(file.read_text().splitlines()):
         if len(row) >= 4 and row[0].strip() != "sheet":
@@ -115,7 +115,7 @@ def read_verdicts(file: Path) -> dict[str, dict[str, Any]]:
 
 
 def measure(entry: dict[str, Any], file: Path, profile: Profile) -> None:
-    """Put into an entry what each of its alternatives costs."""
+    """Add the costs of its alternatives to an entry."""
     mesh = set_on_plate(scaled(read_mesh(file, 1.0, (0.0, 0.0, 0.0))[0], entry["size_mm"]), np.eye(3))
     if mesh_sha256(mesh) != entry["sha256"]:
         raise SystemExit(f"{entry['sheet']}: {file} is not the model that was offered")
@@ -130,7 +130,7 @@ def measure(entry: dict[str, Any], file: Path, profile: Profile) -> None:
 
 
 def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[..., Problem]) -> dict[str, float]:
-    """What the cost of an alternative is made of. problem_of: the problem of the model by how it is turned."""
+    """Terms of an alternative's cost. problem_of: the model's problem by its rotation."""
     turn = alternative["orientation"]
     problem = problem_of(tuple(map(tuple, turn)))
     node = cut_by_hand(problem, PlanFile("", parts=tuple(PlannedPart.of(plane_of(p)) for p in reversed(alternative["planes"]))))
@@ -148,14 +148,14 @@ def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[
 
 
 def plane_of(known: dict[str, Any]) -> Plane:
-    """A plane as it is written down."""
+    """A plane from its record."""
     limbs_mm = np.array(known["limbs_mm"]) if "limbs_mm" in known else None
     return Plane(np.array(known["normal"]), known["offset_mm"], limbs_mm)
 
 
 def seams_by_sight(node: Node, hidden_share: float) -> tuple[float, float]:
-    """How long the seams of a node's cuts are in plain sight, and hidden, mm; half hidden counts half in both. hidden_share: how
-    much a hidden mm counts."""
+    """Lengths of the visible and the hidden seams of a node's cuts, mm; half hidden counts half in both. hidden_share: weight of
+    a hidden mm."""
     weights, seen_mm, hidden_mm = node.places.by_source, 0.0, 0.0
     for step, before in _cuts(node):
         sources, base = before.piece.sources, step.base
@@ -168,7 +168,7 @@ def seams_by_sight(node: Node, hidden_share: float) -> tuple[float, float]:
 
 
 def _cuts(node: Node) -> Iterator[tuple[Node, Node]]:
-    """The nodes after each cut and before it."""
+    """The nodes after and before each cut."""
     step = node
     while step.parent is not None:
         yield step, step.parent
@@ -177,8 +177,8 @@ def _cuts(node: Node) -> Iterator[tuple[Node, Node]]:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """What judges prefer: (n, k) by how much the figures of the worse alternative exceed those of the better; (n,) the source of
-    each model; (n,) whether no judge of its sheet orders it otherwise or not at all."""
+    """Preferences of judges: (n, k) excess of the worse alternative's terms over the better one's; (n,) source of each model;
+    (n,) whether all judges of its sheet agree."""
 
     differences: Floats
     sources: np.ndarray
@@ -200,7 +200,7 @@ def pairs_of(book: Sequence[dict[str, Any]]) -> Pairs:
 
 
 def _row(entry: dict[str, Any], alternative: dict[str, Any]) -> Floats:
-    """(k,) the figures of an alternative, all as shares of the model's surface."""
+    """(k,) terms of an alternative, all relative to the model's surface."""
     known = alternative["figures"]
     costs = np.array([known[name] for name in COSTS]) / entry["surface_mm2"]
     costs[1:3] *= entry["diameter_mm"] / SIZE_MM  # seams
@@ -208,7 +208,7 @@ def _row(entry: dict[str, Any], alternative: dict[str, Any]) -> Floats:
 
 
 def weights_of(profile: Profile) -> Floats:
-    """(k,) the weights by which a profile takes parts."""
+    """(k,) weights of a profile."""
     search = profile.search.effective
     seams = (search.seam_mm, search.seam_mm * search.hidden_seam_share)
     costs = (1.0, *seams, weight_of_stairs(profile), search.cut_mm2, search.second_mm2, search.metre_mm2)
@@ -216,7 +216,7 @@ def weights_of(profile: Profile) -> Floats:
 
 
 def fitted(differences: Floats) -> Floats:
-    """(k,) the weights, none below 0, of a logistic regression without a constant, by accelerated projected gradients (Beck and
+    """(k,) non-negative weights of a logistic regression without a constant, by accelerated projected gradients (Beck and
     Teboulle 2009)."""
     scale = np.abs(differences).mean(axis=0) + 1e-12
     x = differences / scale
@@ -235,7 +235,7 @@ def ordered(pairs: Pairs, weights: Floats) -> Mask:
 
 
 def ordered_by_others(pairs: Pairs) -> Mask:
-    """(n,) the same for weights that are fitted to pairs of other sources."""
+    """(n,) whether weights fitted to pairs of other sources order each pair as the judge does."""
     names, counts = np.unique(pairs.sources, return_counts=True)
     fold = {name: place % FOLDS for place, name in enumerate(names[np.argsort(-counts, kind="stable")])}
     of_fold, right = np.array([fold[name] for name in pairs.sources]), np.zeros(len(pairs.sources), np.bool_)
@@ -245,8 +245,8 @@ def ordered_by_others(pairs: Pairs) -> Mask:
 
 
 def taken(entry: dict[str, Any], weights: Floats, least_saving: float) -> str:
-    """The letter of the cheapest alternative of a sheet by some weights, every cut charged a share of the least cost of
-    one piece."""
+    """The letter of a sheet's cheapest alternative by some weights; every cut is charged a fraction of the least cost in one
+    piece."""
     costs = {letter: float(_row(entry, one) @ weights) for letter, one in entry["alternatives"].items()}
     costs = {letter: cost for letter, cost in costs.items() if np.isfinite(cost)}
     cuts = {letter: len(entry["alternatives"][letter]["planes"]) for letter in costs}
@@ -255,7 +255,7 @@ def taken(entry: dict[str, Any], weights: Floats, least_saving: float) -> str:
 
 
 def report(book: Sequence[dict[str, Any]], profile: Profile) -> str:
-    """What the book says of the weights of a profile, and the fitted weights."""
+    """Agreement of a profile's weights and of the fitted ones with the book, and the fitted weights."""
     pairs, own = pairs_of(book), weights_of(profile)
     fit, lines = fitted(pairs.differences), [f"{len(book)} sheets, {len(pairs.sources)} pairs that a judge marks differently"]
     by_name = {"profile": ordered(pairs, own), "fitted": ordered(pairs, fit), "cross-validated": ordered_by_others(pairs)}

@@ -1,5 +1,5 @@
-"""Shared by all campaigns: options of numbered trials, trials in several processes, tables by groups, and lines of JSON that an
-interrupted campaign goes on from."""
+"""Shared by all campaigns: options of numbered trials, trials in several processes, tables by group, and JSON lines with which an
+interrupted campaign resumes."""
 
 import argparse
 import json
@@ -13,7 +13,7 @@ Result = TypeVar("Result")
 
 
 def options_of(doc: str, **numbers: int) -> argparse.ArgumentParser:
-    """Options of a campaign. numbers: its whole numbers and what they are by default."""
+    """Options of a campaign. numbers: its integers and their defaults."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, number in numbers.items():
         parser.add_argument(f"--{name}", type=int, default=number)
@@ -21,7 +21,7 @@ def options_of(doc: str, **numbers: int) -> argparse.ArgumentParser:
 
 
 def trials(trial: Callable[[int], Result], first: int, count: int, jobs: int) -> Iterator[Result]:
-    """The results of numbered trials in their order. A number makes the same trial at each run."""
+    """The results of numbered trials in order; a number determines its trial."""
     # Processes, not threads: a process forked while another thread holds a lock waits for that lock for ever.
     with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
         yield from pool.map(trial, range(first, first + count), chunksize=4)
@@ -30,7 +30,7 @@ def trials(trial: Callable[[int], Result], first: int, count: int, jobs: int) ->
 def table(
     results: Sequence[Result], group: str, group_of: Callable[[Result], str], columns: dict[str, Callable[[list[Result]], object]]
 ) -> str:
-    """A table in Markdown with a row a group; columns: what each tells of the results of a group."""
+    """A Markdown table with a row per group; columns: functions of a group's results."""
     rows = [f"| {' | '.join((group, *columns))} |", "|---" * (len(columns) + 1) + "|"]
     for name in sorted({group_of(result) for result in results}):
         mine = [result for result in results if group_of(result) == name]
@@ -39,19 +39,19 @@ def table(
 
 
 def counts(ends: Sequence[str], end_of: Callable[[Any], str]) -> dict[str, Callable[[list[Any]], object]]:
-    """A column for each end that a trial can have: how many of a group had it."""
+    """A column for each possible end of a trial: how many of a group had it."""
     return {end: (lambda mine, end=end: sum(end_of(result) == end for result in mine)) for end in ends}
 
 
 def append_line(file: Path, record: dict[str, Any]) -> None:
-    """One line of JSON more, behind one that was cut off, too."""
+    """Append a line of JSON, even after a truncated one."""
     whole = not file.exists() or file.read_bytes()[-1:] in (b"", b"\n")
     with file.open("a") as lines:
         lines.write(("" if whole else "\n") + json.dumps(record) + "\n")
 
 
 def read_lines(file: Path) -> list[dict[str, Any]]:
-    """The records of a file; a line that was cut off counts for nothing."""
+    """The records of a file, without a truncated line."""
     records = []
     for line in file.read_text().splitlines() if file.exists() else ():
         try:

@@ -2,9 +2,8 @@
 
     python tools/campaigns/interrupts.py MODEL... [--moments 8] [--signals GROUP INT TERM KILL] [--commands export print]
 
-GROUP is Ctrl-C, which reaches the whole group of processes as a terminal sends it; INT, TERM and KILL reach only the command
-itself. Two seconds later no process of its session may be left. Exits with 1 where one end took longer than 2 s, had another
-code or left a process.
+GROUP is Ctrl-C, which a terminal sends to the whole process group; INT, TERM and KILL reach only the command itself. Two seconds
+later no process of its session may be left. Exits with 1 if an end took longer than 2 s, had another exit code or left a process.
 """
 
 import os
@@ -37,7 +36,7 @@ COMMANDS = {
 
 @dataclass(frozen=True)
 class End:
-    """How a command ended: after how long, with which code, its last words, how many processes it left; row: what and by what."""
+    """How a command ended: duration, exit code, last output, number of processes left; row: command and signal."""
 
     after_s: float
     code: int
@@ -47,7 +46,7 @@ class End:
 
     @property
     def is_wrong(self) -> bool:
-        """Whether it was late, had another code than it should, or left processes; one that was already done is right."""
+        """Whether it was late, had a wrong exit code, or left processes; a command that had already ended is right."""
         codes = {"GROUP": (130, 0), "INT": (130, 0), "TERM": (143, 130, -signal.SIGTERM, 0), "KILL": (-signal.SIGKILL, 0)}
         return self.after_s > MOST_S or self.code not in codes[self.row.rpartition(" ")[2]] or self.left > 0
 
@@ -93,7 +92,7 @@ def run(command: str, model: str, name: str | None, moment_s: float) -> End:
             (os.killpg if name == "GROUP" else os.kill)(process.pid, SIGNALS[name])
             process.wait()
         finally:
-            process.kill()  # where the campaign itself is interrupted
+            process.kill()  # if the campaign itself is interrupted
         after_s = monotonic() - began if name is None or process.returncode else 0.0
         sleep(0.1)
         if left := session(process.pid):
@@ -107,7 +106,7 @@ def run(command: str, model: str, name: str | None, moment_s: float) -> End:
 
 
 def session(number: int) -> list[int]:
-    """The processes of a session that are no zombies."""
+    """The processes of a session, without zombies."""
     listed = subprocess.run(["ps", "-eo", "pid,sid,stat"], capture_output=True, text=True, check=True).stdout.splitlines()[1:]
     return [int(pid) for pid, session, state in map(str.split, listed) if int(session) == number and state[0] != "Z"]
 

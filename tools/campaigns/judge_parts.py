@@ -1,9 +1,9 @@
-"""Blind judging of decompositions: pictures for people who know neither the code nor the cost, and what they say of them.
+"""Blind judging of decompositions: pictures for judges who know neither the code nor the cost, and their verdicts.
 
 `python tools/campaigns/judge_parts.py sheets FOLDER MODEL... [--size MM] [--set KEY=VALUE]` decomposes models at default
-settings, scaled to a longest side, and draws a sheet of each: what is chosen, and above it the model as its file has it where
-that is another way to lie. `read FILE.csv ...` counts verdicts: lines of sheet, verdict (person: as a person would; doubtful;
-wrong) and a reason. Of several files on the same sheets it says how many verdicts agree, and which sheets nobody accepts.
+settings, scaled to a longest side, and draws a sheet of each: the chosen parts, below the model in its original orientation if
+that differs. `read FILE.csv ...` counts verdicts: lines of sheet, verdict (person: like a human expert; doubtful; wrong) and a
+reason. For several files on the same sheets it reports how many verdicts agree, and which sheets are never accepted.
 """
 
 import argparse
@@ -50,13 +50,13 @@ def main() -> None:
 
 
 def scaled(mesh: Mesh, size_mm: float | None) -> Mesh:
-    """A mesh with that longest side."""
+    """A mesh with a longest side of size_mm."""
     factor = 1.0 if size_mm is None else size_mm / float(np.ptp(mesh.vertices, axis=0).max())
     return Mesh(mesh.vertices * factor, mesh.faces)
 
 
 def sheet(model: Path, out: Path, settings: list[str]) -> str:
-    """Draw a model's sheet; a line with the number of its parts and what they cost."""
+    """Draw a model's sheet; returns a line with its number of parts and their cost."""
     words = [word for setting in settings for word in ("--set", setting)]
     picture, report = model.with_suffix(".png"), model.with_suffix(".json")
     done = subprocess.run([*OURS, "decompose", model, "--png", picture, "--json", report, *words], capture_output=True, text=True)
@@ -85,7 +85,7 @@ def verdicts_of(file: Path) -> dict[str, str]:
 
 
 def summary(verdicts: list[dict[str, str]]) -> str:
-    """How many sheets have each verdict, file by file, and where the files agree."""
+    """Counts of each verdict, by file, and agreement of the files."""
     lines = []
     for of_file in verdicts:
         counts = Counter(of_file.values())

@@ -2,11 +2,11 @@
 
     python tools/campaigns/kills.py [--moments 200] [--seed 1] [--build stock|advanced] [--power]
 
-The printer is in memory on a clock of its own, as stock Marlins are built (no ADVANCED_OK) or with ADVANCED_OK, on a line of
-115200 baud. The host is gone at a random moment: what its journal holds by then is all that is left of it. With --power the
-printer is reset with it, else it lives on. A moment passes when the executed moves, both runs together, are the program's without
-a gap; what was done twice is counted. Where the journal leaves the height in doubt that is counted, and the height nearest to the
-real one is chosen, as a person would who looks.
+The printer is in memory with a virtual clock, a stock Marlin (no ADVANCED_OK) or one with ADVANCED_OK, on a line of 115200 baud.
+The host dies at a random moment: only its journal up to then remains. With --power the printer is reset too, otherwise it lives
+on. A moment passes when the executed moves of both runs together are the program's without a gap; repeated moves are counted. If
+the journal leaves the height in doubt, that is counted, and the height nearest to the true one is chosen, as a user at the
+printer would.
 """
 
 import random
@@ -39,15 +39,15 @@ START = [
 POSES = ((0, 0), (30, 725), (-20, 360))
 LAYERS, STROKES = 16, 40
 BAUD, RING = 115200, 128
-BEGUN, KNOWN, IN_DOUBT = "hardly begun: anew", "height known", "height in doubt, asked"  # what the journal told
+BEGUN, KNOWN, IN_DOUBT = "hardly begun: anew", "height known", "height in doubt, asked"  # possible states of the journal
 LIFT_MM, GROUP = 0.6, 10
 Moves = list[list[float]]
 
 
 @dataclass(frozen=True)
 class Result:
-    """What became of one moment. executed: moves before the second run; first: the program's move with which it began. After a
-    power cut, off_mm: how much too high, or low, the print went on."""
+    """Result of one moment. executed: moves before the second run; first: the program's move with which that began. off_mm:
+    height error of the resumed print after a power cut."""
 
     how: str
     executed: int
@@ -56,17 +56,17 @@ class Result:
 
     @property
     def gap(self) -> int:
-        """Moves that no run has made."""
+        """Number of moves that neither run executed."""
         return max(0, self.first - self.executed)
 
     @property
     def twice(self) -> int:
-        """Moves that both have made."""
+        """Number of moves that both runs executed."""
         return max(0, self.executed - self.first)
 
 
 def program() -> list[str]:
-    """Three parts at three poses, each move with an end of its own; every tenth stroke is reached by a lifted travel."""
+    """Three parts in three poses, with different ends of all moves; every tenth stroke follows a lifted travel."""
     lines = list(START)
     for part, (tilt, turn) in enumerate(POSES, 1):
         lines += [f";PART:{part} of {len(POSES)}", "G1 E-2 F2100", "G0 Z150 F900", f"G0 A{tilt} C{turn} F6000"]
@@ -89,11 +89,11 @@ def program() -> list[str]:
 
 
 class HostGoneError(BaseException):
-    """The host is dead: nothing is done on its way out."""
+    """The host is dead: it must not do anything on its way out."""
 
 
 class _Plug:
-    """A wire whose host is gone at a time; on_end: what happens then."""
+    """A wire whose host dies at a time; on_end: called then."""
 
     def __init__(self, wire: Wire, printer: VirtualPrinter, end_s: float, on_end: Callable[[], object]) -> None:
         self._wire, self._printer, self._end_s, self._on_end, self.name = wire, printer, end_s, on_end, wire.name
@@ -114,14 +114,14 @@ class _Plug:
 
 
 def moves_of(printer: VirtualPrinter) -> Moves:
-    """X Y Z tilt turn where each executed move ended, and its filament."""
+    """X Y Z tilt turn at the end of each executed move, and its filament."""
     record = printer.record
     rows: Moves = np.column_stack([record.end[:, :5], record.end[:, 5] - record.start[:, 5]]).round(4).tolist()
     return rows
 
 
 def moment(build: BuildOptions, text: GcodeFile, folder: Path, end_s: float, whole: Moves, power: bool) -> Result:
-    """Let the host of a print, and its power, end after some time, and resume it. whole: the moves of an undisturbed print."""
+    """Kill the host of a print, or cut the power, after some time, and resume. whole: the moves of an undisturbed print."""
     printer, journal, left = VirtualPrinter(PROFILE.machine, build, baud=BAUD), folder / "journal", folder / "left"
     medium, heading = printer.medium, JournalHeading(str(text.path), text.sha256(), "campaign", {})
 
@@ -158,24 +158,25 @@ def moment(build: BuildOptions, text: GcodeFile, folder: Path, end_s: float, who
 
 
 def same_ends(moves: Moves, whole: Moves) -> int:
-    """How many moves the ends of both have in common."""
+    """Number of common moves at the ends of both."""
     pairs = zip(reversed(moves), reversed(whole), strict=False)
     return next((count for count, (move, planned) in enumerate(pairs) if move != planned), min(len(moves), len(whole)))
 
 
 def judged(how: str, moves: Moves, whole: Moves) -> Result:
-    """Part the executed moves into the first run's, a beginning of the program, and the second's, an end of it."""
+    """Split the executed moves into the first run's, a beginning of the program, and the second's, an end of it."""
     first = same_ends(moves[::-1], whole[::-1])
     return Result(how, first, len(whole) - same_ends(moves[first:], whole))
 
 
 def judged_cut(how: str, done: int, moves: Moves, whole: Moves) -> Result:
-    """done: moves before the cut, the one under way included. The rest is compared without Z, whose error is measured."""
+    """Judge the moves after a power cut; the rest is compared without Z, whose error is measured. done: moves before the cut,
+    including the current one."""
     flat, planned = ([[*move[:2], *move[3:]] for move in rows] for rows in (moves, whole))
     tail = same_ends(flat[done:], planned)
     pairs = zip(moves[len(moves) - tail :], whole[len(whole) - tail :], strict=True)
-    off_mm = max((abs(laid[2] - wanted[2]) for laid, wanted in pairs if wanted[5] > 0), default=0.0)  # of strokes alone
-    whole_moves = done - 1 if moves[done - 1] != whole[done - 1] else done  # the one under way has to be made again
+    off_mm = max((abs(laid[2] - wanted[2]) for laid, wanted in pairs if wanted[5] > 0), default=0.0)  # of strokes only
+    whole_moves = done - 1 if moves[done - 1] != whole[done - 1] else done  # the current move must be repeated
     return Result(how, whole_moves, len(whole) - tail, off_mm)
 
 

@@ -3,8 +3,8 @@
     python tools/campaigns/learning.py MODELS --manifest FILE.csv --out FOLDER [--only-tables]
 
 MODELS holds models as npz (vertices in mm and faces); the manifest names their sources. Four splits by source: every model is
-judged by rankers that saw no model of its source. Whatever FOLDER holds already is not made again, so an interrupted run goes on
-where it stopped. Some 10 core-hours for 615 models.
+judged by rankers that saw no model of its source. Existing files in FOLDER are kept, so that an interrupted run resumes. Some 10
+core-hours for 615 models.
 """
 
 import argparse
@@ -17,8 +17,8 @@ from mdp.learning.lists import FOLDS
 
 ROOT = Path(__file__).resolve().parents[2]
 PLAIN, LEARNED = "1,2,5,10,20,50", "1,2,5"  # widths
-LEAST_REMOVED = 0.05  # of the risky area, by the widest plain beam: on other models every width ends alike
-RANKERS = {  # and how each is trained
+LEAST_REMOVED = 0.05  # of the risky area, by the widest plain beam: on other models all widths give the same result
+RANKERS = {  # and their training options
     "urank": ("--loss", "urank", "--patience", "200"),
     "regret": ("--loss", "regret", "--ensemble", "6", "--columns", "paper"),
     "regret_cheap": ("--loss", "regret", "--ensemble", "6"),
@@ -44,7 +44,7 @@ def main() -> None:
 
 
 def _run(*arguments: str) -> None:
-    """Run a command that says itself what is wrong, and end as it does."""
+    """Run a command that reports its own errors, and exit with its code."""
     try:
         ended = subprocess.run([sys.executable, *arguments], cwd=ROOT).returncode
     except KeyboardInterrupt:
@@ -54,7 +54,7 @@ def _run(*arguments: str) -> None:
 
 
 def _train(options: argparse.Namespace) -> None:
-    """Train what is not there yet: every ranker for each fold."""
+    """Train the missing rankers for each fold."""
     for fold, name in product(range(FOLDS), RANKERS):
         ranker = options.out / "rankers" / f"f{fold}" / f"{name}.onnx"
         ranker.parent.mkdir(parents=True, exist_ok=True)

@@ -2,11 +2,10 @@
 judging.
 
 `python tools/campaigns/offer_parts.py LIST.csv FOLDER` reads lines of id, file, class, source, size_mm. For each model, scaled to
-a longest side of size_mm, it gathers one piece in its best orientations and rows of several fronts, at the standard weights and
-with dearer seams, in two orientations; where that gives too few, also with cheaper seams and in more orientations. Each sheet
-shows four to seven of them, without figures and in random order: every alternative from its best side and from below, what needs
-support red. FOLDER/offers.jsonl has them as plans. Models that are in it already are left out, so that a run can go on where
-another one has ended.
+a longest side of size_mm, it collects one piece in its best orientations and rows of several fronts, at the standard weights and
+with more expensive seams, in two orientations; if these are too few, also with cheaper seams and in more orientations. Each sheet
+shows four to seven of them, without figures and in random order: every alternative from its best side and from below, with faces
+that need support in red. FOLDER/offers.jsonl has them as plans. Models already in it are skipped, so that a run can resume.
 """
 
 import argparse
@@ -42,24 +41,24 @@ from tools.campaigns.judge_parts import scaled
 
 MOST, LEAST, MOST_PARTS = 7, 4, 5
 WHOLE = 3  # orientations in which one piece is offered
-FURTHER = 4  # orientations in which cuts are sought where there is little to choose from
-SAME = cos(radians(15.0))  # between the directions of orientations and planes that are one
-SAME_MM = 0.04  # between the heights of planes that are one, as a share of the longest side
+FURTHER = 4  # orientations in which cuts are sought if there are few alternatives
+SAME = cos(radians(15.0))  # between the directions of equal orientations and planes
+SAME_MM = 0.04  # between the heights of equal planes, relative to the longest side
 SEAMS: tuple[dict[str, float], ...] = ({}, {"seam_mm": 10.0})
-CHEAP = ({"seam_mm": 0.1, "cut_mm2": 0.0, "feature_mm2": 0.0},)  # where those find little
+CHEAP = ({"seam_mm": 0.1, "cut_mm2": 0.0, "feature_mm2": 0.0},)  # if the others find too few
 PIXELS = 400
 
 
 @dataclass(frozen=True, eq=False)
 class Offer:
-    """An alternative: (3, 3) how the model is turned, and its planes in the order of the cuts."""
+    """An alternative: (3, 3) rotation of the model, and its planes in the order of the cuts."""
 
     rotation: Floats
     planes: tuple[Plane, ...]
     today: bool = False
 
     def is_like(self, other: "Offer", size_mm: float) -> bool:
-        """Whether a person sees no difference to another one."""
+        """Whether two alternatives look the same."""
         if len(self.planes) != len(other.planes) or self.rotation[2] @ other.rotation[2] < SAME:
             return False
         turn, left = other.rotation @ self.rotation.T, list(other.planes)
@@ -102,7 +101,7 @@ def sheet_name(row: dict[str, str]) -> str:
 
 
 def sheet(row: dict[str, str], folder: Path, profile: Profile) -> dict[str, Any]:
-    """Draw a model's sheet; its alternatives as plans, by the letters on the sheet."""
+    """Draw a model's sheet; returns its alternatives as plans, by the letters on the sheet."""
     mesh = scaled(read_mesh(Path(row["file"]), 1.0, (0.0, 0.0, 0.0))[0], float(row["size_mm"]))
     mesh = set_on_plate(mesh, np.eye(3))
     offers, sha = offers_of(mesh, profile), mesh_sha256(mesh)
@@ -115,7 +114,7 @@ def sheet(row: dict[str, str], folder: Path, profile: Profile) -> dict[str, Any]
 
 
 def offers_of(mesh: Mesh, profile: Profile) -> list[Offer]:
-    """What is chosen today, one piece in the best orientations and as the file has it, and the most different rows of fronts."""
+    """Today's choice, one piece in the best and in the original orientation, and the most different rows of fronts."""
     size_mm, price = float(np.ptp(mesh.vertices, axis=0).max()), pricing(profile)
     search = partial(decompose, name="", profile=profile, request=SearchRequest(price=price))
     oriented = orient_and_decompose(mesh, profile, pricing, search)
@@ -136,7 +135,7 @@ def offers_of(mesh: Mesh, profile: Profile) -> list[Offer]:
 
 
 def distinct(known: Sequence[Offer], offers: Sequence[Offer], size_mm: float, most: int) -> list[Offer]:
-    """At most `most` offers that are like none before them."""
+    """At most `most` offers that differ from all before them."""
     new: list[Offer] = []
     for offer in offers:
         if len(new) < most and not any(offer.is_like(other, size_mm) for other in (*known, *new)):
@@ -145,7 +144,7 @@ def distinct(known: Sequence[Offer], offers: Sequence[Offer], size_mm: float, mo
 
 
 def cut_rows(mesh: Mesh, rotation: Floats, profile: Profile, settings: Sequence[dict[str, float]]) -> list[Offer]:
-    """Rows of the fronts of a model turned so, one front for each of the settings, those of two parts first."""
+    """Rows of the fronts of a rotated model, one front for each of the settings, those of two parts first."""
     turned, rows = set_on_plate(mesh, rotation), list[FrontRow]()
     narrow = {"beam_width": 1, "directions": profile.search.directions // 2}
     for seams in settings:
@@ -155,13 +154,13 @@ def cut_rows(mesh: Mesh, rotation: Floats, profile: Profile, settings: Sequence[
 
 
 def decomposed(mesh: Mesh, offer: Offer, profile: Profile) -> Decomposition:
-    """A model laid down and cut as it is offered."""
+    """The decomposition of an offered alternative."""
     plan = PlanFile("", parts=tuple(map(PlannedPart.of, reversed(offer.planes))))
     return cut_by_plan(set_on_plate(mesh, offer.rotation), "", profile, SearchRequest(plan=plan))
 
 
 def as_plan(offer: Offer) -> dict[str, Any]:
-    """An alternative as it is written down."""
+    """The record of an alternative."""
     planes = []
     for plane in offer.planes:
         limbs = {} if plane.limbs_mm is None else {"limbs_mm": plane.limbs_mm.tolist()}

@@ -1,10 +1,10 @@
 """The whole program over many models: `python tools/campaigns/prints.py OUT [FOLDER ...] [--varied N] [--every N] [--workers N]`.
 
-Models are those of the folders (npz meshes, vertices in mm and faces, are scaled to 60 mm) and the demos. `tiltprint batch`
-exports all by the default settings, then a sample of them by each of N sets of settings that are drawn by number: machine,
-material, nozzle, layers, infill, walls, support, scale. OUT/table.md counts how they ended; it names each model that is not
-printed, with what was said, and each warning of the dry run. The same command goes on where it was stopped. Options behind `--`
-go to `tiltprint batch`.
+Models are those in the folders (npz meshes, vertices in mm and faces, are scaled to 60 mm) and the demos. `tiltprint batch`
+exports all with the default settings, then a sample with each of N random sets of settings, determined by a number: machine,
+material, nozzle, layers, infill, walls, support, scale. OUT/table.md counts the results and names each model that is not printed,
+with the message, and each warning of the dry run. The same command resumes a stopped run. Options after `--` are passed to
+`tiltprint batch`.
 """
 
 import csv
@@ -38,7 +38,7 @@ Row = dict[str, str]
 
 
 def main() -> None:
-    """Lay the models out, export them, write the table."""
+    """Prepare the models, export them, write the table."""
     parser = options_of(__doc__, varied=4, every=1, sample=10)
     parser.add_argument("out", type=Path)
     parser.add_argument("folders", type=Path, nargs="*")
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def lay_out(folders: Sequence[Path], every: int, out: Path) -> Path:
-    """A folder with the demos and every N-th model of each folder, as the program reads them."""
+    """A folder with the demos and every N-th model of each folder, in formats that the program reads."""
     out.mkdir(parents=True, exist_ok=True)
     for demo in DEMOS:
         copyfile(locate(f"demo:{demo}"), out / f"{demo}.ply")
@@ -77,13 +77,13 @@ def lay_out(folders: Sequence[Path], every: int, out: Path) -> Path:
 
 def exported(models: Path, out: Path, words: Sequence[str]) -> list[Row]:
     """The rows of `tiltprint batch`, each with the name of its run."""
-    subprocess.run([*OURS, "batch", str(models), "-o", str(out), *words], check=False)  # exits with 1 where not all are printed
+    subprocess.run([*OURS, "batch", str(models), "-o", str(out), *words], check=False)  # exits with 1 if not all are printed
     with (out / "export.csv").open(newline="", encoding="utf-8", errors="surrogateescape") as file:
         return [row | {"run": out.name} for row in csv.DictReader(file)]
 
 
 def drawn_options(number: int) -> list[str]:
-    """Options of the command line that are drawn by a number."""
+    """Random command-line options, determined by a number."""
     dice = random.Random(number)
     machine, nozzle_mm = dice.choice(MACHINES), dice.choice((0.25, 0.4, 0.6, 0.8))
     height_mm = dice.choice([height for height in HEIGHTS_MM if height <= 0.75 * nozzle_mm])
@@ -107,7 +107,7 @@ def drawn_options(number: int) -> list[str]:
 
 
 def report(rows: Sequence[Row]) -> str:
-    """How the runs ended, then every model that was not printed, then the warnings."""
+    """Results of the runs, then every model that was not printed, then the warnings."""
     columns = counts(("done", "refused", "failed"), lambda row: row["status"])
     columns |= {"core s: median, 95 %, most": lambda mine: spread([float(row["core_s"] or 0.0) for row in mine])}
     failures = [f"- {row['run']}/{row['model']}: {row['status']}: {row['sentence']}" for row in rows if row["status"] != "done"]
@@ -117,7 +117,7 @@ def report(rows: Sequence[Row]) -> str:
 
 
 def spread(values: Sequence[float]) -> str:
-    """Median, 95th percentile and greatest."""
+    """Median, 95th percentile and maximum."""
     rising = sorted(values)
     return f"{median(rising):.1f}, {rising[ceil(0.95 * len(rising)) - 1]:.1f}, {rising[-1]:.1f}"
 

@@ -3,11 +3,11 @@
     python tools/campaigns/widths.py FOLDER --out FILE.csv [--widths 1,2,10] [--rankers classic,learned] [--paper-terms] ...
     python tools/campaigns/widths.py --out FILE.csv --summary [--least-removed SHARE]
 
-FOLDER holds models as npz (vertices in mm and faces). One line of FILE.csv is one search, written as soon as it is done; lines
-that are there already are not searched again, and runs with other settings may share the file. --paper-terms: seams cost nothing,
-faces on the platform count as risky, head and axes do not limit. --faces: larger models are made coarser first. --side: only
-models whose sources are on one side of the split of mdp.learning.lists. --least-removed: tables of the models of which the widest
-plain beam removes at least this share of the risky area; on the others the width makes no difference.
+FOLDER holds models as npz (vertices in mm and faces). One line of FILE.csv is one search, written as soon as it is done; existing
+lines are not searched again, and runs with other settings may share the file. --paper-terms: seams are free, faces on the build
+plate are risky, head and axes set no limits. --faces: larger models are simplified first. --side: only models whose sources are
+on one side of the split of mdp.learning.lists. --least-removed: tables of the models of which the widest plain beam removes at
+least this fraction of the risky area; on the others the width makes no difference.
 """
 
 import argparse
@@ -38,8 +38,8 @@ from tools.bench.harness import timed
 
 @dataclass(frozen=True)
 class Row:
-    """One search: J (the cost, where seams cost something) and its share of what printing straight up leaves risky, or what went
-    wrong. core_s: processor time."""
+    """One search: J (the cost, if seams have a cost) and its ratio to the risky area of printing straight up, or its error.
+    core_s: processor time."""
 
     mesh: str
     settings: str
@@ -58,12 +58,12 @@ class Row:
 
     @property
     def key(self) -> tuple[str, str, str, int, str]:
-        """What tells the searches of a file apart."""
+        """Key of a search in a file."""
         return self.mesh, self.settings, self.method, self.width, self.ranker
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Search what is missing in the file, or print its tables; the exit code."""
+    """Search what is missing in the file, or print its tables; returns the exit code."""
     return run(_main, arguments, "run the same command again to continue")
 
 
@@ -133,7 +133,7 @@ def _search_models(options: argparse.Namespace) -> None:
 
 
 def searched_rows(path: Path, missing: Sequence[Row], most_faces: int | None) -> Iterator[Row]:
-    """The searches of one model that are missing."""
+    """The missing searches of one model."""
     if not missing:
         return
     try:
@@ -150,7 +150,7 @@ def searched_rows(path: Path, missing: Sequence[Row], most_faces: int | None) ->
 
 @cache
 def _warm_up(settings: str, ranker: str) -> None:
-    """Load the kernels and the ranker once, before anything is timed."""
+    """Load the kernels and the ranker once, before anything is measured."""
     tree, _ = read_mesh(locate("demo:tree"))
     decompose(tree, "tree", load(settings=(*shlex.split(settings), "search.directions=50")), SearchRequest(ranker=ranker))
 
@@ -160,12 +160,12 @@ def _profile(settings: str, method: str, width: int) -> Profile:
 
 
 def searched(row: Row, mesh: Mesh) -> Row:
-    """One search, its failure included."""
+    """Run one search, including its failure."""
     profile = _profile(row.settings, row.method, row.width)
     row = replace(row, faces=len(mesh.faces))
     try:
         result, used = timed(lambda: decompose(mesh, row.mesh, profile, SearchRequest(ranker=row.ranker)))
-    except Exception as error:  # noqa: BLE001 - whatever fails is what the table counts
+    except Exception as error:  # noqa: BLE001 - the table counts every failure
         return replace(row, share=1.0, error=f"{type(error).__name__}: {error}")
     row = replace(row, core_s=used.core_s, wall_s=used.wall_s, parts=1, candidates=result.candidates_evaluated)
     risky_mm2 = result.risky_area_mm2

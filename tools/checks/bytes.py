@@ -1,11 +1,11 @@
-"""What the program writes, byte for byte, beside what an earlier commit has written.
+"""Compare the program's output byte for byte with that of an earlier commit.
 
     python tools/checks/bytes.py MODEL ... [--machine NAME ...] [--set KEY=VALUE ...] -o BYTES.json
     python tools/checks/bytes.py MODEL ... [--machine NAME ...] [--set KEY=VALUE ...] --against BYTES.json
 
 MODEL is a file or demo:NAME. For every model and machine: the G-code, the plan, the figures of the dry run and the record of the
-search (for the first machine alone), each as a SHA-256. `--against` names every difference and exits with 1 where there is one; a
-refusal counts by its sentence. Rows that BYTES.json lacks are left out. Times of a search are not compared.
+search (for the first machine only), each as a SHA-256. `--against` names every difference and exits with 1 if there is one; a
+refusal counts by its sentence. Rows that BYTES.json lacks are left out. Search times are not compared.
 """
 
 import sys
@@ -36,7 +36,7 @@ def main() -> int:
     before = {} if given.against is None else loads(given.against.read_text(encoding="utf-8"))
     sums: dict[str, dict[str, str]] = {}
     different = 0
-    for model in given.models:  # by the names that are given: a plan holds them
+    for model in given.models:  # by the given names, which plans contain
         for number, machine in enumerate(given.machine):
             row = f"{Path(model).name} {machine}"
             if given.against is not None and row not in before:
@@ -52,7 +52,7 @@ def main() -> int:
 
 
 def written(model: str, machine: str, settings: list[str], record: bool) -> Iterator[tuple[str, str]]:
-    """Name and sum of all that one print consists of."""
+    """Name and sum of each output of a print."""
     profile = load(machine=machine, settings=settings)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "record"

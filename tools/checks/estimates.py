@@ -1,9 +1,9 @@
-"""Quick estimates beside dry runs: `python tools/checks/estimates.py MODEL ... [--parts N] [--process NAME] [--set KEY=VALUE
-...]`.
+"""Quick estimates compared with dry runs: `python tools/checks/estimates.py MODEL ... [--parts N] [--process NAME] [--set
+KEY=VALUE ...]`.
 
-One row a model, in one piece as it stands and, with `--parts`, as the search cuts it into up to N parts: minutes and metres of
-filament of the dry run and the estimate over each; cubic millimetres of support that the slicer prints and the estimate over
-them; core seconds of the estimate, warm. Below the table: how many prints are within 4 %.
+One row per model, in one piece as it stands and, with `--parts`, in up to N parts: minutes and metres of filament of the dry run,
+and the ratio of the estimate to each; cubic millimetres of support that the slicer prints, and the ratio of the estimate; core
+seconds of the estimate, warm. Below the table: how many prints are within 4 %.
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def row(decomposition: Decomposition, profile: Profile, ratios: list[tuple[float, float]]) -> Sequence[object]:
-    """One print's cells; time and filament of the estimate over those of the print are added to the ratios."""
+    """A print's cells; appends the ratios of estimated to printed time and filament."""
     parts, program = decomposition.parts, build(decomposition, profile)
     estimate(parts, profile)
     began = process_time()

@@ -1,4 +1,5 @@
-"""Shared by all checks: options, models of files and folders, a table with a row a model, G-code files of ours read again."""
+"""Shared by all checks: options, models from files and folders, a table with a row per model, and reading of tiltprint's
+G-code."""
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +22,7 @@ from profiles.profile import Profile, load
 
 
 def options_of(doc: str) -> argparse.ArgumentParser:
-    """The options that all checks have."""
+    """Options of all checks."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("models", nargs="+", metavar="MODEL|FOLDER")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th file of a folder")
@@ -30,7 +31,7 @@ def options_of(doc: str) -> argparse.ArgumentParser:
 
 
 def files(models: Sequence[str | Path], every: int = 1) -> list[Path]:
-    """The files and demos that are named, and every N-th model of the folders."""
+    """The named files and demos, and every N-th model of the folders."""
     chosen: list[Path] = []
     for name in models:
         model = locate(str(name))
@@ -53,7 +54,7 @@ def undivided(name: str, mesh: Mesh, profile: Profile) -> Decomposition:
 
 
 def table(columns: Sequence[str], models: Sequence[Path], rows: Callable[[Path], Iterator[Sequence[object]]]) -> None:
-    """Print the rows of every model behind its name, as each is done; a model that is refused has its sentence."""
+    """Print the rows of every model after its name, as each is done; a refused model has its message."""
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)
     for model in models:
         try:
@@ -64,7 +65,7 @@ def table(columns: Sequence[str], models: Sequence[Path], rows: Callable[[Path],
 
 
 def played(file: Path) -> tuple[DryRun, Profile]:
-    """The dry run of a G-code file of ours, by the profile in it."""
+    """The dry run of a G-code file of tiltprint, with the profile in it."""
     lines = tuple(file.read_text().split("\n"))
     profile, _ = read_embedded_profile(lines, load(), frozenset())
     return dry_run(lines, profile, known=()), profile

@@ -1,10 +1,11 @@
-"""Every bead of solid layers over the model's true sections: `python tools/checks/layers.py MODEL|FOLDER ... [--layers-every 7]`.
+"""Beads of solid layers compared with the model's true sections: `python tools/checks/layers.py MODEL|FOLDER ... [--layers-every
+7]`.
 
-Models stand as one part, upright, at 100 % infill, without skirt, support and elephant's foot. Every N-th layer is measured: its
-beads are buffered lines in shapely, its section is cut from the mesh anew and not cleaned; slits narrower than 0.06 of a line are
-no spots. One row a model: layers looked at; plastic over the volume (all layers); the largest empty spot in line widths squared
-and its layer; how many are larger than one; how far the farthest bead reaches over the section, mm, and its layer; core seconds
-of slicing.
+Models are one part, upright, at 100 % infill, without skirt, support and elephant's foot compensation. Every N-th layer is
+measured: its beads are buffered lines in shapely, its section is a fresh cut of the mesh without cleaning; gaps narrower than
+0.06 of a line are ignored. One row per model: layers measured; plastic over volume (all layers); the largest empty spot in
+squared line widths and its layer; how many are larger than one; the farthest reach of a bead beyond the section, mm, and its
+layer; core seconds of slicing.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,7 +25,7 @@ from tools.checks.harness import files, mesh_of, options_of, section_of, table
 
 BARE = ["process.skirt_loops=0", "process.small_base_brim_mm=0", "process.support=none"]
 BARE += ["process.infill_density=1", "process.elephant_foot_mm=0"]
-SLIT = 0.06  # of the line width: what is narrower joins spots to one another and is none itself
+SLIT = 0.06  # of the line width: narrower gaps connect spots and are not counted
 HEAD = ("model", "layers", "plastic / volume", "largest spot w2", "layer", "spots over 1 w2", "farthest out mm", "layer", "s")
 
 
@@ -38,7 +39,7 @@ def main() -> None:
 
 
 def rows(model: Path, every: int, profile: Profile) -> Iterator[Sequence[object]]:
-    """One model's cells."""
+    """A model's cells."""
     mesh = mesh_of(model, profile)
     began = process_time()
     sliced = slice_part(one_piece(mesh, profile.machine), profile)
@@ -61,7 +62,7 @@ def rows(model: Path, every: int, profile: Profile) -> Iterator[Sequence[object]
 
 
 def looked_at(layer: Layer, section: shapely.Geometry, width_mm: float) -> tuple[list[float], float]:
-    """Areas, mm2, of the places of a section that no bead covers; how far the farthest bead reaches over it, mm."""
+    """Areas of a section without a bead, mm²; and the farthest reach of a bead beyond it, mm."""
     plastic = shapely.union_all([shapely.LineString(path.points).buffer(path.width_mm / 2) for path in layer.paths])
     slit = 0.5 * SLIT * width_mm
     empty = section.difference(plastic).buffer(-slit).buffer(slit)

@@ -1,10 +1,10 @@
-"""The plastic at joints against the room for it: `python tools/checks/plastic.py FILE.gcode ... [--maps FOLDER]`.
+"""Plastic at joints compared with the space for it: `python tools/checks/plastic.py FILE.gcode ... [--maps FOLDER]`.
 
-One row an interface (a part's first layer on earlier parts) of G-code files of ours: its section, mm2; the share of it in
-contact; plastic over room of all of it, %; square millimetres with more than 110 % and with less than 90 %, % of it; along which
-share of the outer walls nothing lies under their middle, and how far inside their outer edge the plastic below ends at the median
-and at the 95th percentile, mm. `--maps`: a picture of each interface, blue where there is too little plastic, white where it
-fits, red where there is too much, grey where nothing is below.
+One row per interface (a part's first layer on earlier parts) of tiltprint's G-code files: its section, mm²; the fraction of it in
+contact; plastic over space of the whole, %; square millimetres with more than 110 % and with less than 90 %, % of it; the
+fraction of the outer walls without anything below their centre line, and how far inside their outer edge the plastic below ends
+at the median and at the 95th percentile, mm. `--maps`: a picture of each interface, blue for too little plastic, white for the
+right amount, red for too much, grey with nothing below.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,11 +17,11 @@ from machine.pipeline.pictures import write_png
 from mdp.mesh import Floats
 from tools.checks.harness import files, options_of, played, table
 
-LEAST, MOST = 0.9, 1.1  # plastic over room of a square millimetre that is as it should be
+LEAST, MOST = 0.9, 1.1  # acceptable plastic over space of a square millimetre
 WINDOW_MM = 1.0
-LEAST_MM2 = 0.5  # of a window: where less of it has room, as on the tip of a corner, a part of one bead decides
-SAMPLE_MM, FAR_MM, AROUND_MM = 0.1, 1.5, 0.05  # of looks along outer walls, and across them
-FULL = 0.5  # this far from what fits, a colour is full
+LEAST_MM2 = 0.5  # of a window: with less space in it, as at the tip of a corner, a fragment of one bead would decide
+SAMPLE_MM, FAR_MM, AROUND_MM = 0.1, 1.5, 0.05  # between samples along outer walls, and across them
+FULL = 0.5  # a colour is full at this deviation
 GREY, WHITE, RED, BLUE = (np.array(colour, float) for colour in ((170, 170, 170), (255, 255, 255), (200, 30, 30), (30, 60, 200)))
 HEAD = ("file", "part", "mm2", "contact %", "plastic / room %", "over %", "under %", "walls over nothing %", "inside mm", "p95")
 
@@ -52,7 +52,7 @@ def rows(file: Path, maps: Path | None) -> Iterator[Sequence[object]]:
 
 
 def picture(face: Interface) -> np.ndarray:
-    """(h, w, 3) uint8: a pixel a column, Y upward."""
+    """(h, w, 3) uint8: a pixel per column, Y upward."""
     ratio = balance_map(face)
     image = np.full((*ratio.shape, 3), 255.0)
     image[face.section] = GREY
@@ -64,9 +64,8 @@ def picture(face: Interface) -> np.ndarray:
 
 
 def wall_edges(face: Interface) -> tuple[Mask, Floats]:
-    """At places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches up to them near their
-    middle, and (n,) how far inside their outer edge it ends, mm; inf where it is farther than FAR_MM.
-    """
+    """At places SAMPLE_MM apart along an interface's outer walls: (n,) whether an earlier part reaches them near their centre
+    line, and (n,) how far inside their outer edge it ends, mm; inf beyond FAR_MM."""
     walls, side = face.walls, face.walls.end[:, :2] - face.walls.begin[:, :2]
     length = np.hypot(*side.T)
     counts = np.ceil(length / SAMPLE_MM).astype(np.int64)
@@ -96,7 +95,7 @@ def _at(mask: Mask, points: Floats, lattice: Lattice) -> Mask:
 
 
 def balance_map(face: Interface) -> Floats:
-    """(nx, ny) plastic over room in the square millimetre around each column of an interface; nan outside."""
+    """(nx, ny) plastic over space in the square millimetre around each column of an interface; nan outside."""
     return over_room(face.plastic, np.where(face.touching & face.section, face.room, np.nan), face.lattice)
 
 
@@ -111,9 +110,9 @@ def window_sums(values: Floats, lattice: Lattice) -> Floats:
 
 
 def over_room(plastic: Floats, room: Floats, lattice: Lattice) -> Floats:
-    """Plastic over room in the square millimetre around each column with room, mm3 both; nan where there is too little to tell.
+    """Plastic over space in the square millimetre around each column with space, mm³ both; nan if there is too little.
 
-    room: mm3 of each column, nan where it is none.
+    room: mm³ of each column, nan without space.
     """
     there = np.isfinite(room)
     covered = window_sums(there * lattice.column_mm2, lattice)

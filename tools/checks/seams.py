@@ -1,15 +1,14 @@
-"""What the nozzle leaves at the seams of joints: wipes, primes and travels on the rim.
+"""Marks of the nozzle at the seams of joints: wipes, primes and travels on the rim.
 
     python tools/checks/seams.py MODEL|FILE.gcode ... [--list] [--set KEY=VALUE ...]
 
-A joint is where a part's first layer lies on earlier parts, its rim the outline of that layer in the plane of the cut. One row a
-joint. Counted is what the tip does at the height of a layer, of this part or of earlier ones, on that layer's outline (its middle
-no farther inside than ON_RIM of the outer wall's width, or outside up to NEAR_MM) and at most NEAR_MM from the rim in space:
-wipes: those that end there, or run there farther than a line is wide; primes: filament pushed forward, at standstill or by a
-stroke of an outer wall that gets more than its like; travels: those that begin, end or pass there. "below": what earlier parts'
-layers show of each. In brackets: how many of them have to be there: where no place within NEAR_MM is DEEP inside, where a bead
-that does not run round begins or ends, or over support, which is broken off. --list: where each one is, X and Y of the machine.
-tools/checks/plastic.py tells how well the walls meet.
+A joint is where a part's first layer meets earlier parts; its rim is the outline of that layer in the plane of the cut. One row
+per joint. Marks are counted when the tip is at the height of a layer, of this part or of earlier ones, on that layer's outline
+(its centre at most ON_RIM of the outer wall's width inside, or up to NEAR_MM outside) and at most NEAR_MM from the rim in space:
+wipes that end there, or run there for more than a line width; primes: filament pushed forward, at standstill or by a stroke of an
+outer wall that gets more than similar ones; travels that begin, end or pass there. "below": marks in earlier parts' layers. In
+brackets: unavoidable marks: where no place within NEAR_MM is DEEP inside, where an open bead begins or ends, or over support,
+which is broken off. --list: the place of each, X and Y of the machine. tools/checks/plastic.py measures how well the walls meet.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,20 +31,20 @@ from profiles.profile import Profile, load
 from tools.checks.harness import files, options_of, played, table
 
 HEAD = ("model", "part", "rim mm", "wipes", "below", "primes", "below", "travels", "below")
-ON_RIM = 0.75  # of the outer wall's width: its own middle lies half of it inside
-NEAR_MM = 0.9  # walls do not begin within process.interface_seam_mm of it, 1 mm, measured at the middle of their layer
-DEEP = 1.25  # of the outer wall's width: where nothing near is so far inside there is no other wall to be over
-LOW_MM = 0.05  # over its layer a tip touches what lies there
-STEP_MM = 0.05  # of looks along moves
+ON_RIM = 0.75  # of the outer wall's width, whose own centre is half of it inside
+NEAR_MM = 0.9  # walls do not begin within process.interface_seam_mm of it, 1 mm, measured at the centre of their layer
+DEEP = 1.25  # of the outer wall's width: without any place as far inside there is no other wall to be above
+LOW_MM = 0.05  # below this height over its layer a tip touches plastic
+STEP_MM = 0.05  # between samples along moves
 STILL_MM = 0.01
-RICHER = 1.15  # than the median of its like a stroke is that makes up for ooze
-LEAST_MM3 = 0.002  # a shorter stroke's filament is known too badly
-CLOSED_MM = 0.3  # gaps between the beads of a layer that are no outline
+RICHER = 1.15  # ratio to the median of similar strokes, for a stroke that replaces ooze
+LEAST_MM3 = 0.002  # the filament of a shorter stroke is too inaccurate
+CLOSED_MM = 0.3  # gaps between the beads of a layer that are not an outline
 
 
 @dataclass(frozen=True)
 class Mark:
-    """What the nozzle does on a rim. what: wipe, prime or travel; why: narrow, line or support, empty where it need not be."""
+    """A mark on a rim. what: wipe, prime or travel; why: narrow, line or support, "" if avoidable."""
 
     part: int
     what: str
@@ -60,9 +59,9 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """rim: the outline of a part's first layer, machine X Y at the part's pose; plane_mm: its base plane's machine Z.
+    """A joint. rim: the outline of a part's first layer, machine X Y in the part's pose; plane_mm: its base plane's machine Z.
 
-    covered: what lies farther inside than on the rim, where nobody sees what is left.
+    covered: the area inside the rim, where marks are invisible.
     """
 
     machine: Machine
@@ -73,7 +72,7 @@ class Joint:
     plane_mm: float
 
     def near(self, points: Floats, pose: Pose) -> np.ndarray:
-        """(n,) whether (n, 3) machine points at a pose lie near the rim in space, and not under the part."""
+        """(n,) whether (n, 3) machine points in a pose are near the rim in space, and not below the part."""
         points = points if pose == self.pose else self._at_own_pose(points, pose)
         places = shapely.points(points[:, :2])
         away = np.hypot(shapely.distance(self.rim, places), points[:, 2] - self.plane_mm)
@@ -86,10 +85,10 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """One layer's outline, machine X Y at its part's pose.
+    """The outline of a layer, machine X Y in its part's pose.
 
-    inner: what is farther inside than on it; deep: what is so far inside that there is another wall; support: what stands beside;
-    low: rows in which the tip is no higher than the layer.
+    inner: the area inside it; deep: the area far enough inside for another wall; support: adjacent support; low: rows in which
+    the tip is no higher than the layer.
     """
 
     joint: Joint
@@ -104,7 +103,7 @@ class Outline:
     low: np.ndarray
 
     def on(self, points: Floats) -> np.ndarray:
-        """(n,) whether (n, 2) points lie on it near the joint's rim."""
+        """(n,) whether (n, 2) points are on it near the joint's rim."""
         places = shapely.points(points)
         beside = ~shapely.contains(self.inner, places) & (shapely.distance(self.section, places) <= NEAR_MM)
         if beside.any():
@@ -113,7 +112,7 @@ class Outline:
         return beside
 
     def why(self, place: Floats) -> str:
-        """Why something must be on it there."""
+        """Why a mark at a place of it is unavoidable, or ""."""
         point = shapely.Point(place)
         if self.support.distance(point) < self.section.distance(point):
             return "support"
@@ -121,7 +120,7 @@ class Outline:
 
 
 def joints(program: ParsedProgram, machine: Machine) -> Iterator[tuple[Joint, list[Outline]]]:
-    """The joint of every part that stands on others, and the outlines of layers that come near its rim."""
+    """The joint of every part that stands on others, and the outlines of layers near its rim."""
     strokes = (program.kind == MoveKind.EXTRUDE) & (program.part > 0)
     own = strokes & ~program.rows_of_types(*NO_PART)
     walls = np.flatnonzero(own & program.rows_of_types(*AT_THE_EDGE))
@@ -150,14 +149,15 @@ def _pose(program: ParsedProgram, row: int) -> Pose:
 
 
 def _outline(program: ParsedProgram, strokes: np.ndarray, own: np.ndarray, joint: Joint, where: tuple[int, int]) -> Outline:
-    """where: part and layer."""
+    """The outline of a layer; where: part and layer."""
     here = (program.part == where[0]) & (program.layer == where[1])
     mine, walls = np.flatnonzero(own & here), np.flatnonzero(own & here & program.rows_of_types(*AT_THE_EDGE))
     section = _section(program, mine, walls)
     width_mm = float(np.median(program.width_mm[walls]))
     z_mm = float(np.median(program.end[mine, 2]))
     levels = np.stack([program.start[:, 2], program.end[:, 2]])
-    about = (program.part == where[0]) & ((program.layer == where[1]) | (program.layer == where[1] + 1))  # the wipe after it, too
+    # including the wipe after it
+    about = (program.part == where[0]) & ((program.layer == where[1]) | (program.layer == where[1] + 1))
     low = about & (np.abs(levels - z_mm) < LOW_MM).all(axis=0)
     inner = section.buffer(-ON_RIM * width_mm)
     deep = section.buffer(-DEEP * width_mm)
@@ -168,7 +168,7 @@ def _outline(program: ParsedProgram, strokes: np.ndarray, own: np.ndarray, joint
 
 
 def _section(program: ParsedProgram, beads: Indices, walls: Indices) -> shapely.Geometry:
-    """What some beads cover, and what those of them that are outer walls enclose."""
+    """The area that beads cover, and that their outer walls enclose."""
     enclosed = _outlines(program, walls)
     outlines = shapely.symmetric_difference_all(enclosed) if enclosed else shapely.Polygon()
     return shapely.union_all([outlines, _beads(program, beads)]).buffer(CLOSED_MM).buffer(-CLOSED_MM)
@@ -180,7 +180,7 @@ def _beads(program: ParsedProgram, rows: Indices) -> shapely.Geometry:
 
 
 def _outlines(program: ParsedProgram, walls: Indices) -> list[shapely.Geometry]:
-    """What the ways of outer walls that run round enclose."""
+    """The areas that closed outer walls enclose."""
     apart = (np.diff(walls) != 1) | (np.abs(program.start[walls[1:], :2] - program.end[walls[:-1], :2]).max(axis=1) > STILL_MM)
     enclosed: list[shapely.Geometry] = []
     for way in np.split(walls, np.flatnonzero(apart) + 1):
@@ -191,7 +191,7 @@ def _outlines(program: ParsedProgram, walls: Indices) -> list[shapely.Geometry]:
 
 
 def marks(program: ParsedProgram, rim: Outline) -> list[Mark]:
-    """What a part's moves leave on its rim."""
+    """The marks of a part's moves on its rim."""
     across = np.hypot(*(program.end - program.start)[:, :2].T) > STILL_MM
     stroke = program.kind == MoveKind.EXTRUDE
     strokes = np.flatnonzero(stroke)
@@ -227,7 +227,7 @@ def marks(program: ParsedProgram, rim: Outline) -> list[Mark]:
 
 
 def _is_line(program: ParsedProgram, rim: Outline, row: int) -> bool:
-    """Whether a stroke belongs to a bead that does not run round and has an end on the rim: what it leaves there is its end."""
+    """Whether a stroke belongs to an open bead with an end on the rim, which explains its mark."""
     first = last = row
     while first and program.kind[first - 1] == MoveKind.EXTRUDE:
         first -= 1
@@ -238,7 +238,7 @@ def _is_line(program: ParsedProgram, rim: Outline, row: int) -> bool:
 
 
 def _richer(program: ParsedProgram, rows: np.ndarray) -> np.ndarray:
-    """Which of some strokes are outer walls that get more filament than their like."""
+    """Mask of strokes of outer walls that get more filament than similar ones."""
     rows = rows & program.rows_of_types(*AT_THE_EDGE)
     if not rows.any():
         return rows
@@ -249,26 +249,26 @@ def _richer(program: ParsedProgram, rows: np.ndarray) -> np.ndarray:
 
 
 def _runs(rows: np.ndarray) -> list[Indices]:
-    """The marked rows, those together that follow each other."""
+    """Runs of consecutive marked rows."""
     at = np.flatnonzero(rows)
     return [run for run in np.split(at, np.flatnonzero(np.diff(at) != 1) + 1) if len(run)]
 
 
 def _places(program: ParsedProgram, run: Indices) -> Floats:
-    """(n, 2) places STEP_MM apart along moves that follow each other, the last one at their end."""
+    """(n, 2) places STEP_MM apart along consecutive moves, the last one at their end."""
     way = shapely.linestrings(np.vstack([program.start[run[:1], :2], program.end[run, :2]]))
     along = np.append(np.arange(0.0, way.length, STEP_MM), way.length)
     return shapely.get_coordinates(shapely.line_interpolate_point(way, along))
 
 
 def printed(model: Path, settings: Sequence[str]) -> tuple[DryRun, Profile]:
-    """A model, printed as `export` does."""
+    """A model, printed like `export` does."""
     decomposed = decompose_model(ModelRequest(str(model), load(settings=settings)), to_build=True)
     return build(decomposed.decomposition, decomposed.profile).run, decomposed.profile
 
 
 def rows(model: Path, settings: Sequence[str], listed: list[str]) -> Iterator[Sequence[object]]:
-    """The cells of a model's joints; where each mark is goes to the list."""
+    """The cells of a model's joints; appends the place of each mark to the list."""
     run, profile = played(model) if model.suffix == ".gcode" else printed(model, settings)
     for joint, outlines in joints(run.program, profile.machine):
         left = [mark for outline in outlines for mark in marks(run.program, outline)]

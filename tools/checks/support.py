@@ -1,8 +1,8 @@
-"""How much of what needs support gets none: `python tools/checks/support.py MODEL|FOLDER ... [--every N] [--machine NAME]`.
+"""Area that needs support and gets none: `python tools/checks/support.py MODEL|FOLDER ... [--every N] [--machine NAME]`.
 
-One row a model: parts, mm2 seen from above that need support, mm2 that each part's own ground leaves without and that the plan of
-all parts leaves, the share of the latter, mm3 inside the outlines of support both ways, core seconds of both, and why each place
-gets none.
+One row per model: parts, mm² seen from above that need support, mm² without it when each part is planned alone and when all parts
+are planned together, the fraction of the latter, mm³ inside the outlines of support in both cases, core seconds of both, and why
+each place gets none.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ def main() -> None:
 
 
 def rows(model: Path, profile: Profile) -> Iterator[Sequence[object]]:
-    """One model's cells."""
+    """A model's cells."""
     parts = decompose(mesh_of(model, profile), model.name, profile, SearchRequest(price=pricing(profile))).parts
     began = process_time()
     sections = [section_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
@@ -52,7 +52,7 @@ def rows(model: Path, profile: Profile) -> Iterator[Sequence[object]]:
 
 
 def _mm3(several: list[Supports], profile: Profile) -> float:
-    """Volume inside the outlines of support, by layers of the usual height."""
+    """Volume inside the outlines of support, mm³, with layers of the usual height."""
     return profile.process.layer_height_mm * float(sum(area.area() for supports in several for area in supports.areas))
 
 

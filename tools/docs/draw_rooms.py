@@ -1,9 +1,9 @@
-"""Draw the house: the rooms of the packages, each on the lowest floor from which its imports lead down only.
+"""Draw the rooms of the packages, each on the lowest floor from which its imports only lead down.
 
-    python tools/docs/draw_rooms.py     writes docs/rooms.svg; tests/test_layers.py holds it against the imports
+    python tools/docs/draw_rooms.py     writes docs/rooms.svg; tests/test_layers.py compares it with the imports
 
-A room is a folder. A file beside rooms is a room of its own: values that the rooms share lie below them, stages that join
-them above.
+A room is a folder. A file beside rooms is a room of its own: values shared by the rooms are below them, stages that join them
+above.
 """
 
 import ast
@@ -18,7 +18,7 @@ from tools.docs.harness import DOCS, ROOT
 PICTURE = DOCS / "rooms.svg"
 LAYERS = ("profiles", "mdp", "slicer", "machine")
 TINTS = {"profiles": "#f3e2c7", "mdp": "#d5e8d4", "slicer": "#dae8fc", "machine": "#f5d7d3"}
-SHARED = " (shared)"  # behind a folder's name: its files that its rooms import
+SHARED = " (shared)"  # suffix of a folder's name: its files that its rooms import
 WIDTH, HEIGHT, GAP, CHARACTERS = 330, 52, 8, 58
 
 
@@ -29,7 +29,7 @@ def modules() -> dict[str, str]:
 
 
 def imports(source: str) -> Iterator[str]:
-    """Every module that a source imports anywhere, inside functions too; `from a import b` gives a and a.b."""
+    """Every module that a source imports, inside functions too; `from a import b` gives a and a.b."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -40,7 +40,7 @@ def imports(source: str) -> Iterator[str]:
 
 
 def import_graph(sources: Mapping[str, str]) -> dict[str, set[str]]:
-    """Module -> the modules of ours that it imports; a package stands for its `__init__`."""
+    """Module -> its imports from the packages; a package is represented by its `__init__`."""
     graph = {}
     for module, source in sources.items():
         named = {name if name in sources else f"{name}.__init__" for name in imports(source)}
@@ -49,7 +49,7 @@ def import_graph(sources: Mapping[str, str]) -> dict[str, set[str]]:
 
 
 def rooms_of(modules: Iterable[str]) -> dict[str, str]:
-    """Module -> its room: its folder, or itself where the folder has rooms."""
+    """Module -> its room: its folder, or itself if the folder has rooms."""
     folders = {module.rpartition(".")[0] for module in modules}
     parted = {folder for folder in folders if any(path.startswith(f"{folder}.") for path in folders)}
     rooms = {}
@@ -68,7 +68,7 @@ def room_graph(graph: Mapping[str, set[str]], rooms: Mapping[str, str]) -> dict[
 
 
 def floors(graph: Mapping[str, set[str]]) -> dict[str, int]:
-    """Room -> its floor from 0; every room stands above all that it imports. Raises graphlib.CycleError where none can."""
+    """Room -> its floor from 0; every room is above all its imports. Raises graphlib.CycleError for a cycle."""
     level: dict[str, int] = {}
     for room in TopologicalSorter(graph).static_order():
         level[room] = max((level[below] + 1 for below in graph[room]), default=0)
@@ -76,10 +76,10 @@ def floors(graph: Mapping[str, set[str]]) -> dict[str, int]:
 
 
 def columns() -> dict[str, list[tuple[str, str]]]:
-    """Package -> its boxes from the lowest up: name, and what is in it.
+    """Package -> its boxes from the lowest up: name and text.
 
     Rooms have the first sentence of their `__init__`. The files beside rooms are two boxes: those that rooms import and that
-    import no room themselves, the others.
+    import no room themselves, and the others.
     """
     sources = modules()
     rooms, graph = rooms_of(sources), import_graph(sources)
@@ -107,7 +107,7 @@ def _by_floor(box: tuple[str, tuple[int, str]]) -> tuple[int, str]:
 
 
 def draw() -> str:
-    """The house as SVG: a column a package, its lowest room at the bottom."""
+    """The rooms as SVG: a column per package, its lowest room at the bottom."""
     stacks = columns()
     width, height = len(stacks) * (WIDTH + GAP) + GAP, max(map(len, stacks.values())) * (HEIGHT + GAP) + GAP
     out = [

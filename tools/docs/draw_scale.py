@@ -1,7 +1,7 @@
-"""Draw how cost grows: `python tools/docs/draw_scale.py` writes docs/scale.svg from the tables of docs/scale.md.
+"""Draw the growth of cost: `python tools/docs/draw_scale.py` writes docs/scale.svg from the tables of docs/scale.md.
 
-A panel a curve: core seconds or memory over what the rows of a table begin with. The picture's description holds the tables, by
-which a test sees whether it is current. Needs the extra `train` for matplotlib.
+A panel per curve: core seconds or memory over the first column of a table. The picture's description contains the tables, so that
+a test can check whether it is current. Needs the extra `train` for matplotlib.
 """
 
 import re
@@ -66,7 +66,7 @@ def draw(text: str, out: Path) -> None:
 
 
 def described(text: str) -> str:
-    """The tables that the picture shows, as it holds them."""
+    """The tables shown in the picture, as its description contains them."""
     shown = tables(text)
     return str({panel.table: shown[panel.table] for panel in PANELS})
 

@@ -1,8 +1,6 @@
-"""Draw the pictures of docs/tour.md: `python tools/docs/draw_tour.py` writes one for each value that the model becomes to
-docs/tour.
+"""Draw the pictures of docs/tour.md: `python tools/docs/draw_tour.py` writes one for each value to docs/tour.
 
-The model is demo:tree on the machine generic_ac, with the settings that a command without options has. Needs the extra `train`
-for matplotlib.
+The model is demo:tree on the machine generic_ac with default settings. Needs the extra `train` for matplotlib.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,13 +33,13 @@ if TYPE_CHECKING:
 OUT = DOCS / "tour"
 MODEL = "demo:tree"
 LAYER = 40  # of the first part
-EXCERPT = 21  # lines of G-code about the first change of parts
+EXCERPT = 21  # lines of G-code around the first change of parts
 SIZE = (640, 320)
 FLOOR, GREY = (236.0, 238.0, 241.0), (214.0, 217.0, 222.0)
 
 
 def main() -> None:
-    """Take the model the whole way, and draw each value."""
+    """Process the model, and draw each value."""
     OUT.mkdir(exist_ok=True)
     profile = load()
     mesh, _ = read_mesh(locate(MODEL))
@@ -60,7 +58,7 @@ def main() -> None:
 
 
 def save(name: str, show: Callable[..., None], *values: object) -> None:
-    """One picture: what a function shows of some values."""
+    """Save one picture, drawn by a function of some values."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 3.2), layout="constrained")
@@ -85,14 +83,14 @@ def head_over_table(axes: "Axes", machine: Machine) -> None:
 
 
 def mesh_with_overhangs(axes: "Axes", mesh: Mesh, profile: Profile) -> None:
-    """The model, with what needs support red if it is printed straight up."""
+    """The model, with faces that need support upright in red."""
     risky = needing_upright(mesh, profile)
     axes.imshow(draw([floor_of(mesh), mesh], [FLOOR, GREY], reds=[None, risky], axes=best_view(mesh, risky), size=SIZE))
     axes.set_axis_off()
 
 
 def parts_moved_apart(axes: "Axes", decomposition: Decomposition, profile: Profile) -> None:
-    """The parts a little apart, with what still needs support red."""
+    """The parts moved apart, with faces that still need support in red."""
     mesh, parts = decomposition.mesh, decomposition.parts
     reds = [residual_faces(part, profile) for part in parts]
     view = best_view(mesh, needing_upright(mesh, profile))
@@ -102,7 +100,7 @@ def parts_moved_apart(axes: "Axes", decomposition: Decomposition, profile: Profi
 
 
 def strokes_by_kind(axes: "Axes", layer: Layer) -> None:
-    """The strokes of a layer, a colour for each kind."""
+    """The strokes of a layer, coloured by kind."""
     from matplotlib.collections import LineCollection
 
     for colour, kind in enumerate(dict.fromkeys(path.kind for path in layer.paths)):
@@ -115,7 +113,7 @@ def strokes_by_kind(axes: "Axes", layer: Layer) -> None:
 
 
 def axes_over_time(axes: "Axes", run: DryRun) -> None:
-    """Where the machine's axes stand while it prints."""
+    """Positions of the machine's axes during the print."""
     minutes = np.cumsum(run.times_s) / 60.0
     for k, letter in enumerate(run.letters):
         axes.plot(minutes, run.program.end[:, k], linewidth=0.8, label=letter)
@@ -124,7 +122,7 @@ def axes_over_time(axes: "Axes", run: DryRun) -> None:
 
 
 def change_of_parts(axes: "Axes", lines: Sequence[str]) -> None:
-    """The lines about the first change from one part to the next."""
+    """The lines around the first change from one part to the next."""
     at = next((k for k, line in enumerate(lines) if line.startswith(";PART:2")), len(lines) // 2)
     text = "\n".join(line[:90] for line in lines[at - EXCERPT // 3 : at + 2 * EXCERPT // 3])
     axes.text(0.0, 1.0, text, family="monospace", fontsize=8, verticalalignment="top", transform=axes.transAxes)
@@ -132,7 +130,7 @@ def change_of_parts(axes: "Axes", lines: Sequence[str]) -> None:
 
 
 def beads_by_part(axes: "Axes", run: DryRun) -> None:
-    """The plastic in the workpiece frame, seen from the front, a colour for each part."""
+    """The plastic in the workpiece frame, seen from the front, coloured by part."""
     from matplotlib.collections import LineCollection
 
     segments, part = run.deposited.segments(), run.program.part[run.segment_row]

@@ -1,4 +1,4 @@
-"""Shared by the makers of docs: where pages and pictures are, the parts of a page that are made from code, and browsers."""
+"""Shared by the makers of docs: places of pages and pictures, generated parts of a page, and browsers."""
 
 import os
 import re
@@ -16,14 +16,14 @@ DOCS = ROOT / "docs"
 
 
 def marked(text: str, name: str, made: Callable[[re.Match[str]], str]) -> str:
-    """A page with what stands between `<!-- NAME -->` and `<!-- end -->` made anew; name is a pattern."""
+    """A page with the text between `<!-- NAME -->` and `<!-- end -->` replaced; name is a pattern."""
     pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
     return pattern.sub(lambda match: match[1] + made(match) + match[match.re.groups], text)
 
 
 @contextmanager
 def clean_browser(size: tuple[int, int], mobile: bool = False) -> "Iterator[Browser]":
-    """A browser for light pictures, where nothing is known of earlier work and of printers."""
+    """A browser for light-theme pictures, without earlier work and printers."""
     from tests.machine.browser import Browser
 
     with tempfile.TemporaryDirectory() as state, Browser(size) as browser:

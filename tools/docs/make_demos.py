@@ -1,7 +1,7 @@
-"""Makes the models that ship with the program: `python tools/docs/make_demos.py [FOLDER]` writes mdp/demos/NAME.ply.
+"""Make the demo models: `python tools/docs/make_demos.py [FOLDER]` writes mdp/demos/NAME.ply.
 
-Every model is one closed solid standing on a flat base about the z axis whose limbs need several printing directions.
-The organic ones are level sets of smoothly united round cones, the others exact boolean unions of cylinders and bars.
+Every model is one closed solid on a flat base about the z axis whose limbs need several printing directions. The organic ones are
+level sets of smoothly united round cones, the others exact boolean unions of cylinders and bars.
 """
 
 import math
@@ -30,7 +30,7 @@ Limb = list[Knot]  # x, y, z, radius of the knots of a chain of round cones
 
 @kernel
 def cone_distance(knots: NDArray[np.float64], k: int, x: float, y: float, z: float) -> float:
-    """Distance of a point to the segment from knot k to the next, along which the radius runs linearly, mm."""
+    """Distance of a point to the segment from knot k to the next, along which the radius varies linearly, mm."""
     a, b = knots[k], knots[k + 1]
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     share = ((x - a[0]) * dx + (y - a[1]) * dy + (z - a[2]) * dz) / (dx * dx + dy * dy + dz * dz)
@@ -41,7 +41,7 @@ def cone_distance(knots: NDArray[np.float64], k: int, x: float, y: float, z: flo
 
 @kernel
 def _united(knots: NDArray[np.float64], first: NDArray[np.int64], blend_mm: float, x: float, y: float, z: float) -> float:
-    """The field of smooth_union; limb k has the knots first[k] to before first[k + 1]."""
+    """The field of smooth_union; limb k has the knots first[k]:first[k + 1]."""
     union = np.inf
     for limb in range(len(first) - 1):
         d = np.inf
@@ -142,7 +142,7 @@ def bar(start: Point, end: Point, radius_mm: float, segments: int = 24) -> m3.Ma
 
 
 def lattice() -> m3.Manifold:
-    """Two storeys of four cells on a plate: a mast, struts inclined and horizontal outward, a ring around the top."""
+    """Two storeys of four cells on a plate: a mast, inclined struts and horizontal ones outward, a ring around the top."""
     radius, cell, floors = 2.2, 17.0, (15.0, 28.0, 41.0)
     solid = m3.Manifold.cylinder(2.5, 12.0, 12.0, 64) + bar((0, 0, 1.0 + radius), (0, 0, floors[2]), 2.8)
     for azimuth in range(0, 360, 90):
@@ -153,21 +153,21 @@ def lattice() -> m3.Manifold:
     return solid.simplify(0.005)
 
 
-# The calibration piece, mm: on each of its faces u runs to the right and v up the slope, from the middle of the face's scales.
-SCALE_MM, FINER_MM = 2.0, 0.1  # pitch of the grooves across the slope, and by how much finer the notches over them are
-GRID_MM = 0.6  # whole layers of 0.1, 0.15, 0.2 and 0.3 mm: where grooves along the layers begin and end
-ASIDE, UP = 4, 3  # marks to either side of the middle one
+# The calibration piece, mm: on each of its faces u points right and v up the slope, from the centre of the face's scales.
+SCALE_MM, FINER_MM = 2.0, 0.1  # pitch of the grooves across the slope, and difference of the notches above them
+GRID_MM = 0.6  # whole layers of 0.1, 0.15, 0.2 and 0.3 mm: grooves along the layers begin and end there
+ASIDE, UP = 4, 3  # marks on either side of the middle one
 NOTCH_MM, DEEP_MM, LONG_MM, SHORT_MM, GAP_MM = 0.8, 1.0, 3.2, 2.2, 0.3
 PADS, ARM_MM, EDGE_MM, OVER_MM = 4, 24.0, 1.2, 0.02
-PAD_MM, PAD_HEIGHT_MM = ((-10.2, -8.6), (9.2, 8.6)), 1.2  # its least and greatest u and v
+PAD_MM, PAD_HEIGHT_MM = ((-10.2, -8.6), (9.2, 8.6)), 1.2  # least and greatest u and v
 DOT_MM = 1.5
 
 
 def calibration(lean_deg: float, clear_mm: float) -> m3.Manifold:
-    """Four roofs about a square, each with a pad to be printed when the table has turned and tilted by lean_deg: where the pad's
-    notches lie over the grooves of the roof tells, as on a vernier, by how many tenths of a mm it lies aside and too high up.
+    """Four roofs about a square, each with a pad printed after the table has turned and tilted by lean_deg.
 
-    clear_mm: height over the plate below which no pad may reach.
+    Like a vernier, the pad's notches above the grooves of the roof show by how many tenths of a mm it is shifted aside and up.
+    clear_mm: height above the plate below which no pad may reach.
     """
     lean, half = math.radians(lean_deg), 0.5 * ARM_MM
     below_mm, above_mm = LONG_MM + GAP_MM - PAD_MM[0][1] + EDGE_MM, _above_mm()
@@ -186,7 +186,7 @@ def calibration(lean_deg: float, clear_mm: float) -> m3.Manifold:
 
 
 def roofs(lean_deg: float, clear_mm: float) -> list[Plane]:
-    """The base planes of the pads: just over the roofs, which stay whole."""
+    """The base planes of the pads: just above the roofs, which stay whole."""
     lean = math.radians(lean_deg)
     out, up = math.sin(lean), math.cos(lean)
     offset = (0.5 * ARM_MM + _above_mm() * math.cos(lean)) * out + _middle_mm(lean, clear_mm) * up + OVER_MM
@@ -195,17 +195,17 @@ def roofs(lean_deg: float, clear_mm: float) -> list[Plane]:
 
 
 def _above_mm() -> float:
-    """From the middle of a face up to its edge."""
+    """From the centre of a face up to its edge, mm."""
     return PAD_MM[1][1] + EDGE_MM
 
 
 def _middle_mm(lean: float, clear_mm: float) -> float:
-    """Height of the middle of a face over the plate: the grooves about it begin and end between layers."""
+    """Height of the centre of a face above the plate, mm: the grooves around it begin and end between layers."""
     return GRID_MM * (math.ceil((clear_mm - PAD_MM[0][1] * math.sin(lean)) / GRID_MM) + 0.5)
 
 
 def _grooves(lean: float) -> m3.Manifold:
-    """The scales of a face, below its pad and to the right of it; those along the layers have a ceiling that carries itself."""
+    """The scales of a face, below its pad and to the right of it; those along the layers have a self-supporting ceiling."""
     (_, low), (right, _) = PAD_MM
     inside, half = GRID_MM + 0.5 * GRID_MM / math.tan(lean), 0.5 * GRID_MM
     slot = m3.CrossSection([[(-inside, -half), (DEEP_MM, -half), (DEEP_MM, half), (GRID_MM - inside, half)]])
@@ -221,7 +221,7 @@ def _grooves(lean: float) -> m3.Manifold:
 
 
 def _pad(lean: float, dots: int) -> m3.Manifold:
-    """A pad with notches in its lower and in its right edge, and its number as holes."""
+    """A pad with notches in its lower and right edges, and its number as holes."""
     (left, low), (right, high) = PAD_MM
     outline = m3.CrossSection.square((right - left, high - low)).translate((left, low))
     for k in range(-ASIDE, ASIDE + 1):
@@ -236,7 +236,7 @@ def _pad(lean: float, dots: int) -> m3.Manifold:
 
 
 def _up_mm(lean: float) -> float:
-    """Pitch of the grooves above each other, along the slope: whole grids high."""
+    """Pitch of the grooves along the slope, mm, a whole number of grids high."""
     return round(SCALE_MM * math.sin(lean) / GRID_MM) * GRID_MM / math.sin(lean)
 
 
@@ -245,7 +245,8 @@ def _long(mark: int) -> float:
 
 
 def standing(solid: m3.Manifold) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Vertices and faces in an order that does not depend on how the solid was made; base at z = 0, box about the z axis."""
+    """Vertices and faces in an order that does not depend on the construction; base at z = 0, bounding box centred on the z
+    axis."""
     x0, y0, z0, x1, y1, _ = solid.bounding_box()
     mesh = solid.translate((-(x0 + x1) / 2, -(y0 + y1) / 2, -z0)).to_mesh64()
     vertices = np.asarray(mesh.vert_properties)[:, :3].astype("<f4") + np.float32(0.0)
@@ -268,7 +269,7 @@ def ply(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> bytes:
     return header.encode("ascii") + vertices.tobytes() + rows.tobytes()
 
 
-# By name how far the pads lean, and how high over the plate they are: so that most heads, and that the broadest clear it.
+# For each name the lean of the pads and their height above the plate: clear for most heads, and for the broadest.
 LEANS = {"calibration": (60.0, 15.0), "calibration30": (30.0, 26.0)}
 DEMOS: dict[str, Callable[[], m3.Manifold]] = {
     "bracket": bracket,
@@ -292,7 +293,7 @@ def write_plan(folder: Path, name: str) -> None:
 
 
 def main(folder: Path, names: Sequence[str] = tuple(DEMOS)) -> None:
-    """Write demos into the folder and say what they are."""
+    """Write demos into the folder and report them."""
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
         vertices, faces = standing(DEMOS[name]())

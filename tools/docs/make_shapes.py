@@ -1,8 +1,7 @@
-"""Makes the shapes of which hydra5x says that planes cannot print them: `python tools/docs/make_shapes.py FOLDER` writes STL
-files.
+"""Make the shapes that planes cannot print according to hydra5x: `python tools/docs/make_shapes.py FOLDER` writes STL files.
 
-They are our own, made after its descriptions (maker-fab/hydra5x, docs/decisions.md). docs/parts.md has what they cost in parts
-and in one piece: `tiltprint export FOLDER/elbow.stl --as-is [--parts 1] -o elbow.gcode`.
+They are generated from its descriptions (maker-fab/hydra5x, docs/decisions.md). docs/parts.md has their costs in parts and in one
+piece: `tiltprint export FOLDER/elbow.stl --as-is [--parts 1] -o elbow.gcode`.
 """
 
 import sys
@@ -31,7 +30,7 @@ def tube(points: np.ndarray, radius_mm: float) -> m3.Manifold:
 
 
 def elbow() -> m3.Manifold:
-    """A pipe, 24 mm wide outside and 18 inside, that turns by 90 degrees about a radius of 40 mm."""
+    """A pipe, 24 mm outside and 18 mm inside diameter, that turns by 90 degrees with a radius of 40 mm."""
     ring = m3.CrossSection.circle(12.0, SIDES) - m3.CrossSection.circle(9.0, SIDES)
     quarter = m3.Manifold.revolve(ring.translate((40.0, 0.0)), 128, 90.0).rotate((90.0, 0.0, 0.0))
     foot = m3.Manifold.extrude(ring, 20.0).translate((40.0, 0.0, -20.0))
@@ -39,14 +38,14 @@ def elbow() -> m3.Manifold:
 
 
 def wye(lean_deg: float) -> m3.Manifold:
-    """A stem of 20 mm with two arms, 16 mm wide and 60 mm long, that lean to both sides."""
+    """A stem of 20 mm diameter with two arms, 16 mm thick and 60 mm long, that lean to both sides."""
     arms = [m3.Manifold.cylinder(60.0, 8.0, 8.0, SIDES).rotate((0.0, side * lean_deg, 0.0)) for side in (-1.0, 1.0)]
     stem = m3.Manifold.cylinder(40.0, 10.0, 10.0, SIDES)
     return stem + (arms[0] + arms[1]).translate((0.0, 0.0, 36.0))
 
 
 def channel_block() -> m3.Manifold:
-    """A block of 60 x 40 x 50 mm with a channel of 14 mm that goes in at a side and out at the other, level in the middle."""
+    """A block of 60 x 40 x 50 mm with a channel of 14 mm from one side to the other, level in the middle."""
     block = m3.Manifold.cube((60.0, 40.0, 50.0)).translate((-30.0, -20.0, 0.0))
     way = np.array([[-40.0, 0.0, 12.0], [-12.0, 0.0, 12.0], [-12.0, 0.0, 36.0], [40.0, 0.0, 36.0]])
     return block - tube(way, 7.0)

@@ -1,6 +1,6 @@
-"""Makes the parts of the docs that follow from code: `python tools/docs/make_tables.py`; tests hold them against the code.
+"""Make the generated parts of the docs: `python tools/docs/make_tables.py`; tests compare them with the code.
 
-docs/profiles.md: the tables of all keys. docs/serial.md: the states of a conversation with a printer, as the sender uses them.
+docs/profiles.md: the tables of all keys. docs/serial.md: the states of a conversation with a printer.
 """
 
 import json
@@ -16,7 +16,7 @@ PROFILES, SERIAL = DOCS / "profiles.md", DOCS / "serial.md"
 
 
 def table(section: str) -> str:
-    """A Markdown table of a section's keys: what each means, what it must be, what it is by default."""
+    """A Markdown table of a section's keys: meaning, allowed values, default."""
     defaults = getattr(load(), section)
     lines = ["| key | meaning | must be | default |", "|---|---|---|---|"]
     for key, field in keys(SECTIONS[section], f"{section}."):
@@ -26,7 +26,7 @@ def table(section: str) -> str:
 
 
 def _given(model: Any, key: str) -> str:
-    """What the default profile gives for a key that every profile must give; a block of text is not repeated."""
+    """The default profile's value for a required key; multi-line texts are not repeated."""
     for step in key.split(".")[1:]:
         model = getattr(model, step)
     if isinstance(model, str) and "\n" in model:
@@ -36,7 +36,7 @@ def _given(model: Any, key: str) -> str:
 
 
 def diagram() -> str:
-    """The table as Markdown: a Mermaid diagram, an arrow for each pair of states, and what its words mean."""
+    """The transition table as Markdown: a Mermaid diagram with an arrow for each pair of states, and the meaning of its words."""
     lines = ["```mermaid", "stateDiagram-v2", f"    [*] --> {next(iter(State)).name}"]
     for state, row in TABLE.items():
         leads: dict[State, list[str]] = defaultdict(list)
@@ -54,7 +54,7 @@ def _word(signal: Signal) -> str:
 
 
 def page(text: str) -> str:
-    """A page with its tables and its diagram made anew."""
+    """A page with updated tables and diagram."""
     text = marked(text, r"keys of (\w+)", lambda match: table(match[2]))
     return marked(text, "states", lambda match: diagram())
 

@@ -1,7 +1,7 @@
-"""Makes the pictures of the page for README and docs: `python tools/docs/make_view_pictures.py [FOLDER [PICTURE ...]]`; needs
-Chromium.
+"""Make the pictures of the viewer page for README and docs: `python tools/docs/make_view_pictures.py [FOLDER [PICTURE ...]]`;
+needs Chromium.
 
-Each picture is of another model, at another moment or with other choices, so that together they show what the page can do.
+Each picture shows another model, at another moment or with other choices.
 """
 
 import json
@@ -18,14 +18,14 @@ from profiles.profile import load
 from tests.machine.browser import Browser
 from tools.docs.harness import DOCS, clean_browser
 
-PAUSE = "new Promise((done) => setTimeout(done, 400))"  # until the page thinks that nothing moves any more
+PAUSE = "new Promise((done) => setTimeout(done, 400))"  # until the page has come to rest
 STILL = "document.documentElement.dataset.picture === 'idle'"
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A demo model and what is chosen: into how many parts at most (None: the program's own choice), a share of the rows, values
-    of lists and sliders, elements clicked, keys pressed."""
+    """A demo model and the choices on its page: the most parts (None: the program's choice), a fraction of the rows, values of
+    lists and sliders, elements clicked, keys pressed."""
 
     demo: str
     parts: int | None = None
@@ -46,14 +46,14 @@ SHOTS = {
 
 @cache
 def content(demo: str, parts: int | None) -> bytes:
-    """The page of a demo model, sliced for the usual machine."""
+    """The page of a demo model, sliced for the default machine."""
     profile = load()
     decomposed = decompose_model(ModelRequest(f"demo:{demo}", profile, parts=parts))
     return print_page(f"demo:{demo}", build(decomposed.decomposition, profile), profile)
 
 
 def choose(browser: Browser, name: str, value: object) -> None:
-    """A list or a slider set as by hand."""
+    """Set a list or a slider as a user would."""
     browser.value(
         f"(() => {{ const e = document.getElementById({json.dumps(name)}); e.value = {json.dumps(str(value))};"
         "for (const kind of ['input', 'change']) e.dispatchEvent(new Event(kind)); })()"
@@ -61,7 +61,7 @@ def choose(browser: Browser, name: str, value: object) -> None:
 
 
 def shoot(browser: Browser, shot: Shot, page: Path, picture: Path) -> None:
-    """Open a page, choose what is told for this picture, and keep what is seen."""
+    """Open a page, make the choices for a picture, and save it."""
     page.write_bytes(content(shot.demo, shot.parts))
     browser.open(page.as_uri())
     choose(browser, "position", round(shot.share * int(browser.value("document.getElementById('position').max"))))

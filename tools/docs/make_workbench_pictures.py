@@ -1,7 +1,7 @@
-"""Makes the pictures of the workbench: `python tools/docs/make_workbench_pictures.py [FOLDER]`; needs Chromium.
+"""Make the pictures of the workbench: `python tools/docs/make_workbench_pictures.py [FOLDER]`; needs Chromium.
 
 Without a folder those of the docs, `workbench.png`, `workbench-phone.png` and the small ones of one session, `strip/`; with one,
-every step of the way from model to print, on a desktop and on a phone, light and dark, to be looked at.
+every step from model to print, on a desktop and on a phone, light and dark, for inspection.
 """
 
 import sys
@@ -24,7 +24,7 @@ FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.b
 
 
 class Step(NamedTuple):
-    """What is pressed on the page before its picture is taken, and until when."""
+    """Clicks on the page before its picture is taken, and the condition to wait for."""
 
     name: str
     clicks: tuple[str, ...]
@@ -46,7 +46,7 @@ STEPS = (
 
 
 def session(size: tuple[int, int], keep: Callable[[Browser, str], None], last: str = STEPS[-1].name) -> None:
-    """The steps up to one of a name on a workbench on which a model lies; keep: given each step when it is there."""
+    """The steps up to a named one on a workbench with a model; keep: called after each step."""
     with clean_browser(size, mobile=size == PHONE) as browser, workbench(DEMO) as running:
         browser.open(running.address)
         for step in STEPS[: [step.name for step in STEPS].index(last) + 1]:
@@ -68,7 +68,7 @@ def pictures_of_the_docs() -> None:
         session(size, keep, last)
 
     def keep_small(browser: Browser, name: str) -> None:
-        browser.value("$('run-files').hidden = true")  # a log has another path each time
+        browser.value("$('run-files').hidden = true")  # a log's path differs each time
         if name in STRIP:
             browser.screenshot(DOCS / "strip" / f"{STRIP.index(name) + 1}-{name}.png", STRIP_SCALE)
 

@@ -145,7 +145,7 @@ def lift_words(machine: Machine, pose: Pose, far_mm: float, following: bool) -> 
 
 
 def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
-    """G0 lines from axis positions at one pose to axis positions at another; require G21 and G90. Raises JournalError, MoveError."""
+    """G0 lines from axis positions at one pose to those at another; require G21 and G90. Raises JournalError, MoveError."""
     machine, process, goal = profile.machine, profile.process, way.target_mm
     assert goal is not None  # the way leads back into a print
     rise, across = 60.0 * machine.z.speed_mm_s, 60.0 * process.travel_speed_mm_s

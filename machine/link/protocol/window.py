@@ -94,7 +94,7 @@ class Window:
         self._caution = min(4 * self._caution, CAUTION_MOST)
 
     def places(self, rules: LineRules, emergency_parser: bool) -> int:
-        """Number of lines in flight. Without an emergency parser one place stays free, so that the printer sees an M112 at once."""
+        """Number of lines in flight. Without an emergency parser one place stays free, for a printer to see an M112 at once."""
         if self._clean < self._caution:
             return 1
         if not self.numbered:

@@ -116,7 +116,7 @@ class Duet(PrintServer):
         return path.removeprefix(FOLDER) if isinstance(path, str) else ""
 
     def _since_start(self, phase: PrintState, before: PrintState | None) -> PrintState:
-        """The phase, with idle after a print as its end: a cancelled print was paused before. before: the phase at the request."""
+        """The phase, with idle after a print as its end: a cancelled print was paused before. before: the phase before."""
         if phase in ACTIVE:
             self._last = phase
         if phase is not PrintState.READY or before is None or self._last is None:
@@ -152,7 +152,7 @@ class Duet(PrintServer):
             time.sleep(LOOK_S)
 
     def order(self, command: Command) -> None:
-        """Give an order. A print is paused before it is cancelled; the firmware then runs cancel.g, or switches the heaters off."""
+        """Give an order. A print is paused, then cancelled; the firmware then runs cancel.g, or switches the heaters off."""
         self.command(ORDERS[command])
         if command is not Command.CANCEL:
             return

@@ -132,7 +132,7 @@ class Prober(Protocol):
 
 @dataclass(frozen=True)
 class Probe:
-    """A probe. offset_mm: from the nozzle's tip to the contact, 0 if the nozzle itself touches; flat_mm: radius of its flat end."""
+    """A probe. offset_mm: from the nozzle's tip to the contact, 0 for the nozzle itself; flat_mm: radius of its flat end."""
 
     offset_mm: Vector = (0.0, 0.0, 0.0)
     flat_mm: float = 0.0

@@ -1,4 +1,4 @@
-"""Touch program: poses at which a mark is touched, G-code that moves there and waits for the readings, and keys that jog the tip."""
+"""Touch program: poses at which a mark is touched, G-code that goes there and waits for readings, and keys that jog the tip."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Proposal: recognises and reads a firmware's text, applies its values to the nearest shipped machine, and lists what to measure."""
+"""Proposal: applies the values of a firmware's text to the nearest shipped machine, and lists what is left to measure."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
