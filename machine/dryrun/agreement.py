@@ -1,13 +1,12 @@
-"""Agreement: the deposited plastic compared with the model it was made from: the share that is filled, that lies outside and that
-hangs in air; and by how much each part is shifted.
+"""Agreement: compares the deposited plastic with the model: the fraction filled, outside and in air, and the shift of each part.
 
-An outer wall runs half its width inside the surface. Its further offset along the surface's normal is a
-constant (a compensation, the resolution) and the share of a shift along that normal: a least-squares fit over walls of all
-directions tells them apart (the point-to-plane step of Chen and Medioni 1992). Walls along cuts are on no surface and are left
-out by their distance; a shift in a direction in which no wall faces is not known.
+An outer wall runs half its width inside the surface. Its further offset along the surface's normal is a constant (a compensation,
+the resolution) plus the component of a shift along that normal: a least-squares fit over walls of all directions separates them
+(the point-to-plane step of Chen and Medioni 1992). Walls along cuts belong to no surface and are excluded by their distance; a
+shift in a direction that no wall faces is unknown.
 
-The filled share is judged at the points of a lattice inside the model. A bead counts as a bar as wide and as high as itself, in
-its part's printing direction; the corners that round beads leave are filled by the plastic they push aside.
+The filled fraction is evaluated at lattice points inside the model. A bead counts as a bar of its width and height, in its part's
+printing direction; the corners left by round beads are filled by the plastic they push aside.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,11 +36,11 @@ WALLS = (Kind.OUTER_WALL.value, "WALL-OUTER", "Outer wall")
 PIECE_MM = 1.0
 ASIDE_MM = np.array([3.1e-7, 1.7e-7, 0.0])  # keeps upright rays off the edges of CAD faces
 MOST_SHIFT_MM = 0.1
-NEAR_MM = 1.5  # walls farther from where they should be are not of this surface
-LEAST_MM = 0.2  # of a wall's piece
+NEAR_MM = 1.5  # walls farther from their nominal place belong to another surface
+LEAST_MM = 0.2  # of a piece of a wall
 PER_PART = 3000  # pieces
 FEWEST = 40
-INFORMATION = 0.04  # of the pieces: a shift in a direction in which fewer face is not known
+INFORMATION = 0.04  # of the pieces: a shift in a direction that fewer face is unknown
 TRIMMED = 3.0  # times the usual deviation
 ROUNDS = 4
 MOST_OUTSIDE = 0.01  # of the extruded length, by more than half a line: seams, brims and thin walls stay far below
@@ -54,11 +53,9 @@ ROUND_MM = 0.02  # three rounded coordinates, and beads whose tops meet
 
 @dataclass(frozen=True)
 class Agreement:
-    """Shares 0..1. filled: of the model's inside that lies in a bead; outside: of the extruded length (skirt and support
-    aside) that lies more than half a line outside the model, farthest_mm the worst of it; unsupported: of the extruded
-    length that hangs in air where the slicer has not said so, reported: where it has. shift_mm: by which the part that lies
-    farthest from its place does so.
-    """
+    """Fractions 0..1. filled: of the model's inside that is in a bead; outside: of the extruded length (without skirt and
+    support) more than half a line outside the model, farthest_mm at worst; unsupported: of the extruded length in air without the
+    slicer's declaration, reported: with it. shift_mm: of the part with the largest shift."""
 
     filled: float
     outside: float
@@ -69,13 +66,14 @@ class Agreement:
 
 
 def agreement(run: DryRun, mesh: Mesh, profile: Profile, modifiers: Sequence[Modifier] = ()) -> tuple[Agreement, DryRun]:
-    """The agreement of a dry run, made without known findings, with the closed model (workpiece frame); and the run with the
-    findings added. modifiers: where the print has other settings than the profile's.
+    """Agreement of a dry run, made without known findings, with the closed model (workpiece frame); and the run with the findings
+    added.
 
-    Findings: outside and shift (errors), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
+    modifiers: where settings differ from the profile's. Findings: outside and shift (errors), unfilled (warning; only at 100 %
+    infill, for sparse infill leaves space by design).
     """
     tolerance_mm = 0.5 * profile.process.line_width_mm + reach_mm(profile.process)
-    mesh = mesh_of(solid_of(mesh))  # in spatial order, which makes the search for near faces quick
+    mesh = mesh_of(solid_of(mesh))  # in spatial order, for a fast search of nearest faces
     beyond_mm, length_mm, rows = pieces_outside(run, mesh, tolerance_mm)
     outside = beyond_mm > tolerance_mm
     assert run.contacts is not None
@@ -97,7 +95,7 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile, modifiers: Sequence[Mod
 
 
 def _findings(run: DryRun, outside: Indices, result: Agreement, solid: bool) -> Iterator[Finding]:
-    """outside: rows with plastic outside the model; solid: the model is to be filled."""
+    """Findings of outside and unfilled. outside: rows with plastic outside the model; solid: the model should be filled."""
     if result.outside > MOST_OUTSIDE:
         message = (
             f"{100 * result.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
@@ -112,7 +110,7 @@ def _findings(run: DryRun, outside: Indices, result: Agreement, solid: bool) -> 
 
 
 def _shift_findings(run: DryRun, shifted: Mapping[int, tuple[int, Floats]]) -> Iterator[Finding]:
-    """An error for every part that lies beside the model."""
+    """An error for every part that is shifted from the model."""
     for part, (row, by_mm) in shifted.items():
         size_mm = float(np.linalg.norm(by_mm))
         if size_mm > MOST_SHIFT_MM:
@@ -122,8 +120,11 @@ def _shift_findings(run: DryRun, shifted: Mapping[int, tuple[int, Floats]]) -> I
 
 
 def pieces_outside(run: DryRun, mesh: Mesh, tolerance_mm: float) -> tuple[Floats, Floats, Indices]:
-    """The strokes, skirt and support aside, in k pieces of at most 1 mm: (k,) distances of their midpoints from the solid, 0
-    inside it, up to four tolerances and at least 1 mm; (k,) lengths and rows. mesh: the closed model in the workpiece frame."""
+    """The strokes, without skirt and support, in k pieces of at most 1 mm: (k,) distances of their midpoints from the solid,
+    lengths and rows.
+
+    The distances are 0 inside and limited to four tolerances, at least 1 mm. mesh: the closed model in the workpiece frame.
+    """
     which = of_model(run)
     segments, length_mm = run.deposited.segments(which), run.deposited.length_mm[which]
     counts = np.maximum(np.ceil(length_mm / PIECE_MM), 1).astype(np.int64)
@@ -134,21 +135,21 @@ def pieces_outside(run: DryRun, mesh: Mesh, tolerance_mm: float) -> tuple[Floats
 
 
 def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
-    """(n,) distances of (n, 3) points from a closed mesh's solid: 0 inside, at most most_mm (farther is not looked for)."""
+    """(n,) distances of (n, 3) points from a closed mesh's solid: 0 inside, at most most_mm."""
     distances, out = np.zeros(len(points)), np.flatnonzero(~inside(points, mesh))
     distances[out] = nearest_faces(mesh, points[out], most_mm)[0]
     return distances
 
 
 def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
-    """(n,) whether (n, 3) points lie in a closed mesh's solid, also where it intersects itself."""
+    """(n,) whether (n, 3) points are inside a closed mesh's solid, which may intersect itself."""
     within: NDArray[np.bool_] = windings(mesh, points + ASIDE_MM) > 0
     return within
 
 
 def shifts(run: DryRun, mesh: Mesh) -> dict[int, tuple[int, Floats]]:
-    """For every part with enough outer walls the row of its first one, and (3,) mm, workpiece frame, by which it lies beside the
-    closed model."""
+    """For every part with enough outer walls the row of its first one, and its shift (3,) from the closed model, mm, workpiece
+    frame."""
     walls = np.flatnonzero(run.program.rows_of_types(*WALLS)[run.segment_row])
     walls = walls[run.deposited.length_mm[walls] > LEAST_MM]
     part, shifted = run.program.part[run.segment_row[walls]], dict[int, tuple[int, Floats]]()
@@ -173,7 +174,8 @@ def _evenly(which: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def fit_shift(normals: Floats, beside: Floats) -> Floats | None:
-    """(3,) shift that explains best how far (n,) walls lie outward along (n, 3) normals, beside a constant; None: too few."""
+    """(3,) shift that best explains the outward offsets of (n,) walls along (n, 3) normals, plus a constant; None: too few
+    walls."""
     keep = np.ones(len(beside), dtype=np.bool_)
     shift = np.zeros(3)
     for _ in range(ROUNDS):
@@ -192,13 +194,13 @@ def fit_shift(normals: Floats, beside: Floats) -> Floats | None:
 
 
 def of_model(run: DryRun) -> Indices:
-    """The segments that belong to the model, not to its support or skirt."""
+    """The segments of the model, without its support or skirt."""
     return np.flatnonzero(~run.program.rows_of_types(*AROUND)[run.segment_row])
 
 
 def filled_share(run: DryRun, mesh: Mesh, points: int = POINTS) -> float:
-    """0 to 1: the share of the closed model, in the workpiece frame, that its beads fill (support and skirt aside); 1 where it
-    has no inside. points: number of lattice points, about."""
+    """Fraction 0 to 1 of the closed model, in the workpiece frame, that its beads fill (without support and skirt); 1 if it has
+    no inside. points: approximate number of lattice points."""
     step_mm = float(np.cbrt(max(mesh.volume_mm3, 1e-9) / points))
     low, high = mesh.bounds_mm
     filled, which = np.zeros(np.ceil((high - low) / step_mm - 0.5).astype(np.int64), np.bool_), of_model(run)
@@ -212,8 +214,8 @@ def filled_share(run: DryRun, mesh: Mesh, points: int = POINTS) -> float:
 
 @kernel
 def fill(filled: NDArray[np.bool_], origin: Floats, step: float, segments: Floats, ups: Floats, sizes: Floats) -> None:
-    """Mark the points of a lattice, its least corner at the origin, that lie in one of the bars below (m, 2, 3) segments, their
-    tops; ups: (m, 3) printing directions; sizes: (m, 2) widths and heights."""
+    """Mark the points of a lattice, with its lowest corner at the origin, inside bars whose tops are (m, 2, 3) segments. ups: (m,
+    3) printing directions; sizes: (m, 2) widths and heights."""
     d, low, high = floats(3, 0.0), longs(3, 0), longs(3, 0)
     for i in range(len(segments)):
         a, b, up, half, height = segments[i, 0], segments[i, 1], ups[i], 0.5 * sizes[i, 0], sizes[i, 1]

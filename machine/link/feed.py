@@ -1,4 +1,4 @@
-"""Feed: one print under way; the program's commands in order, and between them what person, printer and journal want."""
+"""Feed: runs a print: the program's commands in order, and between them those of user, printer and journal."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -24,19 +24,19 @@ from machine.link.watchdog import PrinterReports
 from profiles.errors import PrinterError
 from profiles.profile import Profile
 
-PROGRESS_S = 0.2  # a person reads no faster
-ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
+PROGRESS_S = 0.2  # users read no faster
+ASK_S = 5.0  # between temperature queries to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
 BOUNDARY_S = 15.0  # the longest that a pause waits for the end of a stroke
-WORTH_S = 0.3  # a planner that takes less to run empty is not asked the next time; a simulated one as fast as it goes takes none
-WATCH_S, WATCH_MOST_S = 0.02, 5.0  # the least time between questions how many moves wait, and how long they may bring no news
+WORTH_S = 0.3  # a planner that empties in less is not queried next time; a simulated one at full speed takes none
+WATCH_S, WATCH_MOST_S = 0.02, 5.0  # interval of queries for the number of moves waiting, and how long they may bring no news
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
 
 class Feed:
-    """run() a program over a greeted exchange; handle_event() and handle_turn() are the exchange's callbacks.
+    """run() streams a program over a greeted exchange; handle_event() and handle_turn() are the exchange's callbacks.
 
-    limit: characters of a line that the firmware keeps; total: commands of the program, None: not known.
+    limit: characters of a line that the firmware keeps; total: commands of the program, None: unknown.
     """
 
     def __init__(
@@ -58,20 +58,20 @@ class Feed:
         self.history = LineHistory(planner=self._planner)
         self._bounds = PrintedBounds(machine) if machine is not None else None
         self.pending = PendingCommands(self.modal.axes, limit, control)
-        # A bed that cannot be heated is as warm as its room.
+        # A bed that cannot be heated has room temperature.
         most_c = (inf, inf) if machine is None else (machine.nozzle_limit_c, machine.bed_limit_c or inf)
         self.reports = PrinterReports(start_s, most_c)
         self.exchange: Exchange
         self.state, self._trouble, self.started, self.finished = PrintState.PRINTING, "", False, False
         self.sent = self._skipped = 0
-        self._program_pause = ""  # what the program says of the pause before its next command
+        self._program_pause = ""  # the program's text about the pause before its next command
         self._barriers, self._reconnected = Barriers(self.modal.axes.letters, start_s), False
-        self._pause: Pause | None = None  # the one under way
+        self._pause: Pause | None = None  # the current one
         self._start_s = self._shown_s = self._asked_s = start_s
-        self._warned = ""  # the warning that was shown last
+        self._warned = ""  # the warning shown last
 
     def run(self, lines: Iterable[str], resume_point: ResumePoint | None = None) -> None:
-        """Feed the program from its beginning, or where an interrupted print goes on, to the barrier at its end."""
+        """Feed the program from its beginning, or from the resume point of an interrupted print, to the final barrier."""
         exchange = self.exchange
         self.started, self.history = True, self._new_history()
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
@@ -91,7 +91,7 @@ class Feed:
         self._finish()
 
     def _approach(self, resume_point: ResumePoint) -> None:
-        """The commands before the first line of a resumed print, proved by the printer's own position."""
+        """Send the commands before the first line of a resumed print, and check them by the printer's position."""
         self.set_state(PrintState.RESUMING)
         self.history = self._new_history(resume_point.line - 1)
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
@@ -102,13 +102,13 @@ class Feed:
         self.set_state(PrintState.PRINTING)
 
     def _skip(self, command: str) -> None:
-        """A command that was done by an earlier run, or that the firmware does not know."""
+        """Skip a command that an earlier run executed, or that the firmware does not know."""
         self._track(command)
         self._skipped += 1
         self._program_pause = ""
 
     def _track(self, command: str) -> bool:
-        """Keep modal state and the print's outline in step; True when the command moves something."""
+        """Update modal state and print's outline; True when the command moves an axis."""
         return self.modal.take(command) if self._bounds is None else self._bounds.track(self.modal, command)[0]
 
     def _send(self, line: int, command: str) -> None:
@@ -158,7 +158,7 @@ class Feed:
             self._rest()
 
     def _prints(self, command: str) -> bool:
-        """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
+        """Whether not to pause before a command: a stroke, or one of a pair that turns the table."""
         return split_command(command.upper())[0] == "MANUAL_STEPPER" or self.modal.names_filament(command)
 
     def _new_history(self, before: int = 0) -> LineHistory:
@@ -167,7 +167,7 @@ class Feed:
         return LineHistory(before, waiting, self._planner)
 
     def _end_moves(self) -> None:
-        """Wait until every move sent so far is over."""
+        """Wait until every move sent so far has ended."""
         begun_s, waiting = self.exchange.medium.now_s(), self.history.waiting
         self._follow_moves()
         self.exchange.drain()
@@ -176,11 +176,11 @@ class Feed:
             self._worth_following = self.exchange.medium.now_s() - begun_s >= WORTH_S
 
     def _note_end(self) -> None:
-        """Every move is over: the question that was answered last came after M400."""
+        """Note that every move has ended: the query answered last followed M400."""
         self.history.end_moves(self.exchange.connection.window.sent - 1)
 
     def _follow_moves(self) -> None:
-        """Wait while more than one move is planned, so far as the printer reports that, and keep the journal up with them."""
+        """Wait while more than one move is planned, as far as the printer reports it, and keep the journal up to date."""
         exchange, history = self.exchange, self.history
         waiting, news_s = inf, exchange.medium.now_s()
         while self._worth_following and history.tracked and self._journal is not None and history.waiting > 1:
@@ -195,7 +195,7 @@ class Feed:
             exchange.settle()
 
     def _position_errors(self) -> list[str]:
-        """Axes on which the printer's own position is not the program's, all moves over; none where it does not report it."""
+        """Axes whose reported position differs from the program's, after all moves; [] if none is reported."""
         self._follow_moves()
         position = self.exchange.ask_position()
         self._note_end()
@@ -207,12 +207,12 @@ class Feed:
         self._record()
 
     def _verify_position(self, when: str) -> None:
-        """Compare the printer's own position with the program's; raises PrinterError when they differ."""
+        """Compare the printer's position with the program's. Raises PrinterError when they differ."""
         if wrong := self._position_errors():
             raise PrinterError(f"{when} the printer stands at {', '.join(wrong)}: its position can no longer be trusted")
 
     def _rest(self, why: str = "") -> None:
-        """A pause; why: shown meanwhile. The print goes on where it stopped."""
+        """Pause, then continue at the same place; why: shown meanwhile."""
         self.set_state(PrintState.PAUSING, why)
         self._record()
         position_known = not self._position_errors()
@@ -227,7 +227,7 @@ class Feed:
         self.set_state(PrintState.PRINTING)
 
     def _finish(self) -> None:
-        """The barrier: the print is done when a question asked after M400 is answered."""
+        """Wait for the end of the print: the answer to a query sent after M400."""
         exchange = self.exchange
         self.set_state(PrintState.FINISHING)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
@@ -240,7 +240,7 @@ class Feed:
         self.show(exchange.medium.now_s())
 
     def handle_event(self, event: Event) -> None:
-        """An event of the printer."""
+        """Handle an event of the printer."""
         now_s = self.exchange.medium.now_s()
         if event.kind is Kind.OK and event.line is not None:
             window = self.exchange.connection.window
@@ -251,7 +251,7 @@ class Feed:
             self.pending.accept(command, self.state, now_s)
 
     def handle_turn(self, now_s: float) -> None:
-        """Once a turn of the exchange."""
+        """Handle a turn of the exchange."""
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self.poll()
         self.reports.check_silence(now_s, self._cannot_report())
@@ -262,15 +262,14 @@ class Feed:
             self._asked_s = now_s
 
     def _cannot_report(self) -> bool:
-        """Whether the printer cannot report temperatures now: it is at a slow command, or waits for a person, and does not report
-        by itself.
-        """
+        """Whether the printer cannot report temperatures now: it is at a slow command or waits for the user, and does not report
+        by itself."""
         connection = self.exchange.connection
         reports = connection.greeting.capabilities.get("AUTOREPORT_TEMP")
         return not reports and (bool(self.reports.waiting) or connection.window.at_slow_command)
 
     def poll(self) -> None:
-        """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""
+        """Take the user's requests, and show the status regularly. Raises CancelledError, EmergencyError."""
         now_s, message = self.exchange.medium.now_s(), self.pending.message
         wanted = self.pending.pause_s is not None
         self.pending.poll(self.state, now_s)
@@ -285,7 +284,7 @@ class Feed:
 
     @contextmanager
     def in_state(self, state: PrintState, message: str) -> Iterator[None]:
-        """Another state for as long as something takes; the position is proved before the print goes on."""
+        """Use another state during a block; the position is checked before the print continues."""
         before, words = self.state, self.pending.message
         self._reconnected, self._trouble = True, message
         self.set_state(state)
@@ -296,13 +295,13 @@ class Feed:
             self.set_state(before, words)
 
     def lift_move(self) -> tuple[str, float] | None:
-        """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or it is away already."""
+        """Words and mm/min of a move away from the print; None when Z is unknown, or the tip is away already."""
         if self.profile is None or (self._pause is not None and self._pause.aside):
             return None
         return lift_move(self.modal, self.profile.machine)
 
     def record_lift(self, position: Mapping[str, float] | None) -> None:
-        """The tip was lifted off the print for good; position: where the printer says it stands now."""
+        """Record that the tip was lifted off the print for good; position: reported by the printer."""
         if self._journal is not None:
             pose = tuple((position or {}).get(letter) for letter in self.modal.axes.letters)
             self._journal.write(replace(self._checkpoint(), state=LEFT, pose=pose))
@@ -310,7 +309,7 @@ class Feed:
     def _checkpoint(self) -> Checkpoint:
         history, waits = self.history, self._pause.stands if self._pause is not None else None
         number = self.exchange.connection.window.wire_number(history.number)
-        # While it is heated again, or its port is lost, the tip still waits.
+        # while heating again or without a port the tip still waits
         state = FINISHED if self.finished else PAUSED if waits is not None else self.state
         return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state)
 
@@ -327,7 +326,7 @@ class Feed:
         elapsed_s, done = now_s - self._start_s, self._skipped + history.commands
         pausing = (
             self.state is PrintState.PRINTING and self.pending.pause_s is not None
-        )  # begins at the end of the stroke under way
+        )  # begins at the end of the current stroke
         self._on_progress(
             PrintStatus(
                 sent=self.sent, acknowledged=done, total=self._total, elapsed_s=elapsed_s,
@@ -347,7 +346,7 @@ class Feed:
         return self._journal.warning if self._journal is not None else ""
 
     def _silence(self) -> str:
-        """Said while an answer is overdue; a slow command may take its time."""
+        """The message while an answer is overdue; slow commands may take their time."""
         connection = self.exchange.connection
         overdue = connection.state is State.PROBING and not connection.window.at_slow_command
         return "no answer from the printer, it is asked again" if overdue else ""

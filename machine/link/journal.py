@@ -1,17 +1,18 @@
-"""Journal: how far a print has come, on disk, so that another run can go on where this one was cut off.
+"""Journal: the progress of a print, on disk, from which another run can resume it.
 
-A file of lines: eight hexadecimal digits of a CRC-32, a blank, a JSON value. The first, padded to whole blocks, holds what is
-printed and for which machine. SLOTS more of one block each hold states of the print; the highest number is that of the newest.
+A file of lines: eight hexadecimal digits of a CRC-32, a blank, a JSON value. The first, padded to whole blocks, holds the program
+and the machine. SLOTS more of one block each hold states of the print; the one with the highest number is the newest.
+
 The file has its full size, on the disk, before the print begins, and records are overwritten in place: a disk that fills up later
-loses none. The slot changes with each fsync, so that the disk always holds a whole record.
+loses none. The slot changes with each fsync, so that the disk always holds a complete record.
 
-A journal is trusted only when its newest record is the newest of its print. The first record that cannot be written or synced is
-therefore final: the journal is marked as incomplete and cannot be read any more. A computer that restarts
-loses what was not yet on the disk; `computer_ran_on` tells whether that can have happened. The mark overwrites the first byte of
-the journal in place, which needs no free block. A disk that can no longer be written (a stick that was removed, a read-only
-remount) cannot take that mark, so the same is noted under the journal's key in other folders.
+A journal is trusted only if its newest record is the newest of its print. The first record that cannot be written or synced is
+therefore final: the journal is marked as incomplete and is refused by readers. A computer that restarts loses what was not yet on
+the disk; `computer_ran_on` shows whether that may have happened. The mark overwrites the first byte of the journal in place,
+which needs no free block. A disk that can no longer be written (a stick that was removed, a read-only remount) cannot take that
+mark, so the same is noted under the journal's key in other folders.
 
-The file is locked as long as its print runs; the system releases the lock when the program dies, however it does.
+The file is locked while its print runs; the system releases the lock when the program dies.
 """
 
 import json
@@ -31,29 +32,29 @@ from profiles.files import lock
 from profiles.folders import state_folders
 
 FORMAT = 3  # in 2 a full disk ended the journal without a trace, in 1 the newest record might lack a change of height
-PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
-EVERY_LINES = 4  # the sender stays fewer lines than this ahead of the newest record,
-EVERY_S = 0.1  # which is not older than this when something has happened since
-SYNC_S = 1.0  # between syncs; the disk is older by this and the time of an fsync when the computer restarts
-BLOCK_BYTES = 4096  # a disk writes a block whole or leaves it damaged, but its neighbour as it was
+PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print ended, the tip was lifted
+EVERY_LINES = 4  # the sender is fewer lines than this ahead of the newest record,
+EVERY_S = 0.1  # which is at most this old if anything has happened since
+SYNC_S = 1.0  # between syncs; after a restart of the computer the disk is older by this and the time of an fsync
+BLOCK_BYTES = 4096  # a disk writes a block completely or damages only that block
 SLOTS = 3  # one on its way to the disk, one being written, one safe
 LONGEST_BYTES = 1_000_000  # of the heading, which holds the resolved profile
-BEYOND_MM = 1e9  # and deg: no machine has such a place, and no filament such a length
-PRIVATE = 0o600  # what a person prints concerns nobody else
+BEYOND_MM = 1e9  # and deg: beyond any machine's positions and any filament's length
+PRIVATE = 0o600  # prints are private to the user
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")  # of Linux
 MARK = b"!"
-MEMORY = Path("/dev/shm")  # of Linux: can be written when no disk can, and lasts until the computer restarts
+MEMORY = Path("/dev/shm")  # of Linux: writable when no disk is, and kept until the computer restarts
 BINARY = getattr(os, "O_BINARY", 0)  # Windows would write carriage returns otherwise
 
 
 @dataclass(frozen=True)
 class JournalHeading:
-    """The program that is printed."""
+    """The printed program."""
 
     program: str  # its file
     sha256: str
-    name: str  # for people
-    profile: dict[str, Any]  # the resolved one as plain values
+    name: str  # for users
+    profile: dict[str, Any]  # the resolved profile as plain values
 
 
 @dataclass(frozen=True)
@@ -63,40 +64,40 @@ class Checkpoint:
     sent: int = 0
     acknowledged: int = 0
     executed: int = 0  # surely
-    number: int = 0  # on the wire, of the newest acknowledged line
-    # X Y Z tilt turn E after the acknowledged line, unwrapped, or where the tip stands that has left the print; None: not known.
+    number: int = 0  # wire number of the newest acknowledged line
+    # X Y Z tilt turn E after the acknowledged line, unwrapped, or of a tip that has left the print; None: unknown.
     pose: tuple[float | None, ...] = ()
-    state: str = "printing"  # what the print was doing
+    state: str = "printing"  # activity of the print
 
 
 @dataclass(frozen=True)
 class JournalContents:
-    """A journal that was read."""
+    """The contents of a journal."""
 
     heading: JournalHeading
     last: Checkpoint  # the newest
-    torn: int  # records that a power cut of the computer has damaged
-    records: int  # number of the newest one, from 1; 0 when nothing was recorded
-    computer_ran_on: bool  # it has surely not restarted since the print began, so all that was recorded is there
+    torn: int  # records damaged by a power cut of the computer
+    records: int  # number of the newest one, from 1; 0 without records
+    computer_ran_on: bool  # it has surely not restarted since the print began, so no record is lost
 
     @property
     def finished(self) -> bool:
-        """Whether the print ran to its end."""
+        """Whether the print finished."""
         return self.last.state == FINISHED
 
     @property
     def continued_in(self) -> str | None:
-        """The journal of the run that went on with this print."""
+        """The journal of the run that resumed this print."""
         before, resumed, name = self.last.state.partition(RESUMED)
         return name if resumed and not before else None
 
 
 class Journal:
-    """`with Journal(path, heading) as journal:` update() as often as wished, write() what must not be lost.
+    """`with Journal(path, heading) as journal:` call update() regularly, write() for records that must not be lost.
 
-    A record costs one write; a thread of its own brings the file to the disk, so that a slow disk never holds up the line.
-    `trouble` is "" as long as every record was written and synced, then what has happened to the journal; the print goes on.
-    Raises OutputError when the journal cannot be begun.
+    A record costs one write; a separate thread syncs the file, so that a slow disk never holds up the line. `trouble` is "" as
+    long as every record was written and synced, then the reason; the print continues. Raises OutputError when the journal cannot
+    be created.
     """
 
     def __init__(self, path: Path, heading: JournalHeading) -> None:
@@ -104,7 +105,7 @@ class Journal:
         self.last = Checkpoint()
         self._key, self._noted_s = uuid4().hex, 0.0
         self._records = self._slot = 0
-        self._unsynced = self._marked = False  # marked: so that nobody can resume from what is incomplete
+        self._unsynced = self._marked = False  # marked: refused by readers as incomplete
         self._writing, self._syncing = threading.Lock(), threading.Lock()
         self._dirty, self._hurry, self._end = threading.Event(), threading.Event(), threading.Event()
         values = {"format": FORMAT, "key": self._key, "boot": boot_id()} | asdict(heading)
@@ -115,7 +116,7 @@ class Journal:
             raise OutputError(f"journal {path} exists already: each print has one of its own, choose another name") from None
         except OSError as error:
             raise OutputError(f"journal {path} cannot be written: {reason(error)}") from None
-        lock(self._file)  # before the heading: whoever can read that sees the lock
+        lock(self._file)  # before the heading: readers of that see the lock
         try:
             write_at(self._file, 0, self._heading + SLOTS * _slot(0, self.last))
             os.fsync(self._file)
@@ -129,11 +130,11 @@ class Journal:
 
     @property
     def warning(self) -> str:
-        """The trouble as a sentence for the person at the print, "" when there is none."""
+        """The trouble as a sentence for the user, "" for none."""
         return f"this print can no longer be resumed: {self.trouble}" if self.trouble else ""
 
     def update(self, checkpoint: Checkpoint, now_s: float) -> None:
-        """Write a checkpoint when the newest record is old."""
+        """Write a checkpoint if the newest record is old."""
         if now_s - self._noted_s >= EVERY_S and checkpoint != self.last:
             self._noted_s = now_s
             self.write(checkpoint)
@@ -143,7 +144,7 @@ class Journal:
         return line - self.last.sent >= EVERY_LINES
 
     def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
-        """Write a checkpoint at once; hurry: to the disk, too, for a computer may lose its power with its printer."""
+        """Write a checkpoint at once; hurry: also to the disk, for a computer may lose its power with its printer."""
         self.last = checkpoint
         with self._writing:
             if self.trouble or self._end.is_set():
@@ -160,12 +161,12 @@ class Journal:
             self._hurry.set()
 
     def settle(self) -> str:
-        """Bring everything to the disk now; returns the trouble, "" when there is none."""
+        """Sync everything to the disk now; returns the trouble, "" for none."""
         self._to_disk()
         return self.trouble
 
     def abandon(self) -> None:
-        """Close and delete the journal of a print that has not begun; where it cannot be deleted nobody can resume from it."""
+        """Close and delete the journal of a print that has not begun; if it cannot be deleted, it is marked as incomplete."""
         self.close()
         try:
             self.path.unlink(missing_ok=True)
@@ -174,7 +175,7 @@ class Journal:
             self._distrust(None)
 
     def close(self) -> None:
-        """Bring everything to the disk and end; from then on `trouble` is final."""
+        """Sync everything to the disk and close; afterwards `trouble` is final."""
         if self._end.is_set():
             return
         self._end.set()
@@ -195,7 +196,7 @@ class Journal:
         self.close()
 
     def _sync(self) -> None:
-        """fsync once a second, or in a hurry, in a thread: an SD card may take longer over it than a printer waits."""
+        """Call fsync once a second, or on demand, in a thread: an SD card may take longer than a printer waits."""
         while not self._end.is_set():
             self._dirty.wait(SYNC_S)
             self._dirty.clear()
@@ -209,7 +210,7 @@ class Journal:
             if not self.trouble:
                 with self._writing:
                     unsynced, self._unsynced = self._unsynced, False
-                    if unsynced:  # what is on its way to the disk is not written to, nor what is the newest there
+                    if unsynced:  # neither the slot being synced nor the newest one on disk is written to
                         self._slot = (self._slot + 1) % SLOTS
                 if why := self._sync_trouble(unsynced):
                     with self._writing:
@@ -226,11 +227,11 @@ class Journal:
         return "" if is_at(self.path, self._file) else "was deleted, moved or replaced"
 
     def _fail(self, why: str) -> None:
-        """The first failure is final: after a failed fsync Linux drops what it could not write, and reports success again."""
+        """Record the first failure, which is final: after a failed fsync Linux drops the data and reports success again."""
         if self.trouble:
             return
         self._end_promise(why)
-        try:  # before another line is sent; the thread brings it to the disk
+        try:  # before another line is sent; the thread syncs it
             write_at(self._file, 0, MARK)
         except OSError:
             note_incomplete(self._key)
@@ -241,7 +242,7 @@ class Journal:
         self.trouble = self.trouble or f"journal {self.path} {why}"
 
     def _distrust(self, descriptor: int | None) -> None:
-        """Mark the journal; tried again each second, for a stick may come back."""
+        """Mark the journal; repeated each second, for a stick may come back."""
         noted = note_incomplete(self._key)
         self._marked = mark_incomplete(self.path, descriptor, self._heading)
         warning = "; that could not be noted anywhere: delete it, and never resume from it"
@@ -250,14 +251,14 @@ class Journal:
 
 
 def boot_id() -> str:
-    """Names the time since the computer was started; "" where the system does not tell."""
+    """Identifier of the time since the computer's start; "" if the system has none."""
     with suppress(OSError, ValueError):
         return BOOT_ID.read_text(encoding="ascii").strip()
     return ""
 
 
 def is_being_printed(path: Path) -> bool:
-    """Whether the print of a journal that was read runs now; False where that cannot be known, as on a disk without locks."""
+    """Whether the print of a journal runs now; False if unknown, as on a disk without locks."""
     try:
         with path.open("rb") as file:
             return not lock(file.fileno(), shared=True)
@@ -266,9 +267,8 @@ def is_being_printed(path: Path) -> bool:
 
 
 def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
-    """Note in a journal which one goes on with its print. contents: as it was read. Raises JournalError, also when the journal
-    has changed since.
-    """
+    """Note in a journal which one continues its print. contents: as it was read. Raises JournalError, also when the journal has
+    changed since."""
     if read_journal(path) != contents:
         raise JournalError(f"journal {path} has changed since it was read: its print was resumed elsewhere")
     resumed = replace(contents.last, state=f"{RESUMED}{rest}")
@@ -287,7 +287,7 @@ def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
 
 
 def _record(value: Any) -> bytes:
-    """A line of whole blocks, filled with blanks."""
+    """A line of whole blocks, padded with blanks."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
     text = text.ljust(-(-(len(text) + 10) // BLOCK_BYTES) * BLOCK_BYTES - 10)
     return b"%08x %s\n" % (crc32(text), text)
@@ -300,7 +300,7 @@ def _slot(number: int, checkpoint: Checkpoint) -> bytes:
 
 
 def read_journal(path: Path) -> JournalContents:
-    """The contents of a journal. Raises JournalError with one sentence when it is none, is damaged or is marked as incomplete."""
+    """The contents of a journal. Raises JournalError with one sentence when it is invalid, damaged or marked as incomplete."""
     first, slots = _read(path)
     if first.startswith(MARK) and first[8:10] == b" {":
         raise _incomplete(path)
@@ -312,7 +312,7 @@ def read_journal(path: Path) -> JournalContents:
         raise _incomplete(path)
     read = [_checkpoint(path, value, number) for number, value in enumerate(map(_value, slots), 1) if value is not None]
     torn, ran_on = SLOTS - len(read), boot != "" and boot == boot_id()
-    if not read or (torn and ran_on):  # only a power cut of the computer tears a record that it was writing
+    if not read or (torn and ran_on):  # only a power cut of the computer damages a record that it was writing
         raise JournalError(f"journal {path} is damaged: {torn} of its {SLOTS} records cannot be read")
     records, last = max(read, key=lambda record: record[0])
     return JournalContents(heading, last, torn, records, ran_on)
@@ -327,7 +327,7 @@ def _incomplete(path: Path) -> JournalError:
 
 def _read(path: Path) -> tuple[bytes, list[bytes]]:
     """The heading, and the blocks of the records."""
-    if lexists(path) and not isfile(path) and not isdir(path):  # a pipe would be waited for
+    if lexists(path) and not isfile(path) and not isdir(path):  # reading a pipe would block
         raise JournalError(f"journal {path} cannot be read: it is no file")
     try:
         with path.open("rb") as file:
@@ -349,12 +349,12 @@ def _value(line: bytes) -> Any:
         return None
     try:
         return json.loads(text)
-    except (ValueError, RecursionError):  # not written by this program: its checksum is right
+    except (ValueError, RecursionError):  # not written by this program, although the checksum is right
         return None
 
 
 def _heading(path: Path, value: Any) -> tuple[JournalHeading, str, str]:
-    """The heading, the journal's key, and the boot of its computer."""
+    """The heading, the journal's key, and its computer's boot ID."""
     if not isinstance(value, dict) or value.get("format") != FORMAT:
         raise JournalError(f"journal {path} is of another version of this program: this one reads format {FORMAT}")
     match value:
@@ -365,7 +365,7 @@ def _heading(path: Path, value: Any) -> tuple[JournalHeading, str, str]:
 
 
 def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:
-    """A record's number, and what it tells."""
+    """Number and content of a record."""
     match value:
         case [int(number), int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(state)] if _is_pose(pose):
             return number, Checkpoint(sent, acknowledged, executed, wire, tuple(pose), state)
@@ -377,16 +377,15 @@ def _is_pose(values: list[Any]) -> bool:
 
 
 def write_at(descriptor: int, offset: int, data: bytes) -> None:
-    """Write all bytes at a place of an open file. Raises OSError, also when only some were written."""
+    """Write all bytes at an offset of an open file. Raises OSError, also when only some were written."""
     os.lseek(descriptor, offset, os.SEEK_SET)
     if os.write(descriptor, data) < len(data):
         raise OSError("not all of it was written")
 
 
 def mark_incomplete(path: Path, descriptor: int | None, heading: bytes) -> bool:
-    """Mark an open journal, and the file at its path where that is another one with the same heading (a stick that was plugged
-    in again, a copy). Returns whether the mark is on the disk, and no such file is left without it.
-    """
+    """Mark an open journal, and a different file at its path with the same heading (a stick plugged in again, a copy). Returns
+    whether the mark is on the disk, with no such file left unmarked."""
     marked = descriptor is not None and _mark(descriptor)
     if descriptor is not None and is_at(path, descriptor):
         return marked
@@ -412,7 +411,7 @@ def _mark(descriptor: int) -> bool:
 
 def is_at(path: Path, descriptor: int) -> bool:
     """Whether a path still leads to an open file, which was not deleted, moved or replaced."""
-    if sys.platform == "win32":  # an open file is none of these there
+    if sys.platform == "win32":  # an open file cannot be deleted, moved or replaced there
         return True
     try:
         return samestat(os.stat(path), os.fstat(descriptor))
@@ -421,7 +420,7 @@ def is_at(path: Path, descriptor: int) -> bool:
 
 
 def note_incomplete(key: str) -> bool:
-    """Note in every folder that can be written that the journal of this key is incomplete; returns whether there was one."""
+    """Note in every writable folder that the journal with this key is incomplete; returns whether there was one."""
     return sum(map(_note, _notes(key))) > 0
 
 
@@ -441,7 +440,7 @@ def _note(file: Path) -> bool:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Bring the names of files to the disk, where the system can do that."""
+    """Sync the names of files to the disk, if the system can."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -451,7 +450,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def is_noted_incomplete(key: str) -> bool:
-    """Whether some folder notes that the journal of this key is incomplete."""
+    """Whether any folder notes that the journal with this key is incomplete."""
     return any(map(lexists, _notes(key)))
 
 

@@ -1,8 +1,7 @@
-"""Print state: where a print stands, from the questions before it to its end, and which state may follow which.
+"""Print state: the states of a print, from the checks before it to its end, and their transitions.
 
-A print at a port, one on a print server and a printer in hand have the same states. `PrintStatus` is a moment of any of them: the
-stream and the servers make it, a terminal's screen and the pages show it. `ProgramPosition` follows part and layer by the lines
-of the program.
+Prints at a port, on a print server and manual control share the states. `PrintStatus` is a snapshot of one: the stream and the
+servers make it, the terminal and the pages show it. `ProgramPosition` follows part and layer by the program's lines.
 """
 
 from collections.abc import Mapping
@@ -14,48 +13,48 @@ from machine.gcode.line_text import begins_layer, begun_part, read_line
 from machine.gcode.words import read_words, split_command
 from machine.link.protocol.events import Temperature
 
-OLD_HEAT_S = 15.0  # a printer reports every few seconds, and is asked when it does not
+OLD_HEAT_S = 15.0  # a printer reports every few seconds, or is queried
 
 
 class PrintState(StrEnum):
-    """A state by the word that people read."""
+    """A state, named as users read it."""
 
-    CHECKING = "checking"  # nothing but questions has gone to the printer
-    READY = "ready"  # a print can begin: a person's word is waited for, or a server prints nothing
-    UPLOADING = "uploading"  # a print server gets the file
+    CHECKING = "checking"  # only queries were sent to the printer
+    READY = "ready"  # a print can begin: the user is asked, or a server is idle
+    UPLOADING = "uploading"  # to a print server
     PRINTING = "printing"
     PAUSING = "pausing"
     PAUSED = "paused"
     RESUMING = "resuming"
     RECONNECTING = "reconnecting"  # the port is lost
-    FINISHING = "finishing"  # all lines are sent, the last moves are waited for
-    IN_HAND = "in hand"  # nothing is printed: a person heats and moves the machine
-    CANCELLING = "cancelling"  # the heaters go off
+    FINISHING = "finishing"  # all lines are sent, the last moves are awaited
+    IN_HAND = "in hand"  # manual control: the user heats and moves the machine
+    CANCELLING = "cancelling"  # the heaters are being switched off
     DONE = "done"
-    CANCELLED = "cancelled"  # by a person
-    LEFT = "left"  # a print server goes on with it by itself
-    DECLINED = "declined"  # a person did not want it: nothing has moved
+    CANCELLED = "cancelled"  # by the user
+    LEFT = "left"  # a print server continues it by itself
+    DECLINED = "declined"  # by the user: nothing has moved
     REFUSED = "refused"  # by a check: nothing has moved
     FAILED = "failed"
-    OFFLINE = "offline"  # the print server is there, its printer is not
+    OFFLINE = "offline"  # the print server responds, its printer does not
 
     @property
     def is_over(self) -> bool:
-        """Whether a print has ended so."""
+        """Whether a print has ended in this state."""
         return self in OVER
 
     @property
     def is_printing(self) -> bool:
-        """Whether a print is under way."""
+        """Whether a print is running."""
         return self in ACTIVE
 
 
 S = PrintState
 OVER = frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.REFUSED, S.FAILED})
-UNHEARD = frozenset({S.CANCELLING, S.RECONNECTING})  # no report is taken
-AWAY = frozenset({S.PAUSING, S.PAUSED})  # the tip, from the print
+UNHEARD = frozenset({S.CANCELLING, S.RECONNECTING})  # without reports
+AWAY = frozenset({S.PAUSING, S.PAUSED})  # the tip is away from the print
 ACTIVE = frozenset({S.PRINTING, S.PAUSING, S.PAUSED, S.RESUMING, S.RECONNECTING, S.FINISHING, S.CANCELLING})
-_ANY = ACTIVE | OVER  # a server tells of its print now and then, so these follow in any order; a cancel may be refused
+_ANY = ACTIVE | OVER  # a server reports from time to time, so these follow in any order; a cancel may be refused
 
 TABLE: Mapping[PrintState, frozenset[PrintState]] = {
     S.CHECKING: _ANY | {S.READY, S.UPLOADING, S.IN_HAND},
@@ -63,20 +62,20 @@ TABLE: Mapping[PrintState, frozenset[PrintState]] = {
     S.UPLOADING: _ANY,
     **{state: _ANY | {S.READY, S.OFFLINE} for state in ACTIVE},
     S.IN_HAND: OVER | {S.CANCELLING},
-    S.LEFT: frozenset({S.CANCELLING}),  # a print that its server goes on with is stopped after all
+    S.LEFT: frozenset({S.CANCELLING}),  # a print that continues on its server is stopped after all
     **{state: frozenset() for state in OVER - {S.LEFT}},
     S.OFFLINE: _ANY | {S.READY},
 }
 
 
 def follows(before: PrintState, after: PrintState) -> bool:
-    """Whether a state may come after another."""
+    """Whether a state may follow another."""
     return before is after or after in TABLE[before]
 
 
 @dataclass(frozen=True)
 class PrintStatus:
-    """A moment of a print. None: not known (yet)."""
+    """A snapshot of a print. None: unknown (yet)."""
 
     state: PrintState = PrintState.PRINTING
     elapsed_s: float = 0.0
@@ -90,24 +89,24 @@ class PrintStatus:
     parts: int | None = None
     layer: int | None = None
     layers: int | None = None  # of the part
-    file_line: int = 0  # line in the program's file of the newest acknowledged command, from 1
-    file: str = ""  # what a print server prints,
-    bytes_read: int | None = None  # and how far into it
-    at: Mapping[str, float] = field(default_factory=dict)  # where the axes stand, by their letters, mm and deg
+    file_line: int = 0  # line of the newest acknowledged command in the program's file, from 1
+    file: str = ""  # printed by a print server,
+    bytes_read: int | None = None  # and how far it was read
+    at: Mapping[str, float] = field(default_factory=dict)  # positions of the axes by their letters, mm and deg
     feed_percent: float = 100.0
     flow_percent: float = 100.0
-    message: str = ""  # the newest word to the person watching
-    warning: str = ""  # what that person must know from now on, beside every message; "" when there is none
+    message: str = ""  # the newest message to the user
+    warning: str = ""  # a lasting warning to the user, besides the messages; "" for none
     heat_age_s: float = 0.0  # since the temperatures were reported
-    homed: bool = False  # a printer in hand may be moved
+    homed: bool = False  # under manual control: it may be moved
 
     @property
     def heat_is_old(self) -> bool:
-        """Whether the temperatures are only those last known."""
+        """Whether the temperatures are outdated."""
         return self.heat_age_s >= OLD_HEAT_S or self.state in UNHEARD or self.state.is_over
 
     def json(self) -> dict[str, Any]:
-        """The status for a page, where nothing is nested but `at`."""
+        """The status for a page, with `at` as the only nested value."""
         values: dict[str, Any] = asdict(self)
         heat: dict[str, float | None] = values.pop("temperature")
         return values | heat | {"heat_is_old": self.heat_is_old}
@@ -115,7 +114,7 @@ class PrintStatus:
 
 @dataclass
 class ProgramPosition:
-    """The sender's place in the program, gathered line by line."""
+    """The sender's place in the program, updated line by line."""
 
     part: int | None = None
     parts: int | None = None
@@ -125,7 +124,7 @@ class ProgramPosition:
     reported_at_s: float = 0.0
 
     def read_comment(self, line: str) -> bool:
-        """Take note of what a line says behind its `;`; whether a layer begins there."""
+        """Read a line's comment; returns whether a layer begins there."""
         comment = read_line(line).comment.strip() if ";" in line else ""
         if not comment:
             return False
@@ -136,7 +135,7 @@ class ProgramPosition:
         return begins
 
     def read_m73(self, command: str, now_s: float) -> None:
-        """Take note of the P (per cent done) and R (minutes left) of an M73; nothing of another command."""
+        """Read P (per cent done) and R (minutes left) of an M73; other commands are ignored."""
         name, rest = split_command(command.upper())
         if name != "M73":
             return
@@ -146,18 +145,18 @@ class ProgramPosition:
             self.minutes_left, self.reported_at_s = words["R"], now_s
 
     def left_s(self, elapsed_s: float, feed_percent: float) -> float | None:
-        """Time left by M73's last word, less what has passed since; None when it has said nothing."""
+        """Time left by the last M73, less the time since, s; None without one."""
         if self.minutes_left is None:
             return None
         return max(0.0, 60.0 * self.minutes_left * 100.0 / feed_percent - (elapsed_s - self.reported_at_s))
 
     def share(self, acknowledged: int, total: int | None) -> float | None:
-        """Done so far, 0 to 1: by M73, else by lines."""
+        """Fraction done, 0 to 1: by M73, else by lines."""
         if self.percent is not None:
             return min(1.0, self.percent / 100.0)
         return acknowledged / total if total else None
 
 
 def last_known(heat: Temperature, age_s: float) -> str:
-    """Temperatures behind the last words of a print, for what hears no more of its heaters; "" where none were told."""
+    """Suffix with the last temperatures, for a print whose heaters are no longer reported; "" without any."""
     return f"; {heat.words} as last known, {age_s:.0f} s before" if heat.words else ""

@@ -1,11 +1,11 @@
-"""Resume: where a print that was cut off goes on, and how the tip gets there.
+"""Resume: where an interrupted print continues, and how the tip gets there.
 
-Three cases, by what the printer itself reports: it has worked on and stands where a line of the program ends (nothing is
-repeated), it has not restarted and knows its place (the tip travels back), it has restarted (the axes are taken to stand where
-they stood, the tip rises along the nozzle, X and Y are homed). Z and the table are never homed onto a print.
+Three cases, by the printer's own reports: it has finished its queue and is at the end of a line (nothing is repeated), it has not
+restarted and knows its position (the tip travels back), or it has restarted (the axes are set to their last positions, the tip
+rises along the nozzle, X and Y are homed). Z and the table are never homed onto a print.
 
-A restart shows in what it changes: the greeting of the firmware, line numbers that begin anew, a position that the firmware
-believes in before anything is homed: 0 0 0, or Marlin's home positions (profiles.machine.Machine.home).
+A restart shows in the firmware's greeting, in line numbers that begin again, or in a position without homing: 0 0 0, or Marlin's
+home positions (profiles.machine.Machine.home).
 """
 
 from collections.abc import Iterable, Mapping
@@ -32,7 +32,7 @@ from profiles.messages import key_name, option, phrase
 from profiles.profile import Profile
 
 TOO_LITTLE = "hardly anything was printed: the program begins anew"
-PARKED = (PAUSED, LEFT)  # states in which the journal's pose is where the tip has been taken
+PARKED = (PAUSED, LEFT)  # states in which the journal's pose is the parking position
 MOVING = ("pausing", "resuming")
 HOME_IT = (
     f"write into {key_name('machine.gcode.resume')} of a profile of this machine how it is homed with a print on it "
@@ -52,36 +52,36 @@ FAULTY = (
 UNSURE_MM = 0.005
 SAME = 0.02  # mm or deg: M114 reports hundredths
 HOME_KEYS = ("x.home_mm", "y.home_mm", "z.home_mm", "tilt.home_deg", "turn.home_deg")
-NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: questions have numbers too
+NUMBERS_AHEAD = 4096  # least excess over the recorded line number that is implausible: queries have numbers too
 
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """The place where a resumed print goes on."""
+    """The place where a resumed print continues."""
 
-    line: int  # the first one of the program to be sent
-    before: tuple[str, ...]  # commands ahead of it
-    reason: str = ""  # what is certain about it, in words
+    line: int  # first line of the program to send
+    before: tuple[str, ...]  # commands before it
+    reason: str = ""  # in words
     homes: bool = False  # X and Y
 
 
 @dataclass(frozen=True)
 class InterruptedPrint:
-    """An interrupted print by its journal and its program."""
+    """An interrupted print, from its journal and its program."""
 
-    line: int  # the first one not surely executed
+    line: int  # first line not surely executed
     last: int
     modal: ModalState  # before that line
     position: ProgramPosition
     printed: Printed
     stroked: bool  # anything was printed before
-    ahead: Mapping[int, ModalState]  # line -> the state after its command, which may have been done since
+    ahead: Mapping[int, ModalState]  # line -> the state after its command, which may have been executed since
     checkpoint: Checkpoint
-    stood_mm: float | None = None  # the height of the tip that a person has read off
+    stood_mm: float | None = None  # the tip's height that the user has measured
 
 
 def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile: Profile, limit: int) -> InterruptedPrint:
-    """Read a program up to where its print was cut off."""
+    """Read a program up to its interruption."""
     modal, position, bounds = ModalState(axes_of(profile.machine)), ProgramPosition(), PrintedBounds(profile.machine)
     first, stroked = checkpoint.executed + 1, False
     before: tuple[ModalState, ProgramPosition] | None = None
@@ -119,9 +119,8 @@ def has_not_restarted(point: InterruptedPrint, status: PrinterStatus) -> bool | 
 
 
 def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile) -> ResumePoint:
-    """Decide. Raises JournalError where going on would be a guess, FirmwareError or SilenceError where the printer has not
-    reported its place.
-    """
+    """Choose the resume point. Raises JournalError if continuing would be a guess, FirmwareError or SilenceError if the printer
+    has not reported its position."""
     if status.position is None and status.fault:
         raise FirmwareError(FAULTY.format(status.fault))
     if status.position is None and status.last_number is None:
@@ -149,7 +148,7 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
 
 
 def _check_begun(status: PrinterStatus, begun: bool) -> None:
-    """Refuse a printer that does not stand as a restart leaves it, for it may have been homed or moved since."""
+    """Refuse a printer that is not in the state of a restart, for it may have been homed or moved since. Raises JournalError."""
     if not begun:
         keys = ", ".join(f"{key_name(f'machine.{key}')}" for key in HOME_KEYS)
         raise JournalError(
@@ -176,7 +175,8 @@ def _check(point: InterruptedPrint, profile: Profile) -> None:
 
 
 def _match_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[int, ModalState] | None:
-    """The first line whose position the printer reports, with the state after it: of the one before the first, or ahead."""
+    """The first line, from the last surely executed one, that ends at the reported position, and the state after it; None for
+    none."""
     if status.position is None:
         return None
     reported = status.position
@@ -190,9 +190,10 @@ def _match_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[int
 
 
 def stands_as_begun(status: PrinterStatus, machine: Machine) -> bool:
-    """Whether the printer stands where a firmware believes itself before anything was homed: at 0 0 0, or (Marlin) each axis at
-    its home position, which is 0, an end of its limits or what the profile says. True where it reports no position. A firmware
-    that does not count lines begins at 0 0 0 (Klipper, RepRapFirmware).
+    """Whether the printer reports the position of a firmware without homing: 0 0 0, or (Marlin) each axis at its home position.
+
+    That is 0, an end of its limits or a value of the profile. True without a reported position. A firmware that does not count
+    lines starts at 0 0 0 (Klipper, RepRapFirmware).
     """
     if not _nonzero(status) or status.position is None:
         return True
@@ -209,7 +210,7 @@ def stands_as_begun(status: PrinterStatus, machine: Machine) -> bool:
 
 
 def _nonzero(status: PrinterStatus) -> bool:
-    """Whether the printer says that it stands somewhere else than at 0 0 0."""
+    """Whether the printer reports another position than 0 0 0."""
     return status.position is not None and sum(abs(value) > SAME for value in status.position.values()) >= SEVERAL
 
 
@@ -218,7 +219,7 @@ def _in_words(status: PrinterStatus) -> str:
 
 
 def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[Floats, Pose] | None:
-    """The position that the printer reports; None where an axis is missing."""
+    """The position that the printer reports; None if an axis is missing."""
     if status.position is None:
         return None
     reported, letters = status.position, point.modal.axes.letters
@@ -232,14 +233,14 @@ def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[
 
 def _goal(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
     standing = axis_position(profile.machine, point.modal.coordinates(), False)
-    assert standing is not None  # _check has seen to it
+    assert standing is not None  # checked by _check
     return standing
 
 
 def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose, homes: bool = False) -> tuple[str, ...]:
     """Heat (the tip may be stuck in the plastic), up, back over the print, down, filament, modes.
 
-    homes: after a restart, the axes are set to where they stand, the tip rises, X and Y are homed.
+    homes: after a restart the axes are set to their positions, the tip rises, X and Y are homed.
     """
     goal, goal_pose = _goal(point, profile)
     pull, push = filament_commands(point.modal, profile)
@@ -252,7 +253,7 @@ def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose,
 
 
 def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
-    """The position of the axes when the power went; raises JournalError when tip or table may have been on a way."""
+    """Positions of the axes at the interruption. Raises JournalError when tip or table may have been moving."""
     state, known = point.checkpoint.state, [value for value in point.checkpoint.pose[:E_AXIS] if value is not None]
     if state in PARKED and len(known) == E_AXIS:
         return np.array(known[:3]), Pose(*known[3:])
@@ -269,9 +270,8 @@ def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple
 
 
 def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
-    """The heights Z at which the tip may have stood, rising; the one that a person has seen. Taken for too low a one the tip
-    prints too high, taken for too high a one it ploughs through the print.
-    """
+    """Possible heights Z of the tip, rising; a single one if the user has measured it. Assumed too low, the tip prints too high;
+    assumed too high, it ploughs through the print."""
     if point.stood_mm is not None:
         return (point.stood_mm,)
     heights = sorted(z for modal in (point.modal, *point.ahead.values()) if (z := modal.at[2]) is not None)
@@ -279,6 +279,6 @@ def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
 
 
 def is_in_doubt(way: ResumePoint, point: InterruptedPrint, profile: Profile) -> bool:
-    """Whether the height must be seen by a person: Z is not homed, and the tip was neither parked nor at one height only."""
+    """Whether the user must measure the height: Z is not homed, and the tip was neither parked nor at a single height."""
     parked = point.checkpoint.state in PARKED and None not in point.checkpoint.pose[:E_AXIS]
     return way.homes and not profile.machine.gcode.resume and not parked and len(heights_mm(point)) > 1

@@ -1,7 +1,6 @@
-"""Resumption: a print that was cut off is read from its journal, and its rest is printed when printer and person agree.
+"""Resumption: reads an interrupted print from its journal, and prints the rest once printer and user agree.
 
-The person is asked only when the printer itself has reported where it stands: until the answer is yes,
-nothing moves or heats.
+The user is asked only after the printer has reported its position; until then nothing moves or heats.
 """
 
 from collections.abc import Iterator, Sequence
@@ -49,7 +48,7 @@ from profiles.errors import JournalError, ProfileError
 from profiles.messages import key_name, phrase
 from profiles.profile import Profile, profile_of_tables
 
-HEIGHT_QUESTION = (  # else all that follows would lie too high or too low
+HEIGHT_QUESTION = (  # otherwise the rest would be printed too high or too low
     "the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
 )
 RESTARTED = (
@@ -60,7 +59,7 @@ RESTARTED = (
 
 @dataclass(frozen=True, eq=False)
 class Resumption:
-    """A print that can be resumed, by its journal and its program. journal: its file; at: the port of its printer."""
+    """A print that can be resumed, from its journal and its program. journal: its file; at: the port of its printer."""
 
     at: SerialPort
     journal: Path
@@ -72,11 +71,11 @@ class Resumption:
 
     @property
     def name(self) -> str:
-        """What was printed."""
+        """The name of the print."""
         return self.story.heading.name
 
     def sentences(self) -> tuple[str, ...]:
-        """Where it was cut off, as sentences for a person."""
+        """Where it was interrupted, as sentences for the user."""
         position, at = self.point.position, self.point.modal.at
         of_parts = f" of {position.parts}" if position.parts else ""
         where = [f"part {position.part}{of_parts}"] if position.part is not None else []
@@ -93,9 +92,9 @@ class Resumption:
 
 
 def read_resumption(job: PrintJob) -> Resumption:
-    """Read the journal of a job. The job's profile is the one whose machine the user has named.
+    """Read the journal of a job, whose profile is the one named by the user.
 
-    Raises JournalError and other UserErrors for what cannot be resumed at this printer.
+    Raises JournalError and other UserErrors for a print that cannot be resumed at this printer.
     """
     journal, at = job.cut_off, at_printer(job.destination)
     assert journal is not None
@@ -103,7 +102,7 @@ def read_resumption(job: PrintJob) -> Resumption:
         raise JournalError(
             f"{phrase('', '--port sim: ')}a simulated printer ends with its print; the port of a printer is expected"
         )
-    if is_being_printed(journal):  # asked first: what is read after that does not change any more
+    if is_being_printed(journal):  # checked first: the files read below do not change any more
         raise JournalError(
             f"journal {journal}: its print runs now, in another terminal or page: it can be resumed when it has ended"
         )
@@ -117,15 +116,15 @@ def read_resumption(job: PrintJob) -> Resumption:
 
 
 def rest_of(cut_off: Resumption) -> LoadedProgram:
-    """The program whose rest is printed, dry-run."""
+    """The dry-run program whose rest is printed."""
     return LoadedProgram(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
 
 
 def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: Person) -> End:
-    """Ask the printer where it stands, then the person whether the print is to go on, and print the rest.
+    """Query the printer's position, ask the user whether to continue, and print the rest with a new journal.
 
-    Where the tip may have stood at several heights, the person is asked which it is. The journal of the job is a new one. Raises
-    PrinterError, JournalError where nobody can answer.
+    If several heights of the tip are possible, the user chooses it. Raises PrinterError, and JournalError when no user can
+    answer.
     """
     with _further_journal(cut_off, job) as further:
 
@@ -156,7 +155,7 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
 
 @contextmanager
 def _further_journal(cut_off: Resumption, job: PrintJob) -> Iterator[Journal]:
-    """The journal of the rest; one without a record is removed, for it would let the whole program begin anew."""
+    """The journal of the rest; removed without a record, for it would restart the whole program."""
     with continue_journal(cut_off.text, cut_off.profile, cut_off.name, job.journal) as further:
         try:
             yield further
@@ -166,10 +165,11 @@ def _further_journal(cut_off: Resumption, job: PrintJob) -> Iterator[Journal]:
 
 
 def _hand_over(cut_off: Resumption, further: Journal, done: int) -> None:
-    """Before the rest begins: the new journal takes over on the disk, then the old one says so. From here on the printer counts
-    its lines anew: only the new journal can tell whether it has restarted. done: lines of the program that are not repeated.
+    """Before the rest begins: write the new journal to disk, then mark the old one as resumed.
 
-    Raises JournalError when one of them cannot be written; then nothing has moved, and only the old one can be resumed.
+    The printer then restarts its line numbers, so that only the new journal can show a restart of the printer. done: lines of the
+    program that are not repeated. Raises JournalError when one of them cannot be written; then nothing has moved, and only the
+    old one can be resumed.
     """
     further.write(replace(cut_off.story.last, sent=done, acknowledged=done, executed=done))
     try:
@@ -182,9 +182,9 @@ def _hand_over(cut_off: Resumption, further: Journal, done: int) -> None:
 
 
 def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> Profile:
-    """The journal's own profile, homed and after a restart believed as the machine says that was named.
+    """The journal's profile, with the home positions and the resume block of the machine named by the user.
 
-    Raises JournalError when that is another machine, or when the journal's profile is not valid.
+    Raises JournalError for a different machine, or for an invalid profile in the journal.
     """
     try:
         profile = profile_of_tables(heading.profile)
@@ -220,7 +220,7 @@ def _program(journal: Path, story: JournalContents) -> GcodeFile:
 
 
 def _question(way: ResumePoint, point: InterruptedPrint, profile: Profile) -> str:
-    """What is going to be done, and what the person must make sure of."""
+    """The question with the next steps, and what the user must make sure of."""
     reason = f"it goes on with line {way.line}: {way.reason}"
     if not way.homes:
         return reason
