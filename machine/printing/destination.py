@@ -127,7 +127,7 @@ def parse_server_address(text: str) -> Server:
     if not _is_host(host) or path.startswith("//"):  # http://http://h
         raise ServerError(f"server address {_plain(text)!r} names no host: {EXPECTED}")
     if port not in ("", ":") and not (NUMBER.fullmatch(port) and int(port[1:]) < 65536):
-        raise ServerError(f"server address {_plain(text)!r}: port {_plain(port[1:])} is none: {EXPECTED}")
+        raise ServerError(f"server address {_plain(text)!r}: {_plain(port[1:])} is not a port number: {EXPECTED}")
     if rest or not path.isprintable():
         raise ServerError(f"server address {_plain(text)!r}: nothing may follow the path: {EXPECTED}")
     usual = TLS_PORT if scheme.lower() == "https" else PORTS[kind]

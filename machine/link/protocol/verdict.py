@@ -16,7 +16,9 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: s
     at = "this baud rate" if baud is None else f"{baud} baud"
     if tries >= RUBBISH_TRIES and decoder.rubbish:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
-        return PrinterError(f"what comes at {at} is rubbish: the printer speaks at another rate, {advice('baud', others, 'try')}")
+        return PrinterError(
+            f"the bytes received at {at} are garbled: the printer speaks at another rate, {advice('baud', others, 'try')}"
+        )
     if tries < SYNC_TRIES:
         return None
     if decoder.foreign:

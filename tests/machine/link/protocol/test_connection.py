@@ -628,7 +628,7 @@ def test_rubbish_of_a_wrong_baud_rate_is_recognised_and_other_rates_are_named() 
         table.say(RUBBISH)
         table.wait(3.1)
     assert str(table.connection.fault) == (
-        "what comes at 115200 baud is rubbish: the printer speaks at another rate, "
+        "the bytes received at 115200 baud are garbled: the printer speaks at another rate, "
         "try --baud 250000, 230400, 500000, 1000000, 57600"
     )
     assert table.now_s < 13
