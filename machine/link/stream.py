@@ -110,7 +110,7 @@ class _Print:
         return device.name
 
     def _reconnect(self, error: PortError) -> tuple[Wire, bool | None]:
-        """Wait for a lost port; a firmware without line numbers is asked for its position."""
+        """Wait for a lost port; a firmware without line numbers reports its position instead."""
         feed, before = self.feed, self._path
         wire, done = self._reopen(error)
         if self._path != before:

@@ -127,7 +127,7 @@ def trial(seed: int, lines: int) -> Trial:
 
 
 def judged(text: list[str], faults: FaultScript, printer: VirtualPrinter, error: str) -> list[str]:
-    """What is wrong about an end."""
+    """The faults of an end."""
     end_s = printer.now_s
     printer.firmware.advance(end_s + AFTER_S)
     record, strokes = printer.record, wanted(text)
@@ -146,8 +146,7 @@ def judged(text: list[str], faults: FaultScript, printer: VirtualPrinter, error:
 
 
 def order(record: Record, strokes: np.ndarray, whole: bool) -> list[str]:
-    """What is wrong with the executed strokes, which must be the program's, each once and in order; a stop may shorten the
-    last."""
+    """Faults of the executed strokes, which must be the program's, each once and in order; a stop may shorten the last."""
     pushed = record.end[:, 5] - record.start[:, 5]
     got = np.column_stack([record.end[:, :2], pushed])[pushed > 1e-9]
     if whole and len(got) != len(strokes):

@@ -2,7 +2,7 @@
 
 `python tools/campaigns/judge_parts.py sheets FOLDER MODEL... [--size MM] [--set KEY=VALUE]` decomposes models at default
 settings, scaled to a longest side, and draws a sheet of each: the chosen parts, below the model in its original orientation if
-that differs. `read FILE.csv ...` counts verdicts: lines of sheet, verdict (person: like a human expert; doubtful; wrong) and a
+that differs. `read FILE.csv ...` counts verdicts: lines of sheet, verdict (`person`: like an expert; `doubtful`; `wrong`) and a
 reason. For several files on the same sheets it reports how many verdicts agree, and which sheets are never accepted.
 """
 

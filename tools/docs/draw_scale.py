@@ -52,7 +52,7 @@ def draw(text: str, out: Path) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    matplotlib.rcParams |= {"svg.hashsalt": "scale", "svg.fonttype": "none"}  # the same bytes at each call
+    matplotlib.rcParams |= {"svg.hashsalt": "scale", "svg.fonttype": "none"}  # deterministic bytes
     columns, figure = tables(text), Figure(figsize=(10.0, 5.6), layout="constrained")
     for panel, axes in zip(PANELS, figure.subplots(2, 3).flat, strict=True):
         values = columns[panel.table]

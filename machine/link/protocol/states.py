@@ -42,7 +42,7 @@ class Signal(Enum):
     LAST_NUMBER = "the last line number was used, and no line is in flight"
 
 
-# What ends a print in any state, and where a lost port leads.
+# The ends of a print from any state, and the transition of a lost port.
 _ENDS = {Signal.START: State.LOST, Signal.UNCHECKED: State.LOST, Signal.FAULT: State.HALTED}
 _DOUBTS = {Signal.RECONNECTED: State.PROBING, Signal.IMPOSSIBLE: State.LOST, **_ENDS}
 # Lines are in flight, each to be acknowledged.

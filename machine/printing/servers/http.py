@@ -263,7 +263,7 @@ def _certificates(address: Server, ca_file: Path | None) -> ssl.SSLContext:
 
 
 def _transport_sentence(error: httpx.TransportError, address: Server, httpx_: Any) -> str:
-    """What failed below HTTP, and what to check."""
+    """Sentence on a failure below HTTP, with what to check."""
     where, chain = f"{address.host} at port {address.port}", causes(error)
     if any(isinstance(cause, socket.gaierror) for cause in chain):
         return f"{address.name}: no computer of the name {address.host} is known here: an IP address will do, too"

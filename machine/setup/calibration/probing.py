@@ -240,7 +240,7 @@ class Measuring:
         return next(obstacle for obstacle in found if obstacle)
 
     def _find_in_the_way(self, machine: Machine, pose: Pose) -> str | None:
-        """What keeps a machine from measuring the ball at a pose, or None."""
+        """The obstacle that keeps a machine from measuring the ball at a pose, or None."""
         least, most = machine.tilt.reach_deg
         if not least <= pose.tilt_deg <= most:
             return f"{machine.tilt.letter} goes from {least:g} to {most:g}"
