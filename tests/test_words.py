@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("mdp", "slicer", "profiles")  # to be extended by machine and tools
+PACKAGES = ("mdp", "slicer", "profiles", "machine/cli")
+CODE = re.compile(r"`[^`]*`")
 # Words and constructions that are not used -> what to write instead. Matched in each paragraph, in either case without (?-i:).
 WORDS = {
     r"\btold\b|\btells?\b(?!: )": "given, reported, distinguishes",
@@ -44,13 +45,13 @@ WORDS = {
 
 
 def words_of(source: str) -> Iterator[tuple[int, str]]:
-    """The paragraphs of a file's docstrings and comments, each as one line, with the number of its first line."""
+    """The paragraphs of a file's docstrings and comments, each as one line without code, with the number of its first line."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and (
             text := ast.get_docstring(node)
         ):
             for paragraph in text.split("\n\n"):
-                yield node.body[0].lineno, " ".join(paragraph.split())
+                yield node.body[0].lineno, CODE.sub("", " ".join(paragraph.split()))
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT:
             yield token.start[0], token.string.lstrip("# ")

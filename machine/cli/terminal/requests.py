@@ -1,4 +1,4 @@
-"""Requests: what each command is asked for, as values whose fields are the options of the command line."""
+"""Requests of the commands: dataclasses whose fields are options of the command line."""
 
 from dataclasses import dataclass
 from os.path import exists  # pathlib's raises for a name that is too long
@@ -31,12 +31,10 @@ class DecomposeOptions:
     front: Annotated[Path | None, option("--front FILE", "picture of how every number of parts would cut the model")] = None
     html: options.HtmlFile = None
     record: Annotated[Path | None, option("--record FILE", "what the search saw, as .npz for training")] = None
-    compare: Annotated[
-        bool, option("--compare", "slice the parts: tell how their joints lie, and time and material in one part")
-    ] = False
+    compare: Annotated[bool, option("--compare", "slice the parts: report joints, time and material, also in one part")] = False
 
     def request(self, model: str, search: options.FileOptions, given: options.ProfileOptions) -> ModelRequest:
-        """What is asked for of a model: a plan that exists is cut by, another is written."""
+        """The request for a model: an existing plan defines the cuts, otherwise the plan is written."""
         known = self.plan if self.plan is not None and exists(self.plan) else None
         outputs = Outputs(
             folder=self.out,
@@ -60,13 +58,13 @@ class ExportOptions:
     svg: Annotated[Path | None, option("--svg FILE", "picture of one layer, see --layer")] = None
     html: options.HtmlFile = None
     layer: Annotated[str | None, option("--layer PART:LAYER", "which layer; else the first, 1:1")] = None
-    compare: Annotated[bool, option("--compare", "tell also time, material, support and risky area printed in one part")] = False
+    compare: Annotated[bool, option("--compare", "also report time, material, support and risky area in one part")] = False
     force: options.Force = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class EditRequest:
-    """The workbench. model: a model, a plan or a project to begin with; lan: open it to the local network, too."""
+    """Options of edit. model: the model, plan or project to open first; lan: also open it to the local network."""
 
     model: Annotated[
         str | None, typer.Argument(metavar="[MODEL|PLAN]", show_default=False, help="a model file, demo:NAME, or a plan (.toml)")
@@ -78,9 +76,9 @@ class EditRequest:
     upload_mib: Annotated[int, option("--upload-mib N", "the largest file that is taken from a page", min=1, max=1024)] = (
         UPLOAD_MIB
     )
-    lan: Annotated[
-        bool, option("--lan", "open it to devices of the local network, too, each paired by a code that is told here")
-    ] = False
+    lan: Annotated[bool, option("--lan", "open it to devices of the local network, too, each paired by a code shown here")] = (
+        False
+    )
     certificate: Annotated[Path | None, option("--certificate FILE", "PEM file: encrypts --lan, with --key")] = None
     key: Annotated[Path | None, option("--key FILE", "PEM file: the key of the certificate")] = None
     given: options.ProfileOptions
@@ -88,7 +86,7 @@ class EditRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchRequest:
-    """Every model of a folder. do: decompose, export or estimate; out: folder for the table and the files."""
+    """Options of batch. do: decompose, export or estimate; out: folder for the table and the files."""
 
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", show_default=False, help="folder of models")]
     out: Annotated[Path, option("-o --out DIR", "folder for DO.csv, a row a model, and what is made")]
@@ -103,11 +101,11 @@ class BatchRequest:
     given: options.ProfileOptions
 
     def asked(self) -> ModelRequest:
-        """What is asked for of each model, without a model's name."""
+        """The request for each model, without the model's name."""
         return options.model_request("", self.search, self.given)
 
     def workers(self) -> "Workers":
-        """Where the work is done."""
+        """The workers that do the work."""
         from mdp.batch.pool import Workers
         from mdp.kernels.threads import THREADS
 
@@ -116,7 +114,7 @@ class BatchRequest:
 
 @dataclass(frozen=True)
 class WatchOptions:
-    """The page that follows and commands a print."""
+    """Options of the page that follows and controls a print."""
 
     watch: Annotated[bool, option("--watch", "open a page of this computer that follows and commands the print")] = False
     watch_port: Annotated[
@@ -126,13 +124,13 @@ class WatchOptions:
 
     @property
     def port(self) -> int | None:
-        """Where the page is served, 0: at any free port; None: nowhere."""
+        """Port of the page, 0: any free one; None: no page."""
         return (self.watch_port or 0) if self.watch or self.watch_port is not None else None
 
 
 @dataclass(frozen=True)
 class PrintOptions:
-    """How a print is recorded and watched, and how fast a simulated printer is."""
+    """Options of print: how it is recorded and watched, and the speed of a simulated printer."""
 
     baud: options.Baud = BAUD
     speed: options.SimSpeed = 0.0
@@ -144,7 +142,7 @@ class PrintOptions:
 
 @dataclass(frozen=True)
 class ResumeOptions:
-    """A print that was cut off, and how its rest is printed; further: the journal of the rest."""
+    """Options of resume. further: journal of the rest."""
 
     journal: Annotated[
         Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
@@ -160,19 +158,19 @@ class ResumeOptions:
 
 @dataclass(frozen=True)
 class MachineOptions:
-    """A machine and settings over it, where nothing else of a profile matters."""
+    """A machine and settings over it, for commands that use nothing else of a profile."""
 
     machine: options.MachineName = Given.machine
     settings: options.Settings = ()
 
     def profile(self) -> "Profile":
-        """The profile. Raises ProfileError."""
+        """The machine's profile. Raises ProfileError."""
         return options.machine_profile(self.machine, self.settings)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConsoleRequest:
-    """A printer to talk to line by line. reports: show temperature reports; log as for a print."""
+    """Options of console. reports: show temperature reports."""
 
     port: options.PortOrSim
     baud: options.Baud = BAUD
@@ -187,9 +185,9 @@ class ConsoleRequest:
 
 @dataclass(frozen=True)
 class SimulatorRequest:
-    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script.
+    """Options of simulator. link: symbolic link to the pseudo-terminal; tcp: port instead of a terminal; faults: fault script.
 
-    ball: X,Y,Z,D of one on its plate, true_machine: what its probe senses; with either of them it has a probe.
+    ball: X,Y,Z,D of a ball on the plate; true_machine: the machine that the probe senses. Either of them adds a probe.
     """
 
     link: Annotated[Path | None, option("--pty PATH", "a link to keep on the terminal's path")] = None
@@ -207,7 +205,7 @@ class SimulatorRequest:
 
 @dataclass(frozen=True)
 class ProbeOptions:
-    """A machine that measures a ball on its plate by itself."""
+    """Options of calibrate with a probe and a ball on the plate."""
 
     probe: Annotated[bool, option("--probe", "the machine at --port measures a ball on its plate by itself")] = False
     port: Annotated[str | None, option("--port PORT|sim", "serial port of the machine to measure; sim: simulated")] = None
@@ -221,7 +219,7 @@ class ProbeOptions:
 
     @property
     def offset_mm(self) -> tuple[float, float, float]:
-        """From the nozzle's tip to what touches; 0 where the nozzle senses. Raises BadParameter."""
+        """From the nozzle's tip to the contact point, 0 for the nozzle itself. Raises BadParameter."""
         try:
             x, y, z = (float(word) for word in self.probe_offset.split(","))
         except ValueError:
@@ -233,10 +231,10 @@ class ProbeOptions:
 
 @dataclass(frozen=True)
 class CalibrationRequest:
-    """A machine profile by name, the mark that is touched on it (None: the usual one), and where the result goes.
+    """Options of calibrate: machine, mark (None: the default), and where the result goes.
 
-    save: name of the user's own profile, None: the machine's. replace: write over files that exist. force: save although the
-    touches are far off. directions: find those of the axes, too.
+    save: name of the user's own profile, None: the machine's. replace: overwrite files. force: save despite large residuals.
+    directions: also find the directions of the axes.
     """
 
     out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
@@ -264,11 +262,10 @@ class CalibrationRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class CouponRequest:
-    """Bars that tell what joints hold. shape: how the bars are broken; vary: KEY=VALUE that half of them are printed with, none:
-    the usual ones; html, png: what shows them; report: a table and nothing else.
+    """Options of coupon. shape: how the bars are broken; vary: KEY=VALUE of half of the bars, none: the usual ones.
 
-    save: name of the user's own material and process, None: theirs. replace: write over files that exist. force: write a program
-    although its dry run found errors.
+    html, png: views of the bars; report: only write a table; save: name of the user's own material and process, None: theirs.
+    replace: overwrite files. force: write the program despite errors of its dry run.
     """
 
     out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
@@ -290,7 +287,7 @@ class CouponRequest:
 
 @dataclass(frozen=True)
 class ImportRequest:
-    """Another slicer's settings to read, with the presets of a bundle: empty: its only or its active one."""
+    """Options of profiles import: file, and presets of a bundle (empty: the only or the active one)."""
 
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="config.ini, bundle or G-code of PrusaSlicer; JSON of OrcaSlicer; .curaprofile")
@@ -306,8 +303,8 @@ class ImportRequest:
 
 @dataclass(frozen=True)
 class DetectRequest:
-    """A firmware that tells of its machine, at a port or in a file. base: profile that is inherited, None: the nearest shipped
-    one; out: file to write, None: in the user's own folder; replace: write over it."""
+    """Options of profiles detect. base: profile to inherit, None: the nearest shipped one; out: file to write, None: in the
+    user's own folder; replace: overwrite it."""
 
     file: Annotated[
         Path | None,

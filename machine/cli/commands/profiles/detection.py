@@ -1,4 +1,4 @@
-"""The profiles detect command: a machine profile by what a firmware tells of itself, with what it does not tell."""
+"""The profiles detect command: makes a machine profile from the settings of a firmware, and lists those it does not report."""
 
 import json
 import sys
@@ -23,11 +23,11 @@ from profiles.places import own_folder
 from profiles.profile import DEFAULTS, load_one
 from profiles.toml_text import value_text
 
-MOST_BYTES = 4 << 20  # of a configuration, the longest of which has some 200 KiB
+MOST_BYTES = 4 << 20  # size limit of a configuration; long ones have 200 KiB
 
 
 def detect(request: DetectRequest) -> int:
-    """Ask or read, write the profile, and tell what is the machine's own in it, what is the base's, and what to measure."""
+    """Query the firmware or read a file, write the profile, and list reported, inherited and unmeasured values."""
     check_baud(request.baud)
     if request.out is not None:
         check_writable(request.out)
@@ -51,7 +51,7 @@ def detect(request: DetectRequest) -> int:
 
 
 def _stem(found: Found, request: DetectRequest) -> str:
-    """A file's name of the machine's, else of the file's that was read."""
+    """File name after the machine, else after the file that was read."""
     named = found.name or (request.file.stem if request.file is not None else "") or found.dialect
     return plain_name(named).strip("._") or found.dialect
 
@@ -66,7 +66,7 @@ def _config(request: DetectRequest) -> ConfigText:
 
 
 def read_file(file: Path) -> ConfigText:
-    """A configuration, with those beside it that it names. Raises ProfileError."""
+    """Read a configuration with the files that it includes. Raises ProfileError."""
     try:
         with file.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)

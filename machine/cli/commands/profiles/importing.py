@@ -1,4 +1,4 @@
-"""The profiles import command: another slicer's configuration as a material and a process of one's own."""
+"""The profiles import command: imports another slicer's configuration as a material and a process of the user's own."""
 
 import json
 import sys
@@ -15,13 +15,13 @@ from profiles.foreign.imported import KINDS, Imported, Row, imported, unchanged_
 from profiles.foreign.read import read_config
 from profiles.places import own_folder
 
-LONGEST_TEXT = 40  # of a setting of theirs in the table
+LONGEST_TEXT = 40  # of an imported value in the table
 WIDTH = 100
 AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "worked out", "left"
 
 
 def import_profiles(request: ImportRequest) -> int:
-    """Write the material and the process of a file, and say row by row what became of its settings."""
+    """Write the material and the process of a file, and list what became of each setting."""
     presets = {"process": request.process, "material": request.material, "printer": request.printer}
     if request.out is not None:
         check_folder(request.out)
@@ -52,7 +52,7 @@ def import_profiles(request: ImportRequest) -> int:
 
 
 def _file(request: ImportRequest, profile: Imported) -> Path:
-    """Where a profile goes: a name that a file may have, in the folder that is asked for, else in the user's own."""
+    """File for a profile, with a valid name, in the requested folder or the user's own."""
     stem = plain_name(profile.name).strip("._") or profile.kind
     if request.out is None:
         return own_folder(profile.kind) / f"{stem}.toml"
@@ -92,7 +92,7 @@ def _row(row: Row) -> str:
 
 
 def _listed(title: str, names: Sequence[str]) -> Iterator[str]:
-    """A title and names below it, as many to a line as fit."""
+    """A title and the names below it, with as many to a line as fit."""
     yield title
     line = ""
     for name in names:
