@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("mdp", "slicer", "profiles", "machine/cli")
+PACKAGES = ("mdp", "slicer", "profiles", "machine/cli", "machine/view")
 CODE = re.compile(r"`[^`]*`")
 # Words and constructions that are not used -> what to write instead. Matched in each paragraph, in either case without (?-i:).
 WORDS = {
