@@ -120,8 +120,7 @@ def _status_lines() -> Iterator[Callable[[PrintStatus], None]]:
 
 @contextmanager
 def _screen(scene: Scene, board: Keyboard) -> Iterator[Callable[[PrintStatus], None]]:
-    """The live screen with keys; restores the terminal at the end. If the terminal is closed, drawing stops but the print goes
-    on."""
+    """The live screen with keys; restores the terminal at the end. If the terminal is closed, only the drawing stops."""
     keys, gone = can_type(), False
     live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
 
