@@ -44,7 +44,7 @@ def simulate(
     json: options.JsonFile = None,
     reference: Annotated[str | None, option("--model MODEL", "compare a G-code file's plastic with this model")] = None,
     html: options.HtmlFile = None,
-    baud: Annotated[int | None, option("--baud N", "find moves that a line of N bits a second brings too late")] = None,
+    baud: Annotated[int | None, option("--baud N", "find moves that arrive too late over a line of N bits/s")] = None,
     *,
     given: options.ProfileOptions,
 ) -> int:
@@ -57,7 +57,9 @@ def simulate(
 def view(
     models: options.ModelsOrGcode,
     program: options.ProgramOptions,
-    out: Annotated[Path | None, option("-o --out VIEW.html", "page to write; else named after the model, here")] = None,
+    out: Annotated[
+        Path | None, option("-o --out VIEW.html", "page to write; default: named after the model, in this folder")
+    ] = None,
     *,
     open_: Annotated[bool, option("--open", "show the page in the browser")] = False,
     compare: Annotated[bool, option("--compare", "also report time and material of a print in one part")] = False,
@@ -118,7 +120,7 @@ def send(
     file: Annotated[str, typer.Argument(metavar="FILE.gcode", help="a G-code file")],
     to: Annotated[str, option("--to SERVER", "octoprint:HOST, moonraker:HOST or duet:HOST; HOST may be http(s)://HOST:PORT")],
     *,
-    start: Annotated[bool, option("--start", "print it at once; print --port SERVER follows it, too")] = False,
+    start: Annotated[bool, option("--start", "start printing at once; print --port SERVER also follows it")] = False,
     log: options.LogFile = None,
     force: options.ForceAll = False,
     given: options.ProfileOptions,
@@ -161,11 +163,11 @@ def resume(asked: requests.ResumeOptions) -> int:
 
 
 def ports(
-    baud: Annotated[int, option("--baud N", "rate tried first, bits a second")] = BAUD,
+    baud: Annotated[int, option("--baud N", "rate to try first, bits/s")] = BAUD,
     *,
     json: Annotated[bool, option("--json", "the list as JSON")] = False,
     ask: Annotated[
-        bool, option("--ask/--no-ask", "open each port and ask what is there; many boards restart when opened")
+        bool, option("--ask/--no-ask", "open each port and identify the printer; many boards restart when opened")
     ] = True,
 ) -> int:
     """List serial ports and what answers at each. Shows firmware, axes and baud rate, or why nothing answers."""
@@ -202,7 +204,7 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
     out, measured, probing = asked.out, asked.measured, asked.probing
     if asked.printed:
         if out is not None or measured is not None or probing.probe or probing.port is not None or asked.directions:
-            raise typer.BadParameter("--printed is a way of its own: -o, --measured, --port and --directions are for touches")
+            raise typer.BadParameter("--printed excludes -o, --measured, --port and --directions, which are for touches")
         return _read_off(asked)
     if asked.readings or asked.html is not None:
         raise typer.BadParameter("--readings and --html go with --printed FILE.gcode")
@@ -221,7 +223,7 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
 
         if out is not None or measured is not None:
             raise typer.BadParameter(
-                "--port takes the machine to the touches: -o and --measured are for a program sent otherwise"
+                "--port takes the machine to the touches: -o and --measured are for a program that is sent separately"
             )
         return touch_by_keys(asked, probing.port, asked.given.profile())
     if out is not None and measured is None:
@@ -257,7 +259,7 @@ def coupon(asked: requests.CouponRequest) -> int:
 
     out, measured = asked.out, asked.measured
     if asked.report is not None and measured is None:
-        raise typer.BadParameter(f"--report {asked.report} goes with --measured FILE, whose loads it tells")
+        raise typer.BadParameter(f"--report {asked.report} goes with --measured FILE, whose loads it reports")
     for name, file in (("--html", asked.html), ("--png", asked.png)):
         if file is not None and out is None:
             raise typer.BadParameter(f"{name} {file} goes with -o OUT.gcode, whose bars it shows")

@@ -131,7 +131,7 @@ def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[n
 
 
 def _row(program: ParsedProgram, finding: Finding) -> int:
-    """Index of the finding's line, else of the first stroke of its layer; n for a finding about the whole print."""
+    """Row of the finding's line, or of its layer's first stroke if the line is not in that; n for one about the whole print."""
     if finding.line <= 0:
         return len(program.line)
     row = int(np.searchsorted(program.line, finding.line))

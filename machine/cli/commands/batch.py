@@ -60,7 +60,7 @@ def batch(request: BatchRequest) -> int:
             _work_off(request, job, files, rows, table)
         except KeyboardInterrupt:
             done = sum(name in rows for name in files)
-            say(f"{done} of {len(files)} models have a row in {table}; started again, it goes on there")
+            say(f"{done} of {len(files)} models have a row in {table}; a repeated run continues there")
             raise
         finally:
             write_rows(table, Row, _in_order(rows))
@@ -107,8 +107,8 @@ def _rows_that_hold(table: Path, files: Mapping[str, Path], job: Job) -> dict[st
         _delete_files(job.out, earlier[name])
     done = sum(name in rows for name in files)
     if done:
-        others = ": going on with the others" if done < len(files) else ""
-        say(f"{done} of {len(files)} models have been done before{others}")
+        others = ": continuing with the others" if done < len(files) else ""
+        say(f"{done} of {len(files)} models were done before{others}")
     return rows
 
 

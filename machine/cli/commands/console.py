@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 PROMPT = "> "
 AT_ONCE_S = 0.5
-HELP = """What you type is sent, one line after the other is answered. Besides:
+HELP = """Each line that you type is sent and answered. Further commands:
   /help     this
   /reports  show or hide temperature reports
   /stop     emergency stop (M112) at once, even while a command is under way
@@ -76,7 +76,7 @@ def console(request: ConsoleRequest, machine: Machine) -> int:
             if direction == "<":
                 shown.hear(data)
 
-        hint = "; /help tells what can be typed" if sys.stdin.isatty() else ""
+        hint = "; /help lists the commands" if sys.stdin.isatty() else ""
         say(describe_answer(identify_printer(wire, rate, halted=True), rate) + hint)
         session = CommandSession(TappedWire(wire, tell), dialect_of(machine).longest_line)
         return _Console(session, shown, request.leave_heaters).run()
@@ -140,7 +140,7 @@ class _Console:
         finally:
             self._part_from(worker)
             if self._waiting:
-                say(f"not sent any more: {', '.join(self._waiting)}")
+                say(f"not sent: {', '.join(self._waiting)}")
         if self._error is not None:
             raise self._error
 
@@ -340,7 +340,7 @@ def ports(baud: int, as_json: bool, ask: bool) -> int:
     if not devices:
         say("no serial port was found: plug the printer in and switch it on")
     elif ask:
-        say(f"asking {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {LONGEST_S:.0f} s")
+        say(f"querying {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {LONGEST_S:.0f} s")
     reports = ask_ports(devices, baud, threading.Event()) if ask else [PortReport(device) for device in devices]
     if as_json:
         write_json(STDOUT, [port_json(report) for report in reports])

@@ -74,7 +74,7 @@ def _table(request: SimulatorRequest, machine: Machine) -> ProbedTable | None:
     except ValueError:
         raise PrinterError(f"--ball is {request.ball}: four numbers X,Y,Z,D in mm are allowed") from None
     if not (all(isfinite(value) for value in (x, y, z)) and 0.0 < diameter <= 100.0):
-        raise PrinterError(f"--ball is {request.ball}: a place, and a diameter above 0 up to 100 mm, are allowed")
+        raise PrinterError(f"--ball is {request.ball}: a position, and a diameter above 0 up to 100 mm, are allowed")
     return ProbedTable(true, TrueBall(0.5 * diameter, (x, y, z)), noise_mm=PROBE_NOISE_MM)
 
 
@@ -118,10 +118,10 @@ def summary(record: Record) -> str:
         f"{record.moves} moves in {duration(record.moving_s)}, {record.lines} lines, {record.strokes} strokes of "
         f"{record.pushed_mm:.1f} mm filament",
         f"{record.clamped} coordinates out of limits, {record.unknown} unknown commands",
-        f"{record.underruns} stops because no line came in time, {record.slowed} moves slowed down for want of lines",
+        f"{record.underruns} stops because no line came in time, {record.slowed} moves slowed down for lack of lines",
     ]
     if record.lost_bytes:
-        lines.append(f"{record.lost_bytes} bytes lost by a full receive ring")
+        lines.append(f"{record.lost_bytes} bytes lost because the receive ring was full")
     lines += [f"at {seconds:.1f} s: {trouble}" for seconds, trouble in record.troubles]
     heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} °C"
     return "".join(f"{line}\n" for line in [*lines, heaters])

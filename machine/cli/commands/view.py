@@ -25,9 +25,9 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     loaded = load_program(request)
     program, profile, known = loaded.program, loaded.profile, loaded.machine_known
     if not len(program.run.program.line):
-        raise GcodeError(f"{request.model} holds no move: there is nothing to show")
+        raise GcodeError(f"{request.model} contains no move: there is nothing to show")
     if not known:
-        say(f"{request.name} does not tell its machine: shown for {profile.machine.name}, --machine names another")
+        say(f"{request.name} does not name its machine: shown for {profile.machine.name}, --machine names another")
     alternatives = compare_with_one_part(program, profile) if request.compare else ()
     content = print_page(request.name, program, profile, known=known, alternatives=alternatives)
     write_bytes(path, content)
@@ -51,5 +51,5 @@ def _default_page(name: str) -> Path:
     """Default file of the page, named after the model. Raises OutputError if another kind of file has that name."""
     path = Path(Path(name.removeprefix("demo:")).stem + ".html")
     if path.is_file() and DATA not in path.read_bytes():
-        raise OutputError(f"output {path} exists and is no page of tiltprint's: -o names another file")
+        raise OutputError(f"output {path} exists and is not a page of tiltprint: name another file with -o")
     return path

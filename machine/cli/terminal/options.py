@@ -88,7 +88,7 @@ def _names_of(kind: str) -> Callable[[str], list[str]]:
     return complete
 
 
-OF_FILE = "; else the project's or G-code file's own, else {}"
+OF_FILE = "; default: that of the project or G-code file, else {}"
 
 
 def _profile_option(kind: str, otherwise: str = "") -> Any:
@@ -102,24 +102,26 @@ Models = Annotated[
     typer.Argument(
         metavar="MODEL",
         show_default=False,
-        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 is three of it",
+        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 prints three",
     ),
 ]
 ModelsOrGcode = Annotated[
     list[str],
     typer.Argument(
-        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as of export, or a G-code file"
+        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as for export, or a G-code file"
     ),
 ]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
 Settings = Annotated[tuple[str, ...], option("--set KEY=VALUE", "override a profile key; repeatable")]
 JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
-HtmlFile = Annotated[Path | None, option("--html FILE", "page that shows it in a browser, see view")]
+HtmlFile = Annotated[Path | None, option("--html FILE", "page to write for a browser, see view")]
 Force = Annotated[bool, option("--force", "go on although the dry run found errors")]
 ForceAll = Annotated[bool, option("--force", "go on although dry run, printer, machine and program do not agree")]
-LogFile = Annotated[Path | None, option("--log FILE", "what is sent and received; else a new file in the state folder")]
-Baud = Annotated[int, option("--baud N", "bits a second")]
+LogFile = Annotated[
+    Path | None, option("--log FILE", "log of what is sent and received; default: a new file in the state folder")
+]
+Baud = Annotated[int, option("--baud N", "bits per second")]
 PortOrSim = Annotated[str, option("--port PORT|sim", "serial port; sim: the simulated printer")]
 SimSpeed = Annotated[float, option("--sim-speed X", "X times real time; 0: as fast as possible")]
 NoBrowser = Annotated[bool, option("--no-browser", "only print the address")]
@@ -130,21 +132,19 @@ class SearchOptions:
     """Options that control the search for parts."""
 
     beam_width: Annotated[int | None, option("--beam-width B", "decompositions followed at a time")] = None
-    search: Annotated[str | None, option("--search best|published", "published: as the 2020 paper searches")] = None
-    time_limit: Annotated[float | None, option("--time-limit SECONDS", "then the best parts so far are used")] = None
+    search: Annotated[str | None, option("--search best|published", "published: the search of the 2020 paper")] = None
+    time_limit: Annotated[float | None, option("--time-limit SECONDS", "stop then, and use the best parts so far")] = None
     ranker: Annotated[
         str,
         option(
             "--ranker classic|learned|FILE.onnx",
-            "which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
+            "how to rank candidates: in the 2020 paper's order, by the shipped network, or by your own",
         ),
     ] = "classic"
-    orient: Annotated[
-        bool | None, option("--orient/--as-is", "lay the model down in the cheapest orientation, or print it as its file has it")
-    ] = None
-    parts: Annotated[int | None, option("--parts N", "into N parts at most, not as many as pay")] = None
+    orient: Annotated[bool | None, option("--orient/--as-is", "choose the cheapest orientation, or keep that of the file")] = None
+    parts: Annotated[int | None, option("--parts N", "cut into at most N parts; default: as many as pay off")] = None
     part: Annotated[
-        tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, as 2:walls=4; repeatable")
+        tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, such as 2:walls=4; repeatable")
     ] = ()
 
     @property
@@ -159,10 +159,10 @@ class FileOptions(SearchOptions):
     """Options of a command for one model: how to cut it, and which plate and settings of a slicer file to use."""
 
     plate: Annotated[
-        int | None, option("--plate N", "plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something")
+        int | None, option("--plate N", "plate of a .3mf of Bambu Studio or OrcaSlicer; default: the first that is not empty")
     ] = None
     settings_of_file: Annotated[
-        bool, option("--settings-of-file", "print by the settings inside a .3mf of another slicer; see profiles import")
+        bool, option("--settings-of-file", "use the settings inside a .3mf of another slicer; see profiles import")
     ] = False
 
 
@@ -174,10 +174,11 @@ class ProgramOptions(FileOptions):
         tuple[Path, ...], option("--plan FILE", "cut by this plan of decompose, without a search; one for each model")
     ] = ()
     pause: Annotated[
-        tuple[str, ...], option("--pause PART:LAYER", "wait for a person before this layer, or at a height: 1:8.4mm; repeatable")
+        tuple[str, ...], option("--pause PART:LAYER", "wait for the user before this layer, or at a height: 1:8.4mm; repeatable")
     ] = ()
     filament_change: Annotated[
-        tuple[str, ...], option("--filament-change PART:LAYER", "the same, for another filament; repeatable")
+        tuple[str, ...],
+        option("--filament-change PART:LAYER", "change the filament before this layer, or at a height; repeatable"),
     ] = ()
     copies: Annotated[int | None, option("--copies N", "number of copies of each model on the plate, 1 by default")] = None
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mdp.batch.pool import Workers
     from profiles.profile import Profile
 
-Replace = Annotated[bool, option("--replace", "write over a file that exists")]
+Replace = Annotated[bool, option("--replace", "overwrite existing files")]
 
 
 @dataclass(frozen=True)
@@ -23,14 +23,14 @@ class DecomposeOptions:
     """Files that decompose reads and writes besides the model."""
 
     out: Annotated[Path | None, option("-o --out DIR", "folder for part-NN.stl, 3MF, JSON")] = None
-    plan: Annotated[Path | None, option("--plan FILE", "where FILE exists: cut by it without a search; else write it")] = None
+    plan: Annotated[Path | None, option("--plan FILE", "cut by FILE without a search if it exists; otherwise write it")] = None
     planes: Annotated[Path | None, option("--planes FILE", "planes by hand, cut first; the search finds the others")] = None
     json: options.JsonFile = None
     png: Annotated[Path | None, option("--png FILE", "picture of the parts")] = None
     sheet: Annotated[Path | None, option("--sheet FILE", "picture of the print order, tilted as printed")] = None
-    front: Annotated[Path | None, option("--front FILE", "picture of how every number of parts would cut the model")] = None
+    front: Annotated[Path | None, option("--front FILE", "picture of the best cuts for each number of parts")] = None
     html: options.HtmlFile = None
-    record: Annotated[Path | None, option("--record FILE", "what the search saw, as .npz for training")] = None
+    record: Annotated[Path | None, option("--record FILE", "record of the search, as .npz for training")] = None
     compare: Annotated[bool, option("--compare", "slice the parts: report joints, time and material, also in one part")] = False
 
     def request(self, model: str, search: options.FileOptions, given: options.ProfileOptions) -> ModelRequest:
@@ -57,7 +57,7 @@ class ExportOptions:
     json: options.JsonFile = None
     svg: Annotated[Path | None, option("--svg FILE", "picture of one layer, see --layer")] = None
     html: options.HtmlFile = None
-    layer: Annotated[str | None, option("--layer PART:LAYER", "which layer; else the first, 1:1")] = None
+    layer: Annotated[str | None, option("--layer PART:LAYER", "layer to draw; default: the first, 1:1")] = None
     compare: Annotated[bool, option("--compare", "also report time, material, support and risky area in one part")] = False
     force: options.Force = False
 
@@ -69,13 +69,9 @@ class EditRequest:
     model: Annotated[
         str | None, typer.Argument(metavar="[MODEL|PLAN]", show_default=False, help="a model file, demo:NAME, or a plan (.toml)")
     ] = None
-    port: Annotated[
-        int, option("--port N", "serve it on this port; else on any free one", min=0, max=65535, show_default=False)
-    ] = 0
+    port: Annotated[int, option("--port N", "port of the page; default: any free one", min=0, max=65535, show_default=False)] = 0
     no_browser: options.NoBrowser = False
-    upload_mib: Annotated[int, option("--upload-mib N", "the largest file that is taken from a page", min=1, max=1024)] = (
-        UPLOAD_MIB
-    )
+    upload_mib: Annotated[int, option("--upload-mib N", "size limit of uploaded files, MiB", min=1, max=1024)] = UPLOAD_MIB
     lan: Annotated[bool, option("--lan", "open it to devices of the local network, too, each paired by a code shown here")] = (
         False
     )
@@ -89,14 +85,14 @@ class BatchRequest:
     """Options of batch. do: decompose, export or estimate; out: folder for the table and the files."""
 
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", show_default=False, help="folder of models")]
-    out: Annotated[Path, option("-o --out DIR", "folder for DO.csv, a row a model, and what is made")]
-    do: Annotated[str, option("--do decompose|export|estimate", "what to make of each; estimate: the row alone")] = "export"
-    scheduler: Annotated[str | None, option("--scheduler ADDRESS", "dask scheduler whose workers do it, as tcp://HOST:8786")] = (
-        None
-    )
-    processes: Annotated[int | None, option("--workers N", "processes here; else one a core", min=1, max=1024)] = None
-    retries: Annotated[int, option("--retries N", "how often a model that was killed is tried again", min=0, max=100)] = 2
-    limit_s: Annotated[float | None, option("--limit-s SECONDS", "a model that takes longer is given up", min=1.0)] = None
+    out: Annotated[Path, option("-o --out DIR", "folder for DO.csv, with a row per model, and the files")]
+    do: Annotated[str, option("--do decompose|export|estimate", "what to do with each model; estimate: only the row")] = "export"
+    scheduler: Annotated[
+        str | None, option("--scheduler ADDRESS", "dask scheduler whose workers do the work: tcp://HOST:8786")
+    ] = None
+    processes: Annotated[int | None, option("--workers N", "local processes; default: one per core", min=1, max=1024)] = None
+    retries: Annotated[int, option("--retries N", "how often to retry a model whose process was killed", min=0, max=100)] = 2
+    limit_s: Annotated[float | None, option("--limit-s SECONDS", "abandon a model that takes longer", min=1.0)] = None
     search: options.SearchOptions
     given: options.ProfileOptions
 
@@ -116,10 +112,10 @@ class BatchRequest:
 class WatchOptions:
     """Options of the page that follows and controls a print."""
 
-    watch: Annotated[bool, option("--watch", "open a page of this computer that follows and commands the print")] = False
-    watch_port: Annotated[
-        int | None, option("--watch-port N", "serve it on this port; else on any free one", min=0, max=65535)
-    ] = None
+    watch: Annotated[bool, option("--watch", "open a page on this computer that follows and controls the print")] = False
+    watch_port: Annotated[int | None, option("--watch-port N", "port of the page; default: any free one", min=0, max=65535)] = (
+        None
+    )
     no_browser: options.NoBrowser = False
 
     @property
@@ -136,7 +132,9 @@ class PrintOptions:
     speed: options.SimSpeed = 0.0
     watching: WatchOptions = WatchOptions()
     log: options.LogFile = None
-    journal: Annotated[Path | None, option("--journal FILE", "for resume; else a new file in the state folder")] = None
+    journal: Annotated[Path | None, option("--journal FILE", "journal for resume; default: a new file in the state folder")] = (
+        None
+    )
     force: options.ForceAll = False
 
 
@@ -145,13 +143,15 @@ class ResumeOptions:
     """Options of resume. further: journal of the rest."""
 
     journal: Annotated[
-        Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
+        Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the interrupted print; without it all are listed")
     ] = None
     port: Annotated[str | None, option("--port PORT", "serial port")] = None
     baud: options.Baud = BAUD
-    yes: Annotated[bool, option("--yes", "go on without asking, where nothing is in doubt")] = False
+    yes: Annotated[bool, option("--yes", "continue without asking if nothing is in doubt")] = False
     watching: WatchOptions = WatchOptions()
-    further: Annotated[Path | None, option("--journal FILE", "journal of the rest; else a new file in the state folder")] = None
+    further: Annotated[Path | None, option("--journal FILE", "journal of the rest; default: a new file in the state folder")] = (
+        None
+    )
     log: options.LogFile = None
     machine: options.MachineGiven = None
 
@@ -177,7 +177,7 @@ class ConsoleRequest:
     sim_speed: options.SimSpeed = 0.0
     reports: Annotated[bool, option("--reports/--no-reports", "show temperatures that the printer reports")] = True
     leave_heaters: Annotated[
-        bool, option("--leave-heaters", "heaters stay as they are on leaving; else they are switched off")
+        bool, option("--leave-heaters", "leave the heaters as they are; default: switch them off at the end")
     ] = False
     log: options.LogFile = None
     given: MachineOptions = MachineOptions()
@@ -190,16 +190,14 @@ class SimulatorRequest:
     ball: X,Y,Z,D of a ball on the plate; true_machine: the machine that the probe senses. Either of them adds a probe.
     """
 
-    link: Annotated[Path | None, option("--pty PATH", "a link to keep on the terminal's path")] = None
+    link: Annotated[Path | None, option("--pty PATH", "symbolic link to the pseudo-terminal")] = None
     tcp: Annotated[int | None, option("--tcp PORT", "for socket://localhost:PORT; 0: a free one")] = None
     faults: Annotated[Path | None, option("--faults FILE", "fault script: what goes wrong")] = None
     speed: Annotated[float, option("--speed X", "X times real time; 0: as fast as possible")] = 1.0
-    baud: Annotated[int | None, option("--baud N", "bytes are as slow as on such a line")] = None
+    baud: Annotated[int | None, option("--baud N", "simulate the speed of a line of N bits/s")] = None
     habits: Annotated[str | None, option("--habits LIST", "how the firmware was built: no-advanced-ok,no-busy,...")] = None
-    ball: Annotated[str | None, option("--ball X,Y,Z,D", "it has a probe, and a ball on the plate: centre and diameter, mm")] = (
-        None
-    )
-    true_machine: Annotated[str | None, option("--true-machine NAME|FILE", "what its probe senses is this machine's")] = None
+    ball: Annotated[str | None, option("--ball X,Y,Z,D", "add a probe and a ball on the plate: centre and diameter, mm")] = None
+    true_machine: Annotated[str | None, option("--true-machine NAME|FILE", "machine that the probe senses")] = None
     given: MachineOptions = MachineOptions()
 
 
@@ -212,9 +210,9 @@ class ProbeOptions:
     baud: options.Baud = BAUD
     ball_mm: Annotated[float, option("--ball-mm MM", "diameter of the ball", min=4, max=60)] = 20.0
     probe_offset: Annotated[
-        str, option("--probe-offset X,Y,Z", "from the nozzle's tip to what touches; 0,0,0: the nozzle senses")
+        str, option("--probe-offset X,Y,Z", "from the nozzle's tip to the contact point; 0,0,0: the nozzle senses")
     ] = "0,0,0"
-    png: Annotated[Path | None, option("--png FILE", "of --probe: picture of what is left over")] = None
+    png: Annotated[Path | None, option("--png FILE", "with --probe: picture of the residuals")] = None
     log: options.LogFile = None
 
     @property
@@ -238,7 +236,7 @@ class CalibrationRequest:
     """
 
     out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
-    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml or .csv: work out the numbers")] = None
+    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml or .csv: compute the axes")] = None
     mark_height_mm: Annotated[float | None, option("--mark-height MM", "height of the mark over the plate", min=0, max=200)] = (
         None
     )
@@ -249,10 +247,10 @@ class CalibrationRequest:
         tuple[Path, ...], option("--printed FILE.gcode", "program of demo:calibration that was printed; repeatable")
     ] = ()
     readings: Annotated[
-        tuple[str, ...], option("--readings TEXT", "of each --printed: right,up,height of its four pads; else asked for")
+        tuple[str, ...], option("--readings TEXT", "for each --printed: right,up,height of its four pads; default: ask")
     ] = ()
     html: Annotated[Path | None, option("--html FILE", "with --printed: page to type the readings on")] = None
-    save: Annotated[str | None, option("--save NAME", "name of your profile; else the machine's")] = None
+    save: Annotated[str | None, option("--save NAME", "name of your profile; default: the machine's")] = None
     replace: Replace = False
     force: Annotated[bool, option("--force", "save although touches or readings are far off")] = False
     directions: Annotated[bool, option("--directions", "find the directions of the axes, too")] = False
@@ -269,17 +267,19 @@ class CouponRequest:
     """
 
     out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
-    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml: work out what holds, and save it")] = None
-    report: Annotated[
-        Path | None, option("--report FILE.md", "with --measured: only write it as a table; - for standard output")
-    ] = None
+    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml: evaluate it and save the result")] = None
+    report: Annotated[Path | None, option("--report FILE.md", "with --measured: only write a table; - for standard output")] = (
+        None
+    )
     shape: Annotated[str, option("--shape bend|tensile", "bars for a luggage scale, or ISO 527-2 type 5A")] = "bend"
     vary: Annotated[
-        tuple[str, ...], option("--vary KEY=VALUE", "what half of the bars have, not the usual four; repeatable, at most 5")
+        tuple[str, ...], option("--vary KEY=VALUE", "setting of half of the bars, replaces the usual four; repeatable, at most 5")
     ] = ()
     html: options.HtmlFile = None
     png: Annotated[Path | None, option("--png FILE", "picture of the bars in print order")] = None
-    save: Annotated[str | None, option("--save NAME", "name of your material and process profiles; else theirs")] = None
+    save: Annotated[str | None, option("--save NAME", "name of your material and process profiles; default: the originals'")] = (
+        None
+    )
     replace: Replace = False
     force: options.Force = False
     given: options.DefaultProfileOptions
@@ -292,13 +292,13 @@ class ImportRequest:
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="config.ini, bundle or G-code of PrusaSlicer; JSON of OrcaSlicer; .curaprofile")
     ]
-    process: Annotated[str, option("--process-preset NAME", "of a bundle's print presets")] = ""
-    material: Annotated[str, option("--material-preset NAME", "of a bundle's filament presets")] = ""
-    printer: Annotated[str, option("--printer-preset NAME", "of a bundle's printers, for its nozzle")] = ""
-    name: Annotated[str, option("--name NAME", "of both profiles; else as there")] = ""
-    out: Annotated[Path | None, option("-o --out FOLDER", "where to; else your own profiles")] = None
+    process: Annotated[str, option("--process-preset NAME", "print preset of a bundle")] = ""
+    material: Annotated[str, option("--material-preset NAME", "filament preset of a bundle")] = ""
+    printer: Annotated[str, option("--printer-preset NAME", "printer preset of a bundle, for its nozzle")] = ""
+    name: Annotated[str, option("--name NAME", "name of both profiles; default: that of the file")] = ""
+    out: Annotated[Path | None, option("-o --out FOLDER", "folder to write to; default: your own profiles")] = None
     replace: Replace = False
-    json: Annotated[bool, option("--json", "what became of every setting as JSON")] = False
+    json: Annotated[bool, option("--json", "report the result for each setting as JSON")] = False
 
 
 @dataclass(frozen=True)
@@ -310,9 +310,9 @@ class DetectRequest:
         Path | None,
         typer.Argument(metavar="FILE", help="printer.cfg, config.g, a log of M503, a dump of $$, LinuxCNC's .ini"),
     ] = None
-    port: Annotated[str | None, option("--port PORT", "of a printer; moonraker:HOST, duet:HOST; or sim")] = None
+    port: Annotated[str | None, option("--port PORT", "port of a printer; moonraker:HOST, duet:HOST; or sim")] = None
     baud: options.Baud = BAUD
-    base: Annotated[str | None, option("--base NAME", "inherit it, else the nearest shipped one")] = None
-    out: Annotated[Path | None, option("-o --out FILE.toml", "profile to write; else one of your own")] = None
+    base: Annotated[str | None, option("--base NAME", "profile to inherit; default: the nearest shipped one")] = None
+    out: Annotated[Path | None, option("-o --out FILE.toml", "profile to write; default: one of your own")] = None
     replace: Replace = False
-    json: Annotated[bool, option("--json", "what was found, what not and what to measure as JSON")] = False
+    json: Annotated[bool, option("--json", "report as JSON what was found, what was not, and what to measure")] = False

@@ -145,7 +145,7 @@ class PrinterProber(PrinterMover):
             return float(corrected[1]) - self._offset_z_mm
         if contact := re.search(self._rules.contact, text):
             return float(contact[1])
-        raise PrinterError(f"the printer does not report where it has met something: {text[:80]!r} is not understood")
+        raise PrinterError(f"the printer does not report where it touched something: {text[:80]!r} is not understood")
 
 
 @contextmanager
@@ -176,7 +176,7 @@ def begin_cold(session: ProbingSession, mover: PrinterMover, machine: Machine) -
         if not session.switch_off():
             raise PrinterError("the printer did not confirm that its heaters are off: measuring is done cold")
     if (nozzle_c := session.nozzle_c()) > HOT_C:
-        say(f"the nozzle is {nozzle_c:.0f} °C hot: plastic that hangs from it falsifies every contact")
+        say(f"the nozzle is {nozzle_c:.0f} °C hot: plastic that hangs from it spoils every contact")
     mover.start()
     mover.rise(machine.z.limits_mm[1])
 

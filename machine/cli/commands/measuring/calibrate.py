@@ -48,7 +48,7 @@ def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
     calibration, off = judged(request, machine, sheet)
     if off:
-        raise ProfileError(f"{off}: look at touch {calibration.worst} first")
+        raise ProfileError(f"{off}: check touch {calibration.worst} first")
     save_calibration(request, machine, calibration, sheet.mark_angle_deg is not None)
     return 0
 

@@ -53,7 +53,9 @@ def correct_axes(request: CalibrationRequest, printed: Sequence[Path], readings:
     """Find the axes from the readings of one or several pieces, show the changes and save them."""
     machine = tilting_machine(request)
     if len(printed) != len(readings):
-        raise ProfileError(f"--printed is given {len(printed)} times, --readings {len(readings)} times: as often is expected")
+        raise ProfileError(
+            f"--printed is given {len(printed)} times, --readings {len(readings)} times: the numbers must be equal"
+        )
     pieces = [_read(path, machine) for path in printed]
     told = np.array([parse_readings(text) for text in readings])
     return _settle(request, machine, correct(machine, pieces, told), len(pieces))
@@ -65,7 +67,7 @@ def ask_for_readings(request: CalibrationRequest, printed: Path) -> int:
     refuse_if_saved(request)
     piece = _read(printed, machine)
     sys.stdout.write(INTRO)
-    told = ask([_question(pad.number) for pad in piece.pads], "all pads were told")
+    told = ask([_question(pad.number) for pad in piece.pads], "all pads were read")
     return _settle(request, machine, correct(machine, [piece], np.array([told])), 1)
 
 
@@ -92,9 +94,9 @@ def _settle(request: CalibrationRequest, machine: Machine, correction: Correctio
     show(comparison(machine, correction))
     if correction.doubtful is not None and not request.force:
         piece, pad, way = correction.doubtful
-        raise ProfileError(f"piece {piece}, pad {pad}: {way} does not fit the others: look at it again, or take it with --force")
+        raise ProfileError(f"piece {piece}, pad {pad}: {way} does not fit the others: check it, or accept it with --force")
     if not correction.significant:
-        show("no number changes by more than the readings can be off: the profile stays as it is\n")
+        show("no value changes by more than the uncertainty of the readings: the profile stays as it is\n")
         return 0
     source = f"tiltprint calibrate, {pieces} printed piece{'s' * (pieces > 1)}"
     save_tables(request, found_tables(machine, correction.machine, FOUND, source))

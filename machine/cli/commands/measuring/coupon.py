@@ -49,7 +49,7 @@ def write_program(request: CouponRequest, out: Path) -> int:
     """Write the G-code, the sheet to fill in beside it, and the requested pictures."""
     sheet_file = out.with_suffix(".toml")
     if sheet_file == out:
-        raise OutputError(f"-o {out}: the sheet is written there, beside the program: another ending is expected, as .gcode")
+        raise OutputError(f"-o {out}: the sheet is written there, beside the program: another ending is expected, such as .gcode")
     for file in (out, sheet_file):
         check_writable(file)
         refuse_to_overwrite(file, request.replace)
@@ -122,7 +122,7 @@ def _ask_loads(sheet: Sheet) -> Sheet:
             return str(error)
         return ""
 
-    return replace(sheet, loads_n=tuple(ask([question(bar) for bar in range(1, bars + 1)], "all loads were told", judge)))
+    return replace(sheet, loads_n=tuple(ask([question(bar) for bar in range(1, bars + 1)], "all loads were given", judge)))
 
 
 def _loads(reply: str, shape: Shape) -> tuple[float, ...]:

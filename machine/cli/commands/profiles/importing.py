@@ -28,15 +28,15 @@ def import_profiles(request: ImportRequest) -> int:
     config = read_config(request.file, presets)
     for kind, name in (("process", config.process), ("material", config.material)):
         if presets[kind] not in ("", name):
-            raise ProfileError(f"--{kind}-preset {presets[kind]}: {request.file} is no bundle that has presets to choose from")
+            raise ProfileError(f"--{kind}-preset {presets[kind]}: {request.file} is not a bundle with presets to choose from")
     found = [imported(config, kind, request.name, request.file.stem) for kind in KINDS]
     rows = [row for profile in found for row in profile.rows]
     if not rows:
-        raise ProfileError(f"profile {request.file}: none of its {len(config.entries)} settings has one like it here")
+        raise ProfileError(f"profile {request.file}: none of its {len(config.entries)} settings has an equivalent here")
     found = [profile for profile in found if any(row.taken for row in profile.rows)]
     if not found:
         raise ProfileError(
-            f"profile {request.file}: {len(rows)} of its {len(config.entries)} settings have one like them here, but no value of "
+            f"profile {request.file}: {len(rows)} of its {len(config.entries)} settings have an equivalent here, but no value of "
             f"theirs can be taken, the first: {_row(rows[0])}"
         )
     files = {profile.kind: _file(request, profile) for profile in found}
@@ -73,7 +73,7 @@ def _lines(config: Config, found: Sequence[Imported]) -> Iterator[str]:
         yield from _listed(f"  stay as {profile.base} has them: {len(ours)}", ours)
         yield ""
     others = unused(config)
-    yield from _listed(f"of their settings there is nothing like it here, or they are the machine's: {len(others)}", others)
+    yield from _listed(f"settings without an equivalent here, or that belong to the machine: {len(others)}", others)
 
 
 def _groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
