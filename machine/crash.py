@@ -13,14 +13,14 @@ from profiles.files import keep_newest
 from profiles.folders import state_folder
 
 KEPT = 20  # log files
-TOLD = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "typer", "rich"}
+LIBRARIES = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "typer", "rich"}
 
 
 def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
     """Write the traceback and the versions to a new file of the state folder and return its path."""
     with suppress(OSError):  # another run may have deleted them
         keep_newest(state_folder().glob("bug-*.log"), KEPT - 1)
-    versions = sorted(f"{d.name} {d.version}" for d in distributions() if d.name in TOLD)
+    versions = sorted(f"{d.name} {d.version}" for d in distributions() if d.name in LIBRARIES)
     with tempfile.NamedTemporaryFile(
         "w", prefix="bug-", suffix=".log", dir=state_folder(), delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:

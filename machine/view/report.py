@@ -31,18 +31,18 @@ Row = list[str]
 MOVES = {
     MoveKind.TRAVEL: "travel", MoveKind.RETRACT: "retraction", PRIME: "prime", WIPE: "wipe", MoveKind.ROTATE: "turning the table",
 }  # fmt: skip
-UNTOLD = "not told"
+UNKNOWN = "unknown"
 COMPARED = "Compared"
 COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "stairs mm²", "findings", "risky mm²")
 STANDS_ON = "base cm³"
-CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
+CUT = "base: plastic that the interface below the part adds, compared with a print in one piece"
 LAID = ["contact %", "plastic %"]
 CONTACT = (
-    "contact: of the joint's section, what beads of the first layer cover and earlier parts reach up to; plastic: what that "
-    "layer gets of what the room below its tip holds there"
+    "contact: share of the joint's section that is covered by beads of the first layer and supported by earlier parts; plastic: "
+    "volume of these beads as a share of the room below the nozzle"
 )
-BREAKS = "breaks: pushed sideways at the end of its arm, the farthest place of what it holds; an estimate of the cold weld alone"
-RISKY = "risky: faces that would need support if the model were printed in one piece as it lies now; left: as the part is printed"
+BREAKS = "breaks: force sideways at the end of the arm, the farthest point that it holds; an estimate of the cold weld alone"
+RISKY = "risky: faces that would need support in one piece in the present orientation; left: as the part is printed"
 
 
 def parts_report(
@@ -160,7 +160,7 @@ def _front(decomposition: Decomposition) -> list[Table]:
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
         rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
     notes = [f"taken: {row.reason}" for row in front if row.chosen]
-    notes.append("--parts takes another row; time and filament are estimates")
+    notes.append("--parts selects another row; time and filament are estimates")
     return [
         _table("In how many parts", ["parts", "support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "m"], rows, notes)
     ]
@@ -173,7 +173,7 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
     """
     program, kind = run.program, page_kinds(run.program)
     groups: list[tuple[str, NDArray[np.bool_]]] = [
-        (name or UNTOLD, (kind == MoveKind.EXTRUDE) & (program.type == index)) for index, name in enumerate(program.types)
+        (name or UNKNOWN, (kind == MoveKind.EXTRUDE) & (program.type == index)) for index, name in enumerate(program.types)
     ]
     groups += [(name, kind == number) for number, name in MOVES.items()]
     spent = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
@@ -200,7 +200,7 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
     whole = decomposition.risky_area_mm2
     rows = [[name, f"{max(area, 0.0):.1f}", _share(whole - area, whole)] for name, area in risky_mm2]
     rows[0][2] = ""
-    notes = [f"best single orientation: {in_words(best)}", "--compare tells time and material too"]
+    notes = [f"best single orientation: {in_words(best)}", "--compare also reports time and material"]
     return _table(COMPARED, ["print", "risky mm²", "less"], rows, notes)
 
 
@@ -242,8 +242,8 @@ def _names(profile: Profile) -> list[Row]:
 
 def _assumptions(profile: Profile, known: bool) -> list[Row]:
     """The rows of _names() for a file that does not name them."""
-    machine = profile.machine.name if known else f"{UNTOLD}: limits, clearance and the plate were not judged"
-    return [["machine", machine], ["material", f"{UNTOLD}: weights as of {profile.material.name}"]]
+    machine = profile.machine.name if known else f"{UNKNOWN}: limits, clearance and the plate were not checked"
+    return [["machine", machine], ["material", f"{UNKNOWN}: masses for {profile.material.name}"]]
 
 
 def _format_fixed(value: float, digits: int) -> str:
@@ -275,9 +275,9 @@ def settings_tables(profile: Profile) -> list[Table]:
     for part in profile.parts:
         shared = profile.process.model_dump(mode="json")
         changed += [[f"part {part.part}: process.{key}", _text(value), _text(shared[key])] for key, value in part.process.items()]
-    notes = [] if changed else ["all settings are the usual ones"]
+    notes = [] if changed else ["all settings have their default values"]
     return [
-        _table("Settings changed", ["setting", "value", "usual"], changed, notes),
+        _table("Settings changed", ["setting", "value", "default"], changed, notes),
         _table("All settings", ["setting", "value", "meaning"], every, folded=True),
     ]
 

@@ -28,7 +28,7 @@ from profiles.machine import Machine
 HOT_C = 50.0  # above it plastic may hang from the nozzle
 CROSS_MM_S = 100.0
 SEEK_MM_S = 3.0
-TOLD_MM = 0.006  # rounding of M114, which reports hundredths of a mm
+ROUNDING_MM = 0.006  # rounding of M114, which reports hundredths of a mm
 
 
 class PrinterMover:
@@ -121,7 +121,7 @@ class PrinterProber(PrinterMover):
         if session.unknown:
             raise PrinterError(f"the printer does not know {session.unknown[0]!r}: {rules.needs} is needed")
         self.z_mm = self._answered() if rules.contact else self._stopped()
-        return None if rules.limited and self.z_mm <= low_mm + TOLD_MM else self.z_mm
+        return None if rules.limited and self.z_mm <= low_mm + ROUNDING_MM else self.z_mm
 
     def _said_by(self, error: FirmwareError, began_mm: float) -> float | None:
         """The contact's Z that a firmware error implies, None without contact; raises any other error."""

@@ -57,8 +57,8 @@ def correct_axes(request: CalibrationRequest, printed: Sequence[Path], readings:
             f"--printed is given {len(printed)} times, --readings {len(readings)} times: the numbers must be equal"
         )
     pieces = [_read(path, machine) for path in printed]
-    told = np.array([parse_readings(text) for text in readings])
-    return _settle(request, machine, correct(machine, pieces, told), len(pieces))
+    read_mm = np.array([parse_readings(text) for text in readings])
+    return _settle(request, machine, correct(machine, pieces, read_mm), len(pieces))
 
 
 def ask_for_readings(request: CalibrationRequest, printed: Path) -> int:
@@ -67,8 +67,8 @@ def ask_for_readings(request: CalibrationRequest, printed: Path) -> int:
     refuse_if_saved(request)
     piece = _read(printed, machine)
     sys.stdout.write(INTRO)
-    told = ask([_question(pad.number) for pad in piece.pads], "all pads were read")
-    return _settle(request, machine, correct(machine, [piece], np.array([told])), 1)
+    read_mm = ask([_question(pad.number) for pad in piece.pads], "all pads were read")
+    return _settle(request, machine, correct(machine, [piece], np.array([read_mm])), 1)
 
 
 def _question(pad: int) -> Question[list[float]]:
