@@ -1,4 +1,4 @@
-"""Crash: the log file of a bug, with what is needed to find it."""
+"""Log files of bugs."""
 
 import platform
 import tempfile
@@ -12,15 +12,15 @@ from profiles.errors import OutputError, notes, reason
 from profiles.files import keep_newest
 from profiles.folders import state_folder
 
-KEPT = 20  # logs of bugs
-TOLD = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "typer", "rich"}
+KEPT = 20  # log files
+LIBRARIES = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "typer", "rich"}
 
 
 def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
     """Write the traceback and the versions to a new file of the state folder and return its path."""
-    with suppress(OSError):  # another run may have been quicker
+    with suppress(OSError):  # another run may have deleted them
         keep_newest(state_folder().glob("bug-*.log"), KEPT - 1)
-    versions = sorted(f"{d.name} {d.version}" for d in distributions() if d.name in TOLD)
+    versions = sorted(f"{d.name} {d.version}" for d in distributions() if d.name in LIBRARIES)
     with tempfile.NamedTemporaryFile(
         "w", prefix="bug-", suffix=".log", dir=state_folder(), delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
@@ -30,7 +30,7 @@ def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
 
 
 def bug_in_words(error: BaseException, arguments: Sequence[str]) -> str:
-    """The sentence for a person, with the error's notes and the log that the bug got; a full disk takes none."""
+    """Sentence that reports a bug, with the error's notes and the path of its log, or why that could not be written."""
     try:
         details = f"the details are in {log_bug(error, arguments)}"
     except (OSError, OutputError) as unwritten:

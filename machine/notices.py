@@ -1,8 +1,8 @@
-"""Notices: what the program tells a person while it works, as values; the front end shows them in its own way.
+"""Notices: messages and progress for the user, as values; the front end decides how to show them.
 
-Any code may call `say`, `show` and `reporting`. A front end takes what they tell with `notices_to`; without one, notices go to
-stderr, progress too, and results to stdout. Text from files, names and printers is made plain on the way: nothing
-in it commands the terminal, and none is endless.
+Any code may call `say`, `show` and `reporting`; a front end receives them through `notices_to`. By default notices and progress
+go to stderr and results to stdout. In text from files, names and printers control characters are escaped, and its length is
+limited.
 """
 
 import re
@@ -15,26 +15,26 @@ from typing import Protocol
 
 from profiles.messages import terminal_words
 
-# C0 and C1 controls, DEL, what turns the direction of writing around (CVE-2021-42574), line separators, halves of characters that
-# stand for bytes of a file name.
+# C0 and C1 controls, DEL, bidirectional overrides (CVE-2021-42574), line separators, and surrogates, which stand for undecodable
+# bytes of file names.
 CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
-WORD = re.compile(r"\S{301,}")  # longer than most paths; its beginning and its end say which it is
+WORD = re.compile(r"\S{301,}")  # longer than most paths, which their beginning and end identify
 WORD_BEGINNING, WORD_END = 120, 60
-MOST_LENGTH = 1500  # characters of a message, so too
+MOST_LENGTH = 1500  # characters of a message
 END_LENGTH = 300
 PLAIN_EVERY_S = 5.0
-PLAIN_AGAIN_S = 60.0  # what has not changed is said again: still alive
+PLAIN_AGAIN_S = 60.0  # an unchanged status is repeated as a sign of life
 
 
 def plain_line(text: str) -> str:
-    """One line for a terminal: controls, newlines too, as backslash escapes; of a long one the middle is left out."""
+    """One line for a terminal: control characters (also newlines) escaped; the middle of a long line is left out."""
     return marked_line(terminal_words(text))
 
 
 def marked_line(text: str) -> str:
-    """The same line with its marks of keys and options, unless it is too long and shortened."""
+    """One line for a terminal that keeps its marks of keys and options, unless it is too long and shortened."""
     shown = terminal_words(text)
-    if len(shown) > MOST_LENGTH or WORD.search(shown):  # a mark must not be cut through
+    if len(shown) > MOST_LENGTH or WORD.search(shown):  # a mark must not be split
         text = shown
     words = WORD.sub(lambda word: _shortened(word[0], WORD_BEGINNING, WORD_END), text)
     return _escaped(
@@ -43,20 +43,19 @@ def marked_line(text: str) -> str:
 
 
 def plain_lines(text: str) -> str:
-    """Several lines for a terminal, tables too: newlines stay."""
+    """Several lines for a terminal: control characters except newlines are escaped."""
     return _lines(terminal_words(text))
 
 
 class Report(Protocol):
-    """Shows what work is under way, and the share of it that is done where that is known."""
+    """Shows the current work, and its completed share if known."""
 
     def __call__(self, text: str, share: float | None = None) -> None: ...
 
 
 @dataclass(frozen=True)
 class Notice:
-    """Text for a person, with marks (see profiles/messages.py). forced: an error that --force goes past; is_result: what a
-    command was asked for."""
+    """Text for the user, with marks (see profiles/messages.py). forced: an error that --force ignores; is_result: a result."""
 
     text: str
     forced: bool = False
@@ -64,13 +63,13 @@ class Notice:
 
 
 class PlainLines:
-    """A status that changes often, as lines at a bearable rate."""
+    """Prints a status that changes often at a readable rate."""
 
     def __init__(self) -> None:
         self._shown, self._shown_at_s = "", monotonic()
 
     def show(self, text: str, at_once: bool = False) -> None:
-        """Say the text when enough time has passed since the one before, or at once."""
+        """Print the text if enough time has passed since the previous line, or at once."""
         now_s = monotonic()
         wait_s = PLAIN_AGAIN_S if text == self._shown else PLAIN_EVERY_S
         if at_once or now_s - self._shown_at_s >= wait_s:
@@ -80,21 +79,21 @@ class PlainLines:
 
 @contextmanager
 def as_notices() -> Iterator[Report]:
-    """Progress as a notice now and then."""
+    """Report progress as occasional notices."""
     lines = PlainLines()
     yield lambda text, share=None: lines.show(text)
 
 
 @dataclass(frozen=True)
 class FrontEnd:
-    """Receives each notice, and the progress of work while that lasts."""
+    """Receives each notice, and the progress of running work."""
 
     note: Callable[[Notice], None]
     progress: Callable[[], AbstractContextManager[Report]] = as_notices
 
 
 def to_streams(notice: Notice) -> None:
-    """A result on stdout, all else on stderr."""
+    """Write results to stdout, all else to stderr."""
     stream = sys.stdout if notice.is_result else sys.stderr
     text = terminal_words(notice.text)
     stream.write(f"{text.rstrip()}; going on because of --force\n" if notice.forced else text)
@@ -106,7 +105,7 @@ _front_end = FrontEnd(to_streams)
 
 @contextmanager
 def notices_to(front_end: FrontEnd) -> Iterator[None]:
-    """Send all notices, from any thread, to this front end until the block ends."""
+    """Send the notices of all threads to this front end until the block ends."""
     global _front_end
     before, _front_end = _front_end, front_end
     try:
@@ -116,22 +115,22 @@ def notices_to(front_end: FrontEnd) -> Iterator[None]:
 
 
 def say(text: str, *, forced: bool = False) -> None:
-    """A notice of one line. forced: it is what --force goes past."""
+    """Send a one-line notice. forced: an error that --force ignores."""
     _front_end.note(Notice(f"{marked_line(text)}\n", forced))
 
 
 def say_lines(text: str) -> None:
-    """A notice of several lines."""
+    """Send a notice of several lines."""
     _front_end.note(Notice(f"{_lines(text)}\n"))
 
 
 def show(text: str) -> None:
-    """A result."""
+    """Send a result."""
     _front_end.note(Notice(_lines(text), is_result=True))
 
 
 def reporting() -> AbstractContextManager[Report]:
-    """What shows the progress of the work inside."""
+    """Show the progress of the block."""
     return _front_end.progress()
 
 

@@ -1,4 +1,4 @@
-"""Program: the G-code of a print with its dry run and its parts, and the alternative ways to print a model."""
+"""Program: a print's G-code with its dry run and parts, and alternative ways to print a model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """The G-code of a print, its dry run, and its parts where it was made from a model."""
+    """The G-code of a print, its dry run, and its parts if it was made from a model."""
 
     lines: Sequence[str]
     run: DryRun
@@ -24,7 +24,7 @@ class Program:
 
     @property
     def interface_mm3(self) -> dict[int, float]:
-        """Plastic that there would not be if the model were in one piece, by the part that stands on it; {} where not known."""
+        """Plastic that the interfaces add, mm³, by the part above; {} if unknown."""
         more: dict[int, float] = {}
         for piece in self.sliced:
             for index, mm3 in piece.interface_mm3.items():
@@ -33,10 +33,10 @@ class Program:
 
 
 def joints_of_print(program: Program, profile: Profile) -> "tuple[Joint, ...]":
-    """The joints of a print, with the contact of the first layers on them by its dry run; none where its model is not known."""
+    """The joints of a print with the contact of their first layers from the dry run; () if the model is unknown."""
     if program.decomposition is None:
         return ()
-    from mdp.joint import joints_of  # a G-code file has none
+    from mdp.joint import joints_of  # not needed for a G-code file
 
     laid = {face.part: face for face in program.run.interfaces}
     return tuple(
@@ -49,11 +49,11 @@ def joints_of_print(program: Program, profile: Profile) -> "tuple[Joint, ...]":
 
 @dataclass(frozen=True)
 class Alternative:
-    """One way to print a model, with its figures; None among them: it cannot be printed this way, and message says why.
+    """One way to print a model, with its figures. They are None if it cannot be printed this way, and message says why.
 
-    risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm: length of the seams between
-    parts; stairs_mm2: area that stair-stepping blemishes; interface_mm3: plastic that one piece would not have, by the part that
-    stands there; joints: their loads; findings: the number in its dry run.
+    risky_mm2: overhanging area that needs support; unsupported_mm2: its share that can get none; seam_mm: length of the cut
+    seams; stairs_mm2: area blemished by stair-stepping; interface_mm3: plastic that the interfaces add, by the part above;
+    joints: their loads; findings: their number in the dry run.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Quantities: figures of a print in the units that people know."""
+"""Figures of a print in customary units."""
 
 from math import pi
 
@@ -6,7 +6,7 @@ from profiles.material import Material
 
 
 def duration(seconds: float) -> str:
-    """Days, hours, minutes and seconds as 1h 6m 15s."""
+    """Format as days, hours, minutes and seconds, such as 1h 6m 15s."""
     left = round(seconds)
     words: list[str] = []
     for letter, size in (("d", 86400), ("h", 3600), ("m", 60)):
@@ -17,48 +17,46 @@ def duration(seconds: float) -> str:
 
 
 def minutes(seconds: float) -> str:
-    """Seconds as 1h 6m, to the minute as an estimate deserves; less than one as 0m."""
+    """Format an estimate to the minute, such as 1h 6m."""
     whole = round(seconds / 60.0)
     return f"{whole // 60}h {whole % 60}m" if whole >= 60 else f"{whole}m"
 
 
 def about(seconds: float) -> str:
-    """Seconds to the minute where there are some, as an estimate deserves."""
+    """Format an estimate: to the minute, or to the second below one minute."""
     return minutes(seconds) if seconds >= 60.0 else duration(seconds)
 
 
 def newtons(force_n: float) -> str:
-    """A force to two digits, as an estimate deserves."""
+    """Format an estimated force with two digits."""
     return f"{float(f'{force_n:.2g}'):.12g}"
 
 
 def percent(share: float | None, digits: int = 0) -> str:
-    """A share in percent without the sign; a dash where it is not known."""
+    """Format a share as percent without the sign; a dash if None."""
     return "-" if share is None else f"{100.0 * share:.{digits}f}"
 
 
 def filament_cm3(filament_mm: float, material: Material) -> float:
-    """Volume of a length of filament."""
     return filament_mm * pi * material.diameter_mm**2 / 4.0 / 1000.0
 
 
 def filament_g(filament_mm: float, material: Material) -> float:
-    """Weight of a length of filament."""
     return filament_cm3(filament_mm, material) * material.density_g_cm3
 
 
 def price(filament_mm: float, material: Material) -> float | None:
-    """What a length of filament costs, in the material's currency; None where its price is not set."""
+    """Price of a length of filament, in the material's currency; None if the material has no price."""
     return None if material.price_per_kg is None else filament_g(filament_mm, material) / 1000.0 * material.price_per_kg
 
 
 def price_in_words(filament_mm: float, material: Material) -> str:
-    """The same as a person reads it, 0.42 EUR; "" where the price is not set."""
+    """Price of a length of filament with its currency, such as 0.42 EUR; "" if the material has no price."""
     amount = price(filament_mm, material)
     return "" if amount is None else f"{amount:.2f} {material.currency}".rstrip()
 
 
 def price_json(filament_mm: float, material: Material) -> dict[str, float | str]:
-    """`cost` and `currency` for a report in JSON; nothing where the price is not set."""
+    """`cost` and `currency` for a JSON report; {} if the material has no price."""
     amount = price(filament_mm, material)
     return {} if amount is None else {"cost": amount, "currency": material.currency}

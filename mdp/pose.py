@@ -192,7 +192,7 @@ def _equivalents(machine: Machine, poses: Sequence[Pose], reach: int) -> list[Po
 
 
 def _keep_turn(machine: Machine, poses: Sequence[Pose], before: Sequence[Pose], known: Sequence[Pose]) -> list[Pose]:
-    """The poses in which any turn works, with each turn of the poses before."""
+    """The poses in which any turn works, with each turn of the previous poses."""
     free = dict.fromkeys(pose.tilt_deg for pose in poses if _any_turn_serves(machine, pose))
     unturned = dict.fromkeys(Pose(tilt, pose.turn_deg) for tilt in free for pose in before)
     return [pose for pose in unturned if pose not in known]

@@ -1,4 +1,4 @@
-"""The command line: what a person types and reads at a terminal.
+"""The command line.
 
-`cli.main` parses and dispatches, `commands` holds a file for each command, `terminal` what is shown and how keys are read.
+`cli.main` parses and dispatches, `commands` has one module per command, `terminal` holds options, reports and keys.
 """

@@ -1,6 +1,6 @@
-"""The command line: parses, dispatches, and turns every error into what a person can use.
+"""Entry point of the command line: parses arguments, runs the command and turns every error into a message.
 
-Exit codes: 0 done, 1 the user can fix it, 3 a bug (log file named), 130 interrupted. Heavy imports stay inside the commands.
+Exit codes: 0 success, 1 user error, 3 bug (with a log file), 130 interrupted. Heavy imports stay inside the commands.
 """
 
 import errno
@@ -22,9 +22,9 @@ from machine.notices import FrontEnd, Report, as_notices, notices_to, plain_line
 from mdp.kernels.threads import harmless
 from profiles.errors import UserError, causes, notes
 
-ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by what --install-completion writes: words are wanted, no command
+ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by the script of --install-completion, which expects completions
 FULL = (errno.ENOSPC, errno.EDQUOT)
-# Kind of a pydantic error -> what a value must be.
+# Type of a pydantic error -> what the value must be.
 EXPECTED = {
     "int_parsing": "a whole number",
     "int_from_float": "a whole number",
@@ -63,21 +63,21 @@ def _options(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code."""
+    """Run one command and return its exit code."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
-            stream.reconfigure(errors="backslashreplace")  # Windows' older encodings lack most letters
+            stream.reconfigure(errors="backslashreplace")  # older Windows encodings lack most characters
     try:
         return _run(arguments)
     finally:
-        kernels = sys.modules.get("mdp.kernels.cache")  # loading it for nothing would cost what it saves
+        kernels = sys.modules.get("mdp.kernels.cache")  # importing it here would cost the time that the cache saves
         if kernels is not None and kernels.trouble():
             _complain(f"the next run compiles the kernels again: {kernels.trouble()}")
 
 
 def _run(arguments: Sequence[str] | None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
-    # numpy's library for products waits for its threads by spinning: on a busy machine that costs more than the products.
+    # OpenBLAS threads spin while they wait, which on a busy machine costs more than the products.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     command = typer.main.get_command(app)
     if ASKED_BY_SHELL in os.environ:
@@ -101,7 +101,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except BrokenPipeError:
         return 0
     except Exception as error:  # noqa: BLE001 - the one place where a bug becomes a message and a log file
-        # Compiled code turns Ctrl-C into an error of its own.
+        # Compiled code replaces KeyboardInterrupt by an exception of its own.
         if any(isinstance(cause, KeyboardInterrupt) for cause in causes(error)):
             return _complain("interrupted", 130)
         if isinstance(error, OSError) and error.errno in FULL:
@@ -113,7 +113,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _full() -> str:
-    """What a full disk has refused where the error does not say: standard output still holds what it could not write."""
+    """Name the output that a full disk refused if the error does not: standard output if it still holds unwritten data."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -127,7 +127,7 @@ def _complain(message: str, code: int = 1) -> int:
 
 
 def _usage(error: TyperException, given: Sequence[str]) -> str:
-    """What is wrong with the words given, in the parser's terms where there are no better ones."""
+    """Explain a usage error, in the parser's words if there is nothing better."""
     message = str(getattr(error, "format_message", lambda: str(error))()).strip().rstrip(".")
     context = getattr(error, "ctx", None)
     if context is None:
@@ -156,13 +156,13 @@ def _option_names(command: Any) -> list[str]:
 
 
 def _wrong_value(error: TyperException) -> str:
-    """What an option is and must be, "" where the error is of another kind."""
+    """State an option's value and what it must be; "" for errors of other kinds."""
     option = next((name for name in getattr(getattr(error, "param", None), "opts", ()) if name.startswith("--")), "")
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
     if not option or not problems:
         return ""
     problem = problems[0]
-    if str(problem["input"]).strip("+-").lower() == "nan":  # which fails at any bound
+    if str(problem["input"]).strip("+-").lower() == "nan":  # which violates any bound
         return f"{option} is nan: it must be a number"
     expected = EXPECTED.get(problem["type"], problem["msg"]).format(**problem.get("ctx", {}))
     return f"{option} is {problem['input']!r}: it must be {expected}"
@@ -170,7 +170,7 @@ def _wrong_value(error: TyperException) -> str:
 
 @contextmanager
 def progress() -> Iterator[Report]:
-    """What shows the progress of the work inside; the terminal is as before afterwards."""
+    """Show a progress bar, or notices if stderr is not a terminal; the terminal is restored at the end."""
     from machine.cli.terminal.keys import is_terminal
 
     if not is_terminal():
@@ -183,7 +183,7 @@ def progress() -> Iterator[Report]:
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         for thread in threading.enumerate():
-            if type(thread).__module__.startswith("rich."):  # it draws the bar, on a stream that a copy of this process reopens
+            if type(thread).__module__.startswith("rich."):  # draws the bar on stderr, which a forked process reopens
                 harmless(thread)
         task = progress.add_task("", total=None)
 

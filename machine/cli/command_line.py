@@ -1,4 +1,4 @@
-"""The commands as typer reads them: which options each has, and which command it runs. Heavy imports stay inside the commands."""
+"""Signatures of all commands, as typer reads them. Heavy imports stay inside the commands."""
 
 import sys
 from collections.abc import Callable
@@ -42,13 +42,13 @@ def simulate(
     models: options.ModelsOrGcode,
     program: options.ProgramOptions,
     json: options.JsonFile = None,
-    reference: Annotated[str | None, option("--model MODEL", "hold a G-code file's plastic against this model")] = None,
+    reference: Annotated[str | None, option("--model MODEL", "compare a G-code file's plastic with this model")] = None,
     html: options.HtmlFile = None,
-    baud: Annotated[int | None, option("--baud N", "find moves that a line of N bits a second brings too late")] = None,
+    baud: Annotated[int | None, option("--baud N", "find moves that arrive too late over a line of N bits/s")] = None,
     *,
     given: options.ProfileOptions,
 ) -> int:
-    """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
+    """Dry-run a model or a G-code file. Compares the plastic with the model; exit code 1 if there is an error."""
     from machine.cli.commands.simulate import simulate
 
     return simulate(options.program_request(models, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
@@ -57,20 +57,22 @@ def simulate(
 def view(
     models: options.ModelsOrGcode,
     program: options.ProgramOptions,
-    out: Annotated[Path | None, option("-o --out VIEW.html", "page to write; else named after the model, here")] = None,
+    out: Annotated[
+        Path | None, option("-o --out VIEW.html", "page to write; default: named after the model, in this folder")
+    ] = None,
     *,
     open_: Annotated[bool, option("--open", "show the page in the browser")] = False,
-    compare: Annotated[bool, option("--compare", "tell also time and material printed in one part")] = False,
+    compare: Annotated[bool, option("--compare", "also report time and material of a print in one part")] = False,
     given: options.ProfileOptions,
 ) -> int:
-    """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
+    """Write an HTML page that shows a model or a G-code file. It has parts, layers, the moving machine and a report."""
     from machine.cli.commands.view import view
 
     return view(options.program_request(models, program, given, outputs=Outputs(html=out), compare=compare), open_)
 
 
 def edit(asked: requests.EditRequest) -> int:
-    """Open the workbench: a page to look, cut, slice and print. It is on this computer alone, but with --lan; Ctrl-C ends it."""
+    """Open the workbench, a page to cut, slice and print. Only this computer reaches it without --lan; Ctrl-C ends it."""
     from machine.cli.commands.edit import edit
 
     return edit(asked)
@@ -82,7 +84,7 @@ def save(
     out: Annotated[Path, option("-o --out NAME.3mf", "project file to write")],
     given: options.ProfileOptions,
 ) -> int:
-    """Write a project: one 3MF with model, plan and profiles. Every command takes it, and other slicers open it."""
+    """Write a project: one 3MF file with model, plan and profiles. Every command reads it, and other slicers open it."""
     options.check_model(model)
     from machine.cli.commands.export import save
 
@@ -90,7 +92,7 @@ def save(
 
 
 def batch(asked: requests.BatchRequest) -> int:
-    """Export every model of a folder, on all cores or many machines. Or decompose or estimate them; started again it goes on."""
+    """Export all models of a folder, on all cores or many machines. Or decompose or estimate them; a repeated run continues."""
     from machine.cli.commands.batch import batch
 
     return batch(asked)
@@ -106,7 +108,7 @@ def print_(
     """Print models or a G-code file on a printer or a simulated one.
 
     PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT, or a print server: octoprint:HOST, moonraker:HOST,
-    duet:HOST, to which the program is handed over first. The printer is asked who it is before anything moves.
+    duet:HOST, which receives the program first. The printer is identified before anything moves.
     Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
     """
     from machine.cli.commands.print import print_model
@@ -118,14 +120,14 @@ def send(
     file: Annotated[str, typer.Argument(metavar="FILE.gcode", help="a G-code file")],
     to: Annotated[str, option("--to SERVER", "octoprint:HOST, moonraker:HOST or duet:HOST; HOST may be http(s)://HOST:PORT")],
     *,
-    start: Annotated[bool, option("--start", "print it at once; print --port SERVER follows it, too")] = False,
+    start: Annotated[bool, option("--start", "start printing at once; print --port SERVER also follows it")] = False,
     log: options.LogFile = None,
     force: options.ForceAll = False,
     given: options.ProfileOptions,
 ) -> int:
-    """Hand a G-code file to a print server. It is dry-run and held against machine and server first.
+    """Send a G-code file to a print server. It is dry-run and checked against machine and server first.
 
-    A key or password stands in servers.toml in the settings folder (see docs/network.md) or in the variable TILTPRINT_SERVER_KEY.
+    A key or password is read from servers.toml in the settings folder (see docs/network.md) or the variable TILTPRINT_SERVER_KEY.
     """
     from machine.cli.commands.print import send
 
@@ -136,9 +138,9 @@ def follow(
     server: Annotated[str, typer.Argument(metavar="SERVER", help="octoprint:HOST, moonraker:HOST or duet:HOST")],
     log: options.LogFile = None,
 ) -> int:
-    """Follow and command what a print server prints already.
+    """Follow and control the running print of a print server.
 
-    Keys at a terminal are those of print; l, or Ctrl-C and no answer, leaves it printing. Ctrl-C twice cancels.
+    Keys at a terminal are those of print; l, or Ctrl-C without an answer, leaves it printing. Ctrl-C twice cancels.
     """
     from machine.cli.commands.print import follow
 
@@ -146,7 +148,7 @@ def follow(
 
 
 def resume(asked: requests.ResumeOptions) -> int:
-    """Go on with a print after a power cut, a crash or a pulled plug."""
+    """Resume a print after a power cut, a crash or a pulled plug."""
     from machine.cli.commands.print import list_resumable, resume
     from machine.link.journal import read_journal
     from profiles.errors import JournalError
@@ -154,30 +156,30 @@ def resume(asked: requests.ResumeOptions) -> int:
     if asked.journal is None:
         return list_resumable()
     if asked.port is None:
-        read_journal(asked.journal)  # report an unreadable one first
+        read_journal(asked.journal)  # an unreadable journal is reported first
         raise JournalError(f"journal {asked.journal}: at which port is the printer? --port PORT is expected")
     named = None if asked.machine is None else options.machine_profile(asked.machine)
     return resume(asked.journal, asked.port, asked, named)
 
 
 def ports(
-    baud: Annotated[int, option("--baud N", "rate tried first, bits a second")] = BAUD,
+    baud: Annotated[int, option("--baud N", "rate to try first, bits/s")] = BAUD,
     *,
     json: Annotated[bool, option("--json", "the list as JSON")] = False,
     ask: Annotated[
-        bool, option("--ask/--no-ask", "open each port and ask what is there; many boards restart when opened")
+        bool, option("--ask/--no-ask", "open each port and identify the printer; many boards restart when opened")
     ] = True,
 ) -> int:
-    """List serial ports and what answers at each. It tells firmware, axes and rate, or why nothing answers."""
+    """List serial ports and what answers at each. Shows firmware, axes and baud rate, or why nothing answers."""
     from machine.cli.commands.console import ports
 
     return ports(baud, json, ask)
 
 
 def console(asked: requests.ConsoleRequest) -> int:
-    """Talk to a printer. Lines typed, or piped in, are sent; its answers are shown.
+    """Talk to a printer. Sends the lines that are typed or piped in, and shows the answers.
 
-    /help tells what else can be typed; Ctrl-D leaves. Heaters that are on are then switched off, after a question at a terminal.
+    /help lists further commands; Ctrl-D leaves. Heaters that are on are then switched off; at a terminal you are asked first.
     """
     from machine.cli.commands.console import console
 
@@ -185,24 +187,24 @@ def console(asked: requests.ConsoleRequest) -> int:
 
 
 def simulator(asked: requests.SimulatorRequest) -> int:
-    """A simulated printer for any host to print on; Ctrl-C ends it."""
+    """Run a simulated printer for any host. Ctrl-C ends it."""
     from machine.cli.commands.simulator import simulate_printer
 
     return simulate_printer(asked)
 
 
 def calibrate(asked: requests.CalibrationRequest) -> int:
-    """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
+    """Find signs, zeros and centres of the rotary axes. A few touches of a mark suffice; your own profile stores the result.
 
-    With --port the machine goes from touch to touch and you take the tip onto the mark by keys; with --probe it measures a ball
-    by itself. Without a port -o writes a program and a sheet to fill in; with --printed they are read off a printed piece.
+    With --port the machine goes from touch to touch and you move the tip onto the mark by keys; with --probe it measures a ball
+    by itself. Without a port -o writes a program and a sheet to fill in; with --printed the values are read off a printed piece.
     """
     from machine.cli.commands.measuring.calibrate import evaluate_sheet, write_program
 
     out, measured, probing = asked.out, asked.measured, asked.probing
     if asked.printed:
         if out is not None or measured is not None or probing.probe or probing.port is not None or asked.directions:
-            raise typer.BadParameter("--printed is a way of its own: -o, --measured, --port and --directions are for touches")
+            raise typer.BadParameter("--printed excludes -o, --measured, --port and --directions, which are for touches")
         return _read_off(asked)
     if asked.readings or asked.html is not None:
         raise typer.BadParameter("--readings and --html go with --printed FILE.gcode")
@@ -221,7 +223,7 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
 
         if out is not None or measured is not None:
             raise typer.BadParameter(
-                "--port takes the machine to the touches: -o and --measured are for a program sent otherwise"
+                "--port takes the machine to the touches: -o and --measured are for a program that is sent separately"
             )
         return touch_by_keys(asked, probing.port, asked.given.profile())
     if out is not None and measured is None:
@@ -232,7 +234,7 @@ def calibrate(asked: requests.CalibrationRequest) -> int:
 
 
 def _read_off(asked: requests.CalibrationRequest) -> int:
-    """From pieces that were printed: by a page, by readings, or by what a terminal asks for."""
+    """Calibrate from printed pieces: by a page, by readings, or by questions at the terminal."""
     from machine.cli.commands.measuring.calibrate_piece import ask_for_readings, correct_axes, write_page
 
     if asked.html is not None and not asked.readings:
@@ -249,15 +251,15 @@ def _is_at_terminal() -> bool:
 
 
 def coupon(asked: requests.CouponRequest) -> int:
-    """Measure how joints hold on your machine. Twelve bars with different joints are printed at once, and broken by hand.
+    """Measure how well joints hold on your machine. Prints twelve bars with different joints, which you break by hand.
 
-    Without -o and --measured a terminal asks for the loads at which the bars broke.
+    Without -o and --measured the terminal asks for the loads at which the bars broke.
     """
     from machine.cli.commands.measuring.coupon import ask_for_loads, evaluate_sheet, write_program
 
     out, measured = asked.out, asked.measured
     if asked.report is not None and measured is None:
-        raise typer.BadParameter(f"--report {asked.report} goes with --measured FILE, whose loads it tells")
+        raise typer.BadParameter(f"--report {asked.report} goes with --measured FILE, whose loads it reports")
     for name, file in (("--html", asked.html), ("--png", asked.png)):
         if file is not None and out is None:
             raise typer.BadParameter(f"{name} {file} goes with -o OUT.gcode, whose bars it shows")
@@ -274,7 +276,7 @@ ProfileName = Annotated[str, typer.Argument(metavar="NAME", help="name of a prof
 
 
 def list_() -> int:
-    """The shipped profiles and your own."""
+    """List the shipped profiles and your own."""
     from machine.cli.commands.profiles.listing import list_profiles
 
     return list_profiles()
@@ -285,7 +287,7 @@ def show(
     json: Annotated[bool, option("--json", "resolved values as JSON")] = False,
     settings: options.Settings = (),
 ) -> int:
-    """Resolved values of one profile, with what each key means."""
+    """Show the resolved values of one profile. Each key has its meaning beside it."""
     from machine.cli.commands.profiles.listing import show
 
     return show(name, json, settings)
@@ -296,21 +298,21 @@ def save_profile(
     out: Annotated[Path, option("-o --out FILE.toml", "profile to write, for --machine and the like")],
     settings: options.Settings = (),
 ) -> int:
-    """A profile with changes of yours as a profile of your own, that says what differs and inherits the rest."""
+    """Save a profile with your changes as your own. It contains the differences and inherits the rest."""
     from machine.cli.commands.profiles.listing import save
 
     return save(name, settings, out)
 
 
 def import_(asked: requests.ImportRequest) -> int:
-    """Another slicer's settings as a material and a process of yours, with what was taken, worked out and left."""
+    """Import another slicer's settings as your own profiles. Lists the settings taken, converted and left."""
     from machine.cli.commands.profiles.importing import import_profiles
 
     return import_profiles(asked)
 
 
 def detect(asked: requests.DetectRequest) -> int:
-    """A machine profile by what the printer's firmware tells of itself. Nothing moves: only questions are asked."""
+    """Make a machine profile from the printer's firmware settings. Nothing moves: the firmware is only queried."""
     from machine.cli.commands.profiles.detection import detect
 
     if (asked.port is None) == (asked.file is None):
@@ -319,7 +321,7 @@ def detect(asked: requests.DetectRequest) -> int:
 
 
 def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="a .toml profile")]) -> int:
-    """All problems of a profile file at once; exit 1 when there are any."""
+    """Report all problems of a profile file. Exit code 1 if there are any."""
     from machine.cli.commands.profiles.listing import check
 
     return check(file)

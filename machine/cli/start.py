@@ -1,4 +1,4 @@
-"""Start: what the command `tiltprint` runs; it knows Ctrl-C before the command line is loaded."""
+"""Entry point of `tiltprint`, which handles Ctrl-C even before the command line is imported."""
 
 import gc
 import os
@@ -7,17 +7,17 @@ import sys
 from contextlib import suppress
 from importlib.util import find_spec
 
-PACKAGES = ("profiles", "mdp", "slicer", "machine")  # names so common that other distributions have them too
-SIGN = b'"""tiltprint: '  # how the first file of each package begins
-SELDOM = (100_000, 20, 50)  # what is allocated between two looks for garbage in circles, of which there is little
+PACKAGES = ("profiles", "mdp", "slicer", "machine")  # names so common that other distributions use them, too
+SIGN = b'"""tiltprint: '  # beginning of each package's __init__.py
+SELDOM = (100_000, 20, 50)  # thresholds of garbage collection, raised because there are few reference cycles
 
 
 def main() -> int:
-    """Load the command line and run it; returns the exit code."""
-    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115 - for as long as the program runs
+    """Import the command line, run it and return the exit code."""
+    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115 - open as long as the program runs
     sys.stdout, sys.stderr = (stream or open(os.devnull, "w", encoding="utf-8") for stream in (sys.stdout, sys.stderr))  # noqa: SIM115
     gc.set_threshold(*SELDOM)
-    os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # what is hardly written to takes no memory
+    os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")  # memory that is hardly written to is not allocated
     try:
         if trouble := package_trouble():
             sys.stderr.write(f"tiltprint: {trouble}: install tiltprint into an environment of its own\n")
@@ -28,8 +28,8 @@ def main() -> int:
     except KeyboardInterrupt:
         sys.stderr.write("tiltprint: interrupted\n")
         code = 130
-    with suppress(ValueError):  # in a thread
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: Ctrl-C would only end in a traceback of Python's own end
+    with suppress(ValueError):  # not in the main thread
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C could only cause a traceback while Python shuts down
     if code == 130:
         from machine.cli.terminal.interrupts import leave
 
@@ -38,7 +38,7 @@ def main() -> int:
 
 
 def package_trouble() -> str:
-    """Which package is missing, or was overwritten or hidden by another distribution; "" if all are tiltprint's own."""
+    """Sentence about a package that is missing, overwritten or hidden by another distribution; "" if all are tiltprint's own."""
     for name in PACKAGES:
         spec = find_spec(name)
         if spec is None:

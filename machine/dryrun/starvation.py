@@ -68,7 +68,7 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
 
 
 def _bytes(lines: Sequence[str], at: Indices32) -> tuple[Floats, Floats]:
-    """(m,) bytes on the wire of the line of each block, at text line `at`, and of the lines since the block before.
+    """(m,) bytes on the wire of the line of each block, at text line `at`, and of the lines since the previous block.
 
     Further blocks of the same line (of an arc) have no bytes.
     """

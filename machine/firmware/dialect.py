@@ -16,7 +16,7 @@ EEPROM_S = 10.0  # while an AVR writes its EEPROM the receive interrupt is off a
 
 # path: X Y Z, rotary axes and filament to a position; filament: only that; table: a rotary axis only; other: its own cycle
 Moves = Literal["", "path", "filament", "table", "other"]
-# named: the heater in its HEATER word; any: unknown, for it runs a macro, a file or a cycle of its own
+# named: the heater in its HEATER word; any: unknown: it runs a macro, a file or a cycle of its own
 Heats = Literal["", "nozzle", "bed", "chamber", "named", "any"]
 Waits = Literal["", "heat", "moves", "time", "person"]
 # Effect of G90 and G91 on the filament: set: they set its mode too; apart: none; carried: G91 makes it relative meanwhile.

@@ -62,7 +62,7 @@ def _path(axes: Floats, chain: Floats) -> Floats:
 
 @kernel
 def _segments(start: Floats, end: Floats, rows: Indices, chain: Floats) -> Floats:
-    """Kernel of workpiece_segments; most moves begin at the end of the one before."""
+    """Kernel of workpiece_segments; most moves begin at the end of the previous one."""
     out, angles = np.empty((len(rows), 2, 3)), table(2, 3)
     for k in range(len(rows)):
         row = rows[k]
@@ -77,7 +77,7 @@ def _segments(start: Floats, end: Floats, rows: Indices, chain: Floats) -> Float
 
 @no_nrt
 def goes_on(start: Floats, end: Floats, row: int) -> bool:
-    """Whether a row begins at the end of the one before, on all five axes."""
+    """Whether a row begins at the end of the previous one, on all five axes."""
     same = row > 0
     for axis in range(5):
         same = same and start[row, axis] == end[row - 1, axis]

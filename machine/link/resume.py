@@ -148,7 +148,7 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
 
 
 def _check_begun(status: PrinterStatus, begun: bool) -> None:
-    """Refuse a printer that is not in the state of a restart, for it may have been homed or moved since. Raises JournalError."""
+    """Refuse a printer whose state is not that of a restart: it may have been homed or moved since. Raises JournalError."""
     if not begun:
         keys = ", ".join(f"{key_name(f'machine.{key}')}" for key in HOME_KEYS)
         raise JournalError(

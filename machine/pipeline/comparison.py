@@ -42,7 +42,7 @@ def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternati
 def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = None) -> tuple[Alternative, Alternative]:
     """The models in one part each, as they stand and in the best orientation, with the same marks and modifiers.
 
-    All get support whatever the process says, for they would fail without. An alternative that the machine cannot print is
+    All get support whatever the process says because they would fail without. An alternative that the machine cannot print is
     returned with the reason. report: shows progress; None: on the terminal. The model is centred on the turn axis.
     """
     tell = say if report is None else report

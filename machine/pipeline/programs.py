@@ -33,7 +33,7 @@ class LoadedProgram:
 
 
 def load_program(request: ModelRequest, pictures: bool = False) -> LoadedProgram:
-    """The program of a model or of a G-code file. pictures: a model's program gets thumbnails, for it becomes a file.
+    """The program of a model or of a G-code file. pictures: a model's program gets thumbnails because it becomes a file.
 
     Raises GcodeError for a file that cannot be read.
     """

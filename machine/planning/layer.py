@@ -399,7 +399,7 @@ def run_in(strokes: Moves, layer: Layer, more_mm: float, profile: Profile) -> fl
 
 @kernel
 def _lay(strokes: Moves, apart: Mask, approach: Floats, approach_starts: Indices, begin: Floats, speeds: Speeds) -> Moves:
-    """Strokes with travels, along the approach, to those that do not begin at the end of the one before.
+    """Strokes with travels, along the approach, to those that do not begin at the end of the previous one.
 
     begin: (5,) X Y Z of the tip, Z of the crossing to the first stroke, and filament to push before that.
     """

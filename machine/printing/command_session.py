@@ -91,7 +91,7 @@ class CommandSession:
         self._ordered = what
 
     def heated(self) -> str:
-        """Which heaters are on, in words; "" when none is. A running command counts, for it may just have switched one on."""
+        """Which heaters are on, in words; "" when none is. A running command counts because it may just have switched one on."""
         if not self._idle():
             return "heaters, for a command was under way"
         self.command("M105")

@@ -102,7 +102,7 @@ def _new_path(name: str) -> Path:
 
 def _delete_oldest(folder: Path) -> None:
     """Make room for one more journal: delete all but the newest and those being printed. A program is deleted when no journal
-    beside it names it any more; a new program only with its journal."""
+    beside it still names it; a new program only with its journal."""
     journals = _journals(folder)
     before = b"".join(map(_first_line, journals))
     keep_newest(journals, KEPT - 1, _name, is_being_printed)

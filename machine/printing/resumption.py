@@ -102,7 +102,7 @@ def read_resumption(job: PrintJob) -> Resumption:
         raise JournalError(
             f"{phrase('', '--port sim: ')}a simulated printer ends with its print; the port of a printer is expected"
         )
-    if is_being_printed(journal):  # checked first: the files read below do not change any more
+    if is_being_printed(journal):  # checked first: the files read below no longer change
         raise JournalError(
             f"journal {journal}: its print runs now, in another terminal or page: it can be resumed when it has ended"
         )
@@ -155,7 +155,7 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
 
 @contextmanager
 def _further_journal(cut_off: Resumption, job: PrintJob) -> Iterator[Journal]:
-    """The journal of the rest; removed without a record, for it would restart the whole program."""
+    """The journal of the rest; removed without a record because it would restart the whole program."""
     with continue_journal(cut_off.text, cut_off.profile, cut_off.name, job.journal) as further:
         try:
             yield further

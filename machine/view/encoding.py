@@ -1,6 +1,6 @@
-"""Encoding: a header and named arrays as one compressed block of bytes that a browser reads without a library.
+"""Encoding of a header and named arrays as one compressed block that a browser reads without a library.
 
-Differences of neighbours in zigzag, their bytes sorted by weight, then deflate: paths shrink to a sixth of their raw size.
+Zigzag differences of neighbours, sorted by byte significance and deflated, shrink paths to a sixth of their raw size.
 """
 
 import json
@@ -24,7 +24,7 @@ TYPES = {"u8": "<u1", "u16": "<u2", "i32": "<i4", "f32": "<f4"}
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """An array to store: values, (n,) or (n, k), in the unit of the page; stored as whole multiples of scale unless f32."""
+    """An array to store: values, (n,) or (n, k), in the page's unit; stored as integer multiples of scale unless f32."""
 
     values: NDArray[Any]
     type: str
@@ -33,7 +33,7 @@ class Column:
 
 
 def pack(header: Mapping[str, Any], columns: Mapping[str, Column]) -> bytes:
-    """The compressed block; the arrays' places are added to the header as `arrays`."""
+    """The compressed block; the header receives the positions of the arrays as `arrays`."""
     arrays: dict[str, Any] = {}
     blocks: list[bytes] = []
     offset = 0
@@ -49,7 +49,7 @@ def pack(header: Mapping[str, Any], columns: Mapping[str, Column]) -> bytes:
 
 
 def with_header(block: bytes, change: Callable[[dict[str, Any]], Mapping[str, Any]]) -> bytes:
-    """A packed block with another header: what change makes of its own."""
+    """Replace the header of a packed block by change(header)."""
     raw = zlib.decompress(block)
     begin = len(MAGIC) + LENGTH.size
     end = begin + LENGTH.unpack_from(raw, len(MAGIC))[0]
@@ -65,7 +65,7 @@ def _press(header: Mapping[str, Any], arrays: Iterable[bytes | memoryview]) -> b
 
 
 def whole(column: Column) -> NDArray[np.int64]:
-    """The values as whole multiples of the scale, as they are stored."""
+    """The values as integer multiples of the scale, as stored."""
     multiples: NDArray[np.int64] = np.rint(np.asarray(column.values, dtype=np.float64) / column.scale).astype(np.int64)
     return multiples
 
@@ -78,7 +78,7 @@ def _plain(column: Column) -> bytes:
 
 
 def _delta(column: Column) -> bytes:
-    """Every column's zigzag differences, as far as they fit into 32 bits, as four planes of bytes, the lowest first."""
+    """Zigzag differences of each column, clipped to 32 bits, as four byte planes, the lowest byte first."""
     multiples = whole(column)
     blocks = []
     for multiple in multiples.reshape(len(multiples), prod(multiples.shape[1:])).T:

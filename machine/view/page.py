@@ -1,6 +1,6 @@
-"""Page: the template, its scripts and a packed block put together into one HTML file that fetches nothing.
+"""Page: puts the template, its scripts and a packed block together into one HTML file that loads nothing.
 
-ES modules that import each other become one script that imports nothing.
+ES modules that import each other become one script without imports.
 """
 
 import base64
@@ -25,7 +25,7 @@ EXPORT = re.compile(r"^export ((?:async )?function|const|class) ([\w$]+)", re.MU
 
 
 def parts_page(decomposition: Decomposition, profile: Profile, alternatives: Sequence[Alternative] = ()) -> bytes:
-    """The page of parts alone; arguments as of_parts takes them."""
+    """The page of parts alone; arguments as for of_parts."""
     return page(decomposition.name, of_parts(decomposition, profile, alternatives))
 
 
@@ -38,12 +38,12 @@ def print_page(
     alternatives: Sequence[Alternative] = (),
     live: bool = False,
 ) -> bytes:
-    """The page of a whole print; arguments as of_print takes them."""
+    """The page of a whole print; arguments as for of_print."""
     return page(name, of_print(name, program, profile, known=known, alternatives=alternatives, live=live), live)
 
 
 def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> bytes:
-    """A page that print_page has written without alternatives, with them: the same bytes as if it had known them."""
+    """Add alternatives to a page of print_page; same bytes as if print_page had been given them."""
     begin = content.index(DATA) + len(DATA)
     end = content.index(b"</script>", begin)
     block = with_header(base64.b64decode(content[begin:end]), lambda header: compared(header, alternatives))
@@ -51,7 +51,7 @@ def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> byte
 
 
 def page(title: str, block: bytes, live: bool = False) -> bytes:
-    """The HTML file. title: any text; block: from machine.view.contents; live: it may ask its own server for the state."""
+    """The HTML file. title: any text; block: from machine.view.contents; live: the page may fetch the state from its server."""
     style, script, body = _template()
     put = {
         "<!--TITLE-->": escape(title),
@@ -64,20 +64,19 @@ def page(title: str, block: bytes, live: bool = False) -> bytes:
 
 
 def policy(style: str, script: str, live: bool) -> str:
-    """The content security policy: the page may run its own script, use its own style, show images that it has made itself."""
+    """Content security policy: only the page's own script and style, and images that it creates."""
     asks = "; connect-src 'self'" if live else ""
     pictures = "img-src data: blob:; base-uri 'none'; form-action 'none'"
     return f"default-src 'none'; script-src {hash_source(script)}; style-src {hash_source(style)}; {pictures}{asks}"
 
 
 def _template() -> tuple[str, str, str]:
-    """Style, scripts as one, and the page around them."""
+    """Style, bundled scripts, and the page around them."""
     return (TEMPLATE / "style.css").read_text("utf-8"), bundle(TEMPLATE / "main.js"), (TEMPLATE / "page.html").read_text("utf-8")
 
 
 def bundle(entry: Path) -> str:
-    """The script of a module and of all that it imports. Each keeps its names to itself: it is a function that gives what it
-    exports, known to the others as modules["FOLDER/NAME"]. Raises CycleError."""
+    """Bundle a module and its imports into one script; modules["FOLDER/NAME"] has the exports of each. Raises CycleError."""
     texts, waiting = dict[Path, str](), [entry.resolve()]
     while waiting:
         file = waiting.pop()
@@ -103,5 +102,5 @@ def _known(file: Path) -> str:
 
 
 def hash_source(text: str) -> str:
-    """How a content security policy names the one script or style that a page may have."""
+    """The hash source of an inline script or style in a content security policy."""
     return f"'sha256-{base64.b64encode(sha256(text.encode()).digest()).decode()}'"

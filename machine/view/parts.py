@@ -1,6 +1,4 @@
-"""Parts: how pictures and pages show them: their colours, and which of their faces are risky before and after the cuts;
-and the ways to cut a model that a search has found.
-"""
+"""Parts in pictures and on pages: their colours, risky faces before and after the cuts, and the front of the search."""
 
 import shlex
 from typing import Any
@@ -14,12 +12,12 @@ from mdp.overhang import risky_above, risky_upright
 from mdp.save import front_values, plane_values
 from profiles.profile import Profile
 
-# Okabe and Ito's colours for all kinds of colour vision, without vermilion, which is too near to the red of risky faces.
+# Okabe and Ito's colours for colour-blind readers, without vermilion, which is too close to the red of risky faces.
 PALETTE = np.array([[86, 180, 233], [230, 159, 0], [0, 158, 115], [204, 121, 167], [240, 228, 66], [0, 114, 178]], dtype=float)
 
 
 def part_colours(count: int) -> Floats:
-    """(count, 3) colours of parts 1, 2, ..., 0 to 255; from the seventh on the palette returns paler."""
+    """(count, 3) colours of parts 1, 2, ..., 0 to 255; after six parts the palette repeats in paler shades."""
     places = np.arange(count)
     paler = np.minimum(places // len(PALETTE), 2)[:, None] * 0.38
     colours: Floats = PALETTE[places % len(PALETTE)] * (1.0 - paler) + 255.0 * paler
@@ -27,12 +25,12 @@ def part_colours(count: int) -> Floats:
 
 
 def page_colours(count: int) -> list[str]:
-    """The part_colours() as #rrggbb."""
+    """The colours of part_colours() as #rrggbb."""
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(part_colours(count)).astype(int).tolist()]
 
 
 def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
-    """(m,) faces of a part that need support although it is printed in its own direction."""
+    """(m,) faces of a part that need support in its own direction."""
     if part.needing is not None:
         return part.needing
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
@@ -40,7 +38,7 @@ def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
 
 
 def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> NDArray[np.bool_]:
-    """(m,) risky faces of a part when the model is printed straight up, the cut below it left out."""
+    """(m,) risky faces of a part if the model is printed straight up, without the cut below it."""
     if part.needing_upright is not None:
         return part.needing_upright
     down = risky_upright(part.mesh, angle_deg, count_platform_faces)
@@ -49,18 +47,18 @@ def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> ND
 
 
 def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> float:
-    """Area of risky_before() faces, mm2."""
+    """Area of risky_before() faces, mm²."""
     return float(part.mesh.areas_mm2[risky_before(part, angle_deg, count_platform_faces)].sum())
 
 
 def front_record(row: FrontRow) -> dict[str, Any]:
-    """A row of a front as pages know it. planes: in print order, from part 2 on; why: of the chosen row, else ""."""
+    """A row of a front for pages. planes: in print order, beginning with part 2; why: reason of the chosen row, else ""."""
     planes = [plane_values(plane) for plane in reversed(row.planes)]
     return front_values(row) | {"why": row.reason, "planes": planes}
 
 
 def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:
-    """The rows of a front with the colours of their parts, and the command that takes each."""
+    """The rows of a front with the colours of their parts, and the command that selects each."""
     return [
         {
             **front_record(row),

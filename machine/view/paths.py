@@ -1,5 +1,4 @@
-"""Paths: the rows of a dry run as the page's columns, one row a straight move, in a very long program as many as a browser draws
-quickly; and its layers, by its comments or else by the heights of its strokes."""
+"""Paths: the rows of a dry run as columns of the page, one row per straight move, thinned for very long programs; and layers."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,21 +14,21 @@ from machine.view.encoding import Column
 from mdp.mesh import Floats
 from profiles.profile import Profile
 
-WIPE, PRIME = 4, 5  # kinds of the page beside those of MoveKind
-REACH = 1e6  # mm and deg: what lies beyond is no place of a machine
+WIPE, PRIME = 4, 5  # kinds of moves on the page in addition to those of MoveKind
+REACH = 1e6  # mm and deg; values beyond it are errors
 STILL = 1e-9
 MOST_ROWS = 1_500_000
 FINEST_MM = 0.01
-SAME_MM = 0.02  # strokes whose heights differ less lie in one layer
-FEWEST = 4  # strokes that a helix takes to rise by a layer, at least: what goes up and down more quickly is no helix
+SAME_MM = 0.02  # strokes whose heights differ by less are in one layer
+FEWEST = 4  # least number of strokes in which a helix rises by a layer; faster changes of height are not a helix
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """number: (n,) for the rows of a program, 0 before the first. first, rows: (l,) where layers begin and how long they are.
+    """number: (n,) layer of each row of a program, 0 before the first. first, rows: (l,) first row and length of each layer.
 
-    by: "comments", or "heights" in a text without layer comments.
+    by: "comments", or "heights" for a text without layer comments.
     """
 
     number: NDArray[np.int64]
@@ -39,7 +38,7 @@ class Layers:
 
 
 def end_times_s(run: DryRun) -> Floats:
-    """(n,) seconds from the start to the end of each row, the waits before it included."""
+    """(n,) end time of each row, s, including the waits before it."""
     waits = np.zeros(len(run.times_s) + 1)
     for line, seconds in run.waits:
         waits[np.searchsorted(run.program.line, line)] += seconds
@@ -48,7 +47,7 @@ def end_times_s(run: DryRun) -> Floats:
 
 
 def page_kinds(program: ParsedProgram) -> NDArray[np.int8]:
-    """(n,) kinds of moves on the page: wipes and primes are kinds of their own, beads laid during turns count as beads."""
+    """(n,) kinds of moves on the page: wipes and primes have their own, beads laid while the table turns count as beads."""
     kind = program.kind.copy()
     kind[turning_strokes(program)] = MoveKind.EXTRUDE
     kind[(kind == MoveKind.TRAVEL) & (program.e_mm < -STILL)] = WIPE
@@ -57,13 +56,13 @@ def page_kinds(program: ParsedProgram) -> NDArray[np.int8]:
 
 
 def turning_strokes(program: ParsedProgram) -> NDArray[np.bool_]:
-    """(n,) moves that lay a bead while the table turns, as programs of curved layers do."""
+    """(n,) moves that lay a bead while the table turns, as in programs of curved layers."""
     mask: NDArray[np.bool_] = (program.kind == MoveKind.ROTATE) & (program.e_mm > STILL)
     return mask
 
 
 def columns(run: DryRun, profile: Profile, layers: Layers, ends_s: Floats, shown: NDArray[np.int64]) -> dict[str, Column]:
-    """The page's arrays for the shown rows of a dry run. layers, ends_s (seconds): of all rows."""
+    """The page's arrays for the shown rows of a dry run. layers, ends_s (s): of all rows."""
     program = run.program
     jumps = _jumps(program, shown)
     width, height = _bead_sizes(run, profile)
@@ -89,14 +88,14 @@ def columns(run: DryRun, profile: Profile, layers: Layers, ends_s: Floats, shown
 
 
 def _jumps(program: ParsedProgram, shown: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Places in shown of the rows that do not begin where the row before ends, the first among them."""
+    """(k,) positions in shown of rows that do not begin where the previous row ends, including the first row."""
     apart = np.abs(program.start[1:] - program.end[:-1]).max(axis=1, initial=0.0) > STILL
     begins: NDArray[np.bool_] = np.concatenate([[True], apart])[: len(program.line)]
     return np.flatnonzero(begins[shown])
 
 
 def _bead_sizes(run: DryRun, profile: Profile) -> tuple[Floats, Floats]:
-    """(n,) width and height of the beads, mm, from comments or from the filament; 0 where none is laid."""
+    """(n,) width and height of the beads, mm, from comments or from the filament; 0 for other moves."""
     program, width, height = run.program, np.zeros(len(run.times_s)), np.zeros(len(run.times_s))
     for beads in (run.deposited, beads_of(program, np.flatnonzero(turning_strokes(program)), profile)):
         width[beads.rows], height[beads.rows] = beads.width_mm, beads.height_mm
@@ -104,10 +103,10 @@ def _bead_sizes(run: DryRun, profile: Profile) -> tuple[Floats, Floats]:
 
 
 def shown_rows(program: ParsedProgram, most: int = MOST_ROWS) -> NDArray[np.int64]:
-    """(k,) places of the rows to show: all when there are no more than `most`.
+    """(k,) indices of the rows to show; all if there are at most `most`.
 
-    Points inside strokes go, in all of the print alike, those first that lie nearest to the line between their neighbours. What
-    begins or ends a stroke, a turn, a layer or a part stays, and so does every row of another kind, however many there are.
+    Points inside strokes are dropped over the whole print, those nearest to the line between their neighbours first. The ends of
+    strokes, turns, layers and parts stay, and so do all other kinds of rows, however many there are.
     """
     shown = np.arange(len(program.line))
     if len(shown) <= most:
@@ -123,7 +122,7 @@ def shown_rows(program: ParsedProgram, most: int = MOST_ROWS) -> NDArray[np.int6
 
 
 def _inside_strokes(program: ParsedProgram) -> Mask:
-    """(n,) rows whose end is no end of a stroke: the next row goes on with the same bead."""
+    """(n,) rows that do not end a stroke: the next row continues the same bead."""
     extruding = program.kind == MoveKind.EXTRUDE
     goes_on = np.zeros(len(extruding), dtype=np.bool_)
     goes_on[:-1] = extruding[1:] & extruding[:-1] & np.all(program.start[1:] == program.end[:-1], axis=1)
@@ -133,7 +132,7 @@ def _inside_strokes(program: ParsedProgram) -> Mask:
 
 
 def _off_the_chord_mm(points: Floats) -> Floats:
-    """(n,) how far each point lies from the line through its neighbours; 0 at both ends."""
+    """(n,) distance of each point from the line through its neighbours, mm; 0 at both ends."""
     off = np.zeros(len(points))
     chord, arm = points[2:] - points[:-2], points[1:-1] - points[:-2]
     length2 = np.maximum((chord * chord).sum(axis=1), 1e-12)
@@ -143,7 +142,7 @@ def _off_the_chord_mm(points: Floats) -> Floats:
 
 
 def _alternate(marked: Mask) -> Mask:
-    """Every second of marks that follow each other, so that no two neighbours are left."""
+    """Every second one of adjacent marks, so that no two neighbours are left."""
     places = np.arange(len(marked))
     begun = np.maximum.accumulate(np.where(marked & ~np.append(False, marked[:-1]), places, -1))
     alternate: Mask = marked & ((places - begun) % 2 == 0)
@@ -151,7 +150,7 @@ def _alternate(marked: Mask) -> Mask:
 
 
 def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
-    """The layers of a program. layer_height_mm: by how much a helix rises until it is a new layer."""
+    """The layers of a program. layer_height_mm: rise after which a helix begins a new layer."""
     commented = program.layers > 0
     number = program.layer.astype(np.int64) if commented else _by_heights(program, layer_height_mm)
     changes = np.ones(len(number), dtype=np.bool_)
@@ -163,9 +162,9 @@ def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
 
 
 def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.int64]:
-    """(n,) numbers of layers: a level stroke at another height begins one, and so does a rise of a layer's height in a helix.
+    """(n,) layer numbers: a new layer begins at a level stroke at another height, or after a helix has risen by a layer height.
 
-    Beads laid while the table turns have no height of their own: they are one layer, or continue the one before.
+    Beads laid while the table turns have no height of their own: they form one layer, or continue the previous one.
     """
     number = np.zeros(len(program.line), dtype=np.int64)
     number[np.flatnonzero((program.kind == MoveKind.ROTATE) & (program.e_mm > 0.0))[:1]] = 1
@@ -186,7 +185,7 @@ def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.in
 
 
 def sums_of_parts(program: ParsedProgram, layers: Layers, ends_s: Floats) -> list[dict[str, Any]]:
-    """Layers, time and filament of each part; without ;PART: comments all is part 0. ends_s: (n,) when each row ends."""
+    """Layers, time and filament of each part; without ;PART: comments all rows are part 0. ends_s: (n,) end time of each row."""
     seconds, sums = np.diff(ends_s, prepend=0.0), []
     for index in program.parts or (0,):
         rows = np.flatnonzero(program.part == index)
@@ -204,7 +203,7 @@ def sums_of_parts(program: ParsedProgram, layers: Layers, ends_s: Floats) -> lis
 def layer_columns(
     program: ParsedProgram, layers: Layers, ends_s: Floats, height_mm: Floats, shown: NDArray[np.int64]
 ) -> dict[str, Column]:
-    """The table of layers. ends_s, height_mm: (n,) of all rows; first and rows are commented in places of the shown rows."""
+    """The table of layers. ends_s, height_mm: (n,) of all rows; layer_first and layer_rows count shown rows."""
     first, last = layers.first, layers.first + layers.rows
     part = program.part[first]
     seconds = np.concatenate([[0.0], ends_s])
@@ -223,7 +222,7 @@ def layer_columns(
 
 
 def _ground(part: Indices32, top: Floats, height_mm: Floats, layers: Layers) -> Floats:
-    """(l,) machine Z at which the part of each layer begins: its first layer's beads less their height."""
+    """(l,) machine Z at which the part of each layer begins: the top of its first layer minus the bead height."""
     parts, places, back = np.unique(part, return_index=True, return_inverse=True)
     thick = np.array(
         [height_mm[a : a + n].max(initial=0.0) for a, n in zip(layers.first[places], layers.rows[places], strict=True)]

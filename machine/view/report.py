@@ -1,7 +1,6 @@
-"""Report: what stands beside the picture: figures of the print, its parts, its kinds of line, its alternatives,
-and the settings that it was made with: first what differs from the defaults, then everything.
+"""Report beside the picture: figures of the print, its parts, line kinds and alternatives, and its settings.
 
-All values are texts ready to show, so that the page has nothing to work out.
+All values are texts ready to be shown, so that the page computes nothing.
 """
 
 import json
@@ -32,24 +31,24 @@ Row = list[str]
 MOVES = {
     MoveKind.TRAVEL: "travel", MoveKind.RETRACT: "retraction", PRIME: "prime", WIPE: "wipe", MoveKind.ROTATE: "turning the table",
 }  # fmt: skip
-UNTOLD = "not told"
+UNKNOWN = "unknown"
 COMPARED = "Compared"
 COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "stairs mm²", "findings", "risky mm²")
 STANDS_ON = "base cm³"
-CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
+CUT = "base: plastic that the interface below the part adds, compared with a print in one piece"
 LAID = ["contact %", "plastic %"]
 CONTACT = (
-    "contact: of the joint's section, what beads of the first layer cover and earlier parts reach up to; plastic: what that "
-    "layer gets of what the room below its tip holds there"
+    "contact: share of the joint's section that is covered by beads of the first layer and supported by earlier parts; plastic: "
+    "volume of these beads as a share of the room below the nozzle"
 )
-BREAKS = "breaks: pushed sideways at the end of its arm, the farthest place of what it holds; an estimate of the cold weld alone"
-RISKY = "risky: faces that would need support if the model were printed in one piece as it lies now; left: as the part is printed"
+BREAKS = "breaks: force sideways at the end of the arm, the farthest point that it holds; an estimate of the cold weld alone"
+RISKY = "risky: faces that would need support in one piece in the present orientation; left: as the part is printed"
 
 
 def parts_report(
     decomposition: Decomposition, profile: Profile, joints: Sequence[Joint], alternatives: Sequence[Alternative] = ()
 ) -> dict[str, Any]:
-    """The report of a page of parts alone; alternatives: as they print, where that was tried."""
+    """The report of a page of parts alone; alternatives: their costs, if known."""
     facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
     rows = [_solid(part, profile) for part in decomposition.parts]
     parts = _table("Parts", SOLID, rows, [RISKY])
@@ -76,7 +75,7 @@ def print_report(
 ) -> dict[str, Any]:
     """The report of a whole print. parts: sums_of_parts(); joints: of a known model; alternatives: the model in one part.
 
-    known: the machine is no guess; ours: the file was made with this profile, else its settings are left out.
+    known: the machine is not a guess; ours: the file was made with this profile, otherwise its settings are left out.
     """
     tables = [_parts(program, parts, profile), _kinds(program.run, profile, "" if known else profile.machine.name)]
     tables += _joints(joints) or _interfaces(program.run)
@@ -89,7 +88,7 @@ def print_report(
 
 
 def with_alternatives(report: dict[str, Any], alternatives: Sequence[Alternative]) -> dict[str, Any]:
-    """The report of a print from a model, the alternatives in the place of the areas that are compared at no cost."""
+    """Replace the table of areas, which costs nothing to compute, by one of the alternatives."""
     tables = [_alternatives(alternatives) if table["title"] == COMPARED else table for table in report["tables"]]
     return report | {"tables": tables}
 
@@ -102,7 +101,7 @@ SOLID = ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²"]
 
 
 def _solid(part: Part, profile: Profile) -> Row:
-    """A part's shape: pose, volume, and the faces that would and will need support."""
+    """A part's pose, volume, and areas that would need and will need support."""
     before = risky_before_mm2(part, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
     angles = [f"{part.pose.tilt_deg:.1f}°", f"{part.pose.turn_deg:.1f}°"]
     areas = [f"{max(area, 0.0):.1f}" for area in (before, part.risky_area_mm2)]
@@ -110,7 +109,7 @@ def _solid(part: Part, profile: Profile) -> Row:
 
 
 def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) -> Table:
-    """Each part with its layers, time and material; with its shape where the program came from a model."""
+    """Table of the parts with layers, time and material, and with their shapes if the model is known."""
     decomposition = program.decomposition
     solids = {part.index: _solid(part, profile) for part in decomposition.parts} if decomposition is not None else {}
     interfaces = program.interface_mm3
@@ -125,7 +124,7 @@ def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) 
 
 
 def _joints(joints: Sequence[Joint]) -> list[Table]:
-    """Every joint: its area and seam, the contact of its first layer where it is sliced, and its strength."""
+    """Table of the joints with area, seam, strength, and contact of the first layer if sliced."""
     sliced = any(joint.contact_share is not None for joint in joints)
     weakest, rows = weakest_of(joints), []
     for joint in joints:
@@ -140,7 +139,7 @@ def _joints(joints: Sequence[Joint]) -> list[Table]:
 
 
 def _interfaces(run: DryRun) -> list[Table]:
-    """The joints of a program without a model, from its G-code alone."""
+    """Table of the joints of a program without a model, from its G-code alone."""
     rows = [[str(face.part), f"{face.area_mm2:.1f}", *_laid(face.contact, face.over_room)] for face in run.interfaces]
     return [_table("Joints", ["part", "mm²", *LAID], rows, [CONTACT])] if rows else []
 
@@ -150,7 +149,7 @@ def _laid(contact: float | None, over_room: float | None) -> Row:
 
 
 def _front(decomposition: Decomposition) -> list[Table]:
-    """The best decomposition for every number of parts; none where there is no choice."""
+    """Table of the best decomposition for each number of parts; none if there is no choice."""
     front = decomposition.front
     if len(front) < 2:
         return []
@@ -161,20 +160,20 @@ def _front(decomposition: Decomposition) -> list[Table]:
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
         rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
     notes = [f"taken: {row.reason}" for row in front if row.chosen]
-    notes.append("--parts takes another row; time and filament are estimates")
+    notes.append("--parts selects another row; time and filament are estimates")
     return [
         _table("In how many parts", ["parts", "support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "m"], rows, notes)
     ]
 
 
 def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
-    """Time and material by kind of line, then of travels, then of waits; they add up to the whole print.
+    """Table of time and material by kind of line, then travels, then waits, which add up to the whole print.
 
-    guess: name of the machine whose speeds were used where the file names none.
+    guess: name of the machine whose speeds were used if the file names none.
     """
     program, kind = run.program, page_kinds(run.program)
     groups: list[tuple[str, NDArray[np.bool_]]] = [
-        (name or UNTOLD, (kind == MoveKind.EXTRUDE) & (program.type == index)) for index, name in enumerate(program.types)
+        (name or UNKNOWN, (kind == MoveKind.EXTRUDE) & (program.type == index)) for index, name in enumerate(program.types)
     ]
     groups += [(name, kind == number) for number, name in MOVES.items()]
     spent = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
@@ -189,7 +188,7 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
 
 
 def _areas(decomposition: Decomposition, profile: Profile) -> Table:
-    """Risky area straight up, in the best single orientation, in parts."""
+    """Table of the risky area straight up, in the best single orientation, and in parts."""
     best = best_orientation(decomposition.mesh, profile.process.self_supporting_angle_deg)
     turned = set_on_plate(decomposition.mesh, best.rotation)
     single = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
@@ -201,12 +200,12 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
     whole = decomposition.risky_area_mm2
     rows = [[name, f"{max(area, 0.0):.1f}", _share(whole - area, whole)] for name, area in risky_mm2]
     rows[0][2] = ""
-    notes = [f"best single orientation: {in_words(best)}", "--compare tells time and material too"]
+    notes = [f"best single orientation: {in_words(best)}", "--compare also reports time and material"]
     return _table(COMPARED, ["print", "risky mm²", "less"], rows, notes)
 
 
 def _alternatives(alternatives: Sequence[Alternative]) -> Table:
-    """This print beside the model in one part, a row for each cost: a row for each way would be broader than a phone."""
+    """Table of this print beside the model in one part; a row per alternative would be too wide for a phone."""
     columns = []
     for way in alternatives:
         costs = ["-"] * 8
@@ -243,12 +242,12 @@ def _names(profile: Profile) -> list[Row]:
 
 def _assumptions(profile: Profile, known: bool) -> list[Row]:
     """The rows of _names() for a file that does not name them."""
-    machine = profile.machine.name if known else f"{UNTOLD}: limits, clearance and the plate were not judged"
-    return [["machine", machine], ["material", f"{UNTOLD}: weights as of {profile.material.name}"]]
+    machine = profile.machine.name if known else f"{UNKNOWN}: limits, clearance and the plate were not checked"
+    return [["machine", machine], ["material", f"{UNKNOWN}: masses for {profile.material.name}"]]
 
 
 def _format_fixed(value: float, digits: int) -> str:
-    """The value with `digits` digits, without a sign where they are all 0."""
+    """The value with `digits` digits, without the sign of a negative zero."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
@@ -261,9 +260,9 @@ def _cm3(volume_mm3: float) -> str:
 
 
 def settings_tables(profile: Profile) -> list[Table]:
-    """Two tables: keys whose values differ from the usual ones, beside these; then all keys with their meanings.
+    """Two tables: keys whose values differ from the defaults, beside these; then all keys with their meanings.
 
-    Usual are the values of the default material and process, and those of the shipped machine of this name.
+    Defaults are the values of the default material and process, and those of the shipped machine of this name.
     """
     usual = _usual(profile)
     changed, every = [], []
@@ -276,9 +275,9 @@ def settings_tables(profile: Profile) -> list[Table]:
     for part in profile.parts:
         shared = profile.process.model_dump(mode="json")
         changed += [[f"part {part.part}: process.{key}", _text(value), _text(shared[key])] for key, value in part.process.items()]
-    notes = [] if changed else ["all settings are the usual ones"]
+    notes = [] if changed else ["all settings have their default values"]
     return [
-        _table("Settings changed", ["setting", "value", "usual"], changed, notes),
+        _table("Settings changed", ["setting", "value", "default"], changed, notes),
         _table("All settings", ["setting", "value", "meaning"], every, folded=True),
     ]
 
@@ -288,17 +287,17 @@ def _usual(profile: Profile) -> dict[str, Frozen]:
     for kind, sections in OF_KIND.items():
         models = load_one(_shipped_machine(profile.machine.name) if kind == "machine" else DEFAULTS[kind])
         usual |= {section: models[section] for section in sections}
-    spans = {"bridge_longest_mm": profile.material.bridge_longest_mm}  # a process that says nothing leaves it to the material
+    spans = {"bridge_longest_mm": profile.material.bridge_longest_mm}  # the material determines it unless the process does
     return usual | {"process": usual["process"].model_copy(update=spans)}
 
 
 def _shipped_machine(name: str) -> str:
-    """The shipped profile of the machine that people call so; the default one when none does."""
+    """Name of the shipped profile of the machine with this name, else of the default one."""
     for file in shipped("machine"):
         try:
             if getattr(load_one(file)["machine"], "name", None) == name:
                 return file
-        except ProfileError:  # the user's own in its place is broken, and is not asked for here
+        except ProfileError:  # the user's own profile of the same name is invalid, which does not matter here
             continue
     return DEFAULTS["machine"]
 

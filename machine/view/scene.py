@@ -1,4 +1,4 @@
-"""Scene: what the page shows in space: surfaces of the parts, the machine's bodies and axes, and the places of the findings."""
+"""Scene: the spatial content of the page: surfaces of the parts, bodies and axes of the machine, positions of the findings."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -47,7 +47,7 @@ def _marks(part: Part, profile: Profile) -> NDArray[np.int64]:
 
 
 def solids(decomposition: Decomposition, profile: Profile, joints: Sequence[Joint]) -> list[dict[str, Any]]:
-    """Records of each part for the header: pose, base plane, joint and place in the surfaces."""
+    """Header records of the parts: pose, base plane, joint and position in the surfaces."""
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
     by_part = {joint["part"]: joint for joint in joint_values(joints)}
     records, vertex, face = [], 0, 0
@@ -74,7 +74,7 @@ def solids(decomposition: Decomposition, profile: Profile, joints: Sequence[Join
 
 
 def _foot(part: Part) -> tuple[Floats, float]:
-    """Centre and radius of a disc in the base plane that covers what lies in it; the whole part's shadow where nothing does."""
+    """Centre and radius of a disc in the base plane that covers the part's contact face, or else the projection of the part."""
     heights = part.base.heights_mm(part.mesh.vertices)
     low = heights <= max(float(heights.min()), 0.0) + FOOT_MM
     flat = part.mesh.vertices[low] - heights[low, None] * part.base.normal
@@ -83,7 +83,7 @@ def _foot(part: Part) -> tuple[Floats, float]:
 
 
 def machine_bodies(machine: Machine, known: bool) -> dict[str, Any]:
-    """The machine as the page moves it."""
+    """The machine's axes and bodies, for the page to move."""
     return {
         "name": machine.name,
         "known": known,
@@ -106,12 +106,12 @@ def _axis(axis: RotaryAxis) -> dict[str, Any]:
 
 
 def relevant_findings(run: DryRun, known: bool) -> list[Finding]:
-    """The findings in their order; known: False leaves out those that need the right machine."""
+    """The findings in their order, without those that depend on the machine if that is not known."""
     return [finding for finding in run.findings if known or finding.code not in MACHINES_OWN]
 
 
 def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[np.int64]) -> list[dict[str, Any]]:
-    """The relevant findings for the page; row: the row that shows it, -1 for a finding about the whole."""
+    """The relevant findings for the page; row: the row that shows it, -1 for a finding about the whole print."""
     program = run.program
     records = []
     for finding in relevant_findings(run, known):
@@ -131,7 +131,7 @@ def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[n
 
 
 def _row(program: ParsedProgram, finding: Finding) -> int:
-    """The first row from the finding's line on, or of the layer it names when that lies elsewhere; n for one about the whole."""
+    """Row of the finding's line, or of its layer's first stroke if the line is not in that; n for one about the whole print."""
     if finding.line <= 0:
         return len(program.line)
     row = int(np.searchsorted(program.line, finding.line))

@@ -1,8 +1,8 @@
-"""Text: the G-code of a print as patterns of its lines, which the rows of the page fill.
+"""Text: the G-code of a print as patterns of its lines, which the rows of the page fill in.
 
-The rows tell of a move's line all but its form: `G1 X12.500 Y3.250 E0.04214` is the pattern `G1 X. Y. E.` with holes for numbers.
-So some thousand patterns, and for each line its place among them, are the whole text, letter for letter, in a hundredth of
-what it takes compressed by itself.
+The rows contain everything but the form of a move's line: `G1 X12.500 Y3.250 E0.04214` is the pattern `G1 X. Y. E.` with holes
+for numbers. Some thousand patterns and a pattern index per line reproduce the text exactly, in a hundredth of its compressed
+size.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from machine.view.encoding import Column, whole
 
-MOST_LETTERS = 1_000_000  # in all patterns together; with more the page would grow by some hundred kilobytes
+MOST_LETTERS = 1_000_000  # of all patterns together; with more the page would grow by several hundred kilobytes
 AXES, FILAMENT = "XYZ", "EUVW"
-AXIS_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point, as the page's rows are stored
-# Holes: the number in full; without its last zeros; without the zero before its point.
+AXIS_DIGITS, FILAMENT_DIGITS = 3, 5  # digits after the point, as the page's rows are stored
+# Holes: the full number; without trailing zeros; without the zero before the point.
 STEPS, SUMS = "\x01\x02\x03", "\x04\x05\x06"
-LONGEST = 15  # letters of a number: its digits fit into 64 bits
-LINES_AT_ONCE = 100_000  # so that the longest print takes little memory
+LONGEST = 15  # characters of a number: its digits fit into 64 bits
+LINES_AT_ONCE = 100_000  # limits memory for the longest print
 SPACE, BREAK, MINUS, POINT, ZERO = b" \n-.0"
 NOTHING: tuple[None, dict[str, Column]] = (None, {"text": Column(np.zeros(0), "i32", delta=True)})
 
@@ -28,8 +28,8 @@ Mask = NDArray[np.bool_]
 
 
 def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dict[str, Any] | None, dict[str, Column]]:
-    """For the header the patterns and where sums of filament begin anew, and the column of the lines' places among the patterns;
-    None and an empty column where the lines are too unlike. rows: from machine.view.paths."""
+    """Header entry with patterns and filament resets, and the column of each line's pattern index; None and an empty column if
+    the lines are too different. rows: from machine.view.paths."""
     ends = np.searchsorted(rows["line"].values, np.arange(len(lines) + 1), side="right")
     first, last = ends[:-1], ends[1:]
     pushed = np.concatenate([[0], whole(rows["filament"])])
@@ -50,7 +50,7 @@ def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dic
 
 
 def _zeros(lines: Sequence[str], pushed: Wholes) -> tuple[list[list[int]], Wholes]:
-    """Pairs of a line (from 1) and the sum of filament that counts as 0 from there on, and for each line what counts as 0."""
+    """Pairs of a line (from 1) and the filament sum that counts as 0 after it, and that sum for each line."""
     begins = [k for k, line in enumerate(lines) if line.startswith("G92 ")]
     values = [0]
     for k in begins:
@@ -61,7 +61,7 @@ def _zeros(lines: Sequence[str], pushed: Wholes) -> tuple[list[list[int]], Whole
 
 
 def _zero(line: str, pushed: int, before: int) -> int:
-    """What counts as 0 of the filament after a G92."""
+    """The filament sum that counts as 0 after a G92."""
     for word in line.split(";")[0].split():
         if word[0] in FILAMENT:
             try:
@@ -72,9 +72,9 @@ def _zero(line: str, pushed: int, before: int) -> int:
 
 
 def _with_holes(text: str, moves: Wholes) -> str:
-    """The lines with a hole instead of every number that the page's rows have.
+    """The lines with a hole in place of each number that the page's rows contain.
 
-    moves: (6, m) of the lines: 1 where one has a row, X Y Z, then the step and the sum of filament."""
+    moves: (6, m) per line: 1 if it has a row, X Y Z, then the step and the sum of filament."""
     letters = np.frombuffer(text.encode(), dtype=np.uint8)
     breaks = np.flatnonzero((letters == SPACE) | (letters == BREAK))
     start, end = np.concatenate([[0], breaks + 1]), np.concatenate([breaks, [len(letters)]])
@@ -99,8 +99,7 @@ def _with_holes(text: str, moves: Wholes) -> str:
 
 
 def _numbers(letters: NDArray[np.uint8], start: Wholes, end: Wholes) -> tuple[Wholes, Wholes, list[Mask]]:
-    """(n,) numbers as they are written: their digits as one whole number with its sign, how many of these are behind the point,
-    and whether each may be one in full; without its last zeros; without the zero before its point."""
+    """(n,) numbers as written: signed digits as an integer, count of digits after the point, and masks of the possible forms."""
     minus = letters[start] == MINUS
     first, count = start + minus, len(start)
     digits, behind, points = (np.zeros(count, dtype=np.int64) for _ in range(3))
@@ -117,12 +116,12 @@ def _numbers(letters: NDArray[np.uint8], start: Wholes, end: Wholes) -> tuple[Wh
     leading = letters[np.minimum(first, len(letters) - 1)] == ZERO
     sound &= (points == (behind > 0)) & (before + behind > 0) & ~(minus & (digits == 0))
     trimmed = (behind == 0) | (letters[end - 1] != ZERO)
-    plain = (before == 1) | ((before > 1) & ~leading)  # as many digits before the point as needed
+    plain = (before == 1) | ((before > 1) & ~leading)  # no unnecessary leading zeros
     return np.where(minus, -digits, digits), behind, [sound & plain, sound & trimmed & plain, sound & trimmed & (before == 0)]
 
 
 def _form(number: tuple[Wholes, Wholes, list[Mask]], value: Wholes, digits: int) -> Wholes:
-    """The form, from 1, in which numbers are whole values with `digits` digits behind the point; 0: in none of the three."""
+    """The form, from 1, in which numbers are integer values with `digits` digits after the point; 0: none of the three."""
     written, behind, (full, short, bare) = number
     same = (behind <= digits) & (written * 10 ** np.maximum(digits - behind, 0) == value)
     return np.select([same & full & (behind == digits), same & short, same & bare], [1, 2, 3], 0)

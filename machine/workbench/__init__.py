@@ -1,5 +1,5 @@
 """Workbench: the program's window in the browser.
 
-Rooms, each above what it imports: `bench` the values, `work` what takes time, `session` a bench with the work for it, `printing`
-what is printed, `access` who is answered, `web` the server and the page. `web.serve.serve_workbench` runs it.
+Rooms, from low to high: `bench` holds the values, `work` the long tasks, `session` a bench with its tasks, `printing` the prints,
+`access` the access control, `web` server and page. `web.serve.serve_workbench` runs it.
 """

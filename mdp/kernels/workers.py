@@ -73,7 +73,7 @@ def _read(pipe: IO[bytes], size: int) -> bytearray:
 def listen(pipe: IO[bytes], take: Callable[[Any], None], end: Callable[[], None]) -> None:
     """Pass each value received through a pipe to take(); call end() when no more can come, however the other side ended.
 
-    An unreadable message also calls end(): no process can reach this one any more.
+    An unreadable message also calls end(): no process can reach this one again.
     """
     try:
         for value in read_frames(pipe):
@@ -199,7 +199,7 @@ def _send(message: bytes) -> None:
 
 
 def serve(one_core: bool, idle_s: float) -> None:
-    """In a worker: answer calls until no process can call it any more or the idle time is over."""
+    """In a worker: answer calls until no process can call it or the idle time is over."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C does
     requests, answers = take_pipes()
     _answers.append(answers)

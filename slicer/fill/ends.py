@@ -208,7 +208,7 @@ def hold_ends(
     inside_mm = depths(np.concatenate([beads[k].points[[0, -1]] for k in skins]), index_edges(section_below)).reshape(-1, 2)
     loose = np.where(ends & (inside_mm > 0.0), CUT, np.where(ends & (inside_mm > -width_mm), EXTEND, HELD))
     needs, outline = dict(zip(skins, loose.tolist(), strict=True)), index_edges(section)
-    out, cut = list[Bead](), False  # cut: whether the bead before, which the next one would follow, was dropped
+    out, cut = list[Bead](), False  # cut: whether the previous bead, which the next one would follow, was dropped
     for k, bead in enumerate(beads):
         points, (first, last) = bead.points, needs.get(k, (HELD, HELD))
         if first:

@@ -42,7 +42,7 @@ def order_beads(
 ) -> Strokes:
     """The beads of one layer in printing order.
 
-    tip: (2,) position of the nozzle before, None at the part's start; support: its area; skin: visible wall beside joints, which
+    tip: (2,) initial position of the nozzle, None at the part's start; support: its area; skin: visible wall beside joints, which
     no travel crosses; kind_mm_s: speeds by number of the kind, which replace the process's.
     """
     if not beads:

@@ -1,4 +1,1 @@
-"""Commands: one function each, which returns an exit code and never sees the parser.
-
-`print.print_model`, `resume.resume`, `view.view`: a module bears the name of its command.
-"""
+"""One module per command; each command is a function that returns an exit code and does not know the parser."""

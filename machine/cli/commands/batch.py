@@ -1,4 +1,4 @@
-"""The batch command: every model of a folder, on many cores or machines, a row each; what is done is not done again."""
+"""The batch command: processes all models of a folder on many cores or machines, and writes a table with a row for each."""
 
 import re
 from collections import Counter
@@ -34,14 +34,14 @@ from mdp.ranking.ranker import ranker_named
 from profiles.errors import UserError, counted
 
 LOCK = "batch.lock"
-NO_FILES = "estimate"  # makes none
+NO_FILES = "estimate"  # writes no files
 CLASH = "{} would have the files of {}: another name is expected"
-REASONS = 5  # of the most common ones, told at the end
+REASONS = 5  # number of the most common ones that the summary lists
 NUMBER = re.compile(r"\d+([.,]\d+)*")
 
 
 def batch(request: BatchRequest) -> int:
-    """Do what is asked with every model of a folder; 1 unless all of them are done."""
+    """Process every model of the folder; returns 0 if all are done, else 1."""
     if request.do not in ACTIONS:
         raise UserError(f"--do {request.do}: {', '.join(ACTIONS)} is expected")
     files = model_files(request.folder)
@@ -60,7 +60,7 @@ def batch(request: BatchRequest) -> int:
             _work_off(request, job, files, rows, table)
         except KeyboardInterrupt:
             done = sum(name in rows for name in files)
-            say(f"{done} of {len(files)} models have a row in {table}; started again, it goes on there")
+            say(f"{done} of {len(files)} models have a row in {table}; a repeated run continues there")
             raise
         finally:
             write_rows(table, Row, _in_order(rows))
@@ -70,7 +70,7 @@ def batch(request: BatchRequest) -> int:
 
 
 def model_files(folder: Path) -> dict[str, Path]:
-    """The models of a folder by name, absolute. Raises UserError for a folder without any."""
+    """The models of a folder: name -> absolute path. Raises UserError if there are none."""
     if not folder.is_dir():
         raise UserError(f"{folder}: there is no such folder; models are expected in it")
     files = (file for file in folder.resolve().iterdir() if file.suffix.lower() in READERS and not file.name.startswith("."))
@@ -81,7 +81,7 @@ def model_files(folder: Path) -> dict[str, Path]:
 
 
 def is_current(row: Row, file: Path, job: Job) -> bool:
-    """Whether a row of an earlier run still holds: same model, same options, files there, and no failure that may pass."""
+    """Whether an earlier run's row is valid: same model and options, its files exist, and it is not a failure that may pass."""
     files = row.files.split(BETWEEN) if row.files else []
     return row.status != FAILED and all((job.out / name).is_file() for name in files) and row.inputs == inputs_of(file, job)
 
@@ -91,14 +91,14 @@ def _in_order(rows: Mapping[str, Row]) -> list[Row]:
 
 
 def _delete_files(out: Path, row: Row) -> None:
-    """Nobody shall print what an earlier run has made of another model or by other options."""
+    """Delete the files of an outdated row, so that no one prints them by mistake."""
     for name in row.files.split(BETWEEN) if row.files else ():
         if (out / name).resolve().is_relative_to(out):
             delete(out / name)
 
 
 def _rows_that_hold(table: Path, files: Mapping[str, Path], job: Job) -> dict[str, Row]:
-    """The rows of earlier runs that need not be done again, those of models that are gone included."""
+    """Rows of earlier runs that are valid, including those of models that have been removed."""
     earlier = {row.model: row for row in read_rows(table, Row)}
     stems = {_stem(name) for name in files}
     gone = {name for name, row in earlier.items() if name not in files and not (row.files and _stem(name) in stems)}
@@ -107,13 +107,13 @@ def _rows_that_hold(table: Path, files: Mapping[str, Path], job: Job) -> dict[st
         _delete_files(job.out, earlier[name])
     done = sum(name in rows for name in files)
     if done:
-        others = ": going on with the others" if done < len(files) else ""
-        say(f"{done} of {len(files)} models have been done before{others}")
+        others = ": continuing with the others" if done < len(files) else ""
+        say(f"{done} of {len(files)} models were done before{others}")
     return rows
 
 
 def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: dict[str, Row], table: Path) -> None:
-    """Add the missing rows, to the table at once."""
+    """Process the models without a row, and append each result to the table at once."""
     calls = {name: (file, job) for name, file in files.items() if name not in rows}
     if not calls:
         return
@@ -130,30 +130,30 @@ def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: 
 
 
 def in_words(row: Row) -> str:
-    """What came of a model, for a person who waits."""
+    """One line that reports the result of a model."""
     parts = f"{row.parts} part{'s' * (row.parts > 1)}, {duration(row.time_s)}"
     return f"{row.model}: {row.sentence.removeprefix(f'{row.model}: ') or parts}"
 
 
 def same_files(names: Iterable[str]) -> dict[str, str]:
-    """The models whose files would be those of another one, by the name of that."""
+    """Models whose output files would overwrite those of another model: name -> name of the other one."""
     firsts: dict[str, str] = {}
     return {name: first for name in sorted(names) if (first := firsts.setdefault(_stem(name), name)) != name}
 
 
 def _stem(name: str) -> str:
-    """What tells the files of a model from those of others; case does not count on some systems."""
+    """Stem that a model's output files share, case folded because some file systems ignore case."""
     return Path(name).stem.casefold()
 
 
 def _compile(job: Job) -> None:
-    """Compile once what every process of this machine needs."""
+    """Compile the kernels that all processes of this machine share once, before these start."""
     program = compilers.bundles_to_build(job.asked.profile) if job.do == "export" else ()
     compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH, *program))
 
 
 def summary(rows: Iterable[Row], table: Path) -> str:
-    """What came of all models, what printing them takes, and why the others are not done."""
+    """Counts of all results, total time and filament, and the most common reasons of failures."""
     rows = list(rows)
     counts = Counter(row.status for row in rows)
     text = f"{counted(len(rows), 'model')}: " + ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
@@ -166,8 +166,7 @@ def summary(rows: Iterable[Row], table: Path) -> str:
 
 
 def reasons(rows: Iterable[Row]) -> list[tuple[str, int]]:
-    """The most common sentences of models that are not done, and how many models each is said of; names and numbers in them
-    do not count, those of the first model stand for all."""
+    """Most common reasons why models are not done, with counts; reasons that differ only in names and numbers count as one."""
     firsts: dict[str, str] = {}
     counts: Counter[str] = Counter()
     for row in rows:

@@ -1,4 +1,4 @@
-"""A printer at a port without a print: the ports command lists what answers where, the console talks to one line by line."""
+"""The ports and console commands: list what answers at each port, and talk to a printer line by line."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 PROMPT = "> "
 AT_ONCE_S = 0.5
-HELP = """What you type is sent, one line after the other is answered. Besides:
+HELP = """Each line that you type is sent and answered. Further commands:
   /help     this
   /reports  show or hide temperature reports
   /stop     emergency stop (M112) at once, even while a command is under way
@@ -59,7 +59,7 @@ COLOURS: dict[Kind, str] = {
 
 
 def console(request: ConsoleRequest, machine: Machine) -> int:
-    """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
+    """Talk to a printer. Returns 0 when the user leaves, 130 after Ctrl-C, 1 if a piped command was not known."""
     at = parse_printer(request.port, request.baud, request.sim_speed)
     if request.log is not None:
         check_writable(request.log)
@@ -76,14 +76,14 @@ def console(request: ConsoleRequest, machine: Machine) -> int:
             if direction == "<":
                 shown.hear(data)
 
-        hint = "; /help tells what can be typed" if sys.stdin.isatty() else ""
+        hint = "; /help lists the commands" if sys.stdin.isatty() else ""
         say(describe_answer(identify_printer(wire, rate, halted=True), rate) + hint)
         session = CommandSession(TappedWire(wire, tell), dialect_of(machine).longest_line)
         return _Console(session, shown, request.leave_heaters).run()
 
 
 class _Console:
-    """One console from the greeting to a safe end."""
+    """A console session, from the greeting until the heaters are safe."""
 
     def __init__(self, session: CommandSession, shown: Shown, leave_heaters: bool) -> None:
         self._session, self._shown, self._leave_heaters = session, shown, leave_heaters
@@ -93,7 +93,7 @@ class _Console:
         self._interrupted = False
 
     def run(self) -> int:
-        """The exit code. Raises PrinterError, and whatever went wrong, after the heaters were switched off."""
+        """Return the exit code. Raises PrinterError and any other error after the heaters have been switched off."""
         typed, code, session = sys.stdin.isatty(), 0, self._session
         heated, unknown = "", list[str]()
         with session:
@@ -109,7 +109,7 @@ class _Console:
             finally:
                 self._shown.quiet = True
             if session.restarts:
-                session.keep_heat = True  # the restart switches the heaters off, and nobody listens meanwhile
+                session.keep_heat = True  # the restart switches the heaters off, and the firmware answers nothing meanwhile
                 say("the printer restarts, its heaters are off: the next console or print waits until it is ready")
                 return code
             if session.exchange.greeted:
@@ -123,7 +123,7 @@ class _Console:
         return code
 
     def _piped(self) -> None:
-        """Every line of a pipe, one after the other."""
+        """Send the lines of a pipe one after the other."""
         for line in sys.stdin:
             if self._meant_for_us(line.strip()):
                 return
@@ -131,7 +131,7 @@ class _Console:
                 self._session.command(line)
 
     def _typed(self) -> None:
-        """What a person types; a thread of its own keeps listening meanwhile."""
+        """Read lines at a prompt while a thread talks to the printer."""
         prompt = _prompt_session()
         worker = threading.Thread(target=self._serve, args=(prompt.app,), name="console", daemon=True)
         worker.start()
@@ -140,12 +140,12 @@ class _Console:
         finally:
             self._part_from(worker)
             if self._waiting:
-                say(f"not sent any more: {', '.join(self._waiting)}")
+                say(f"not sent: {', '.join(self._waiting)}")
         if self._error is not None:
             raise self._error
 
     def _part_from(self, worker: threading.Thread) -> None:
-        """Let the other thread end whatever interrupts: two must not talk at the same time."""
+        """Wait until the thread has ended, through all interrupts: only one thread may talk to the printer."""
         while worker.is_alive():
             with suppress(KeyboardInterrupt):
                 self._session.order(LeftError)
@@ -156,7 +156,7 @@ class _Console:
             try:
                 line = self._read_line(prompt)
             except EOFError:
-                if not sys.stdin.isatty():  # the terminal was closed: its end can be read before its signal comes
+                if not sys.stdin.isatty():  # a closed terminal can reach its end of file before the signal comes
                     raise KeyboardInterrupt from None
                 return
             if self._meant_for_us(line):
@@ -165,7 +165,7 @@ class _Console:
                 self._hand_over(line)
 
     def _read_line(self, prompt: PromptSession[str]) -> str:
-        """What is typed at the prompt. Raises EOFError, and KeyboardInterrupt when the prompt has put everything in order."""
+        """Read a line at the prompt. Raises EOFError, and KeyboardInterrupt once the prompt has restored the terminal."""
         with calling(lambda: self._interrupt(prompt.app)), self._shown.above(prompt.app):
             line = prompt.prompt(PROMPT, pre_run=lambda: self._begin_prompt(prompt.app)).strip()
         if self._interrupted:
@@ -179,10 +179,10 @@ class _Console:
         self._call_prompt(app)
 
     def _call_prompt(self, app: Application[str]) -> None:
-        """Have the prompt look whether it must end."""
+        """Make the prompt check whether it must end."""
         loop = app.loop
         if loop is not None:
-            with suppress(RuntimeError):  # the prompt has just ended, and its loop with it
+            with suppress(RuntimeError):  # the prompt and its loop have just ended
                 loop.call_soon_threadsafe(self._end_prompt, app)
 
     def _begin_prompt(self, app: Application[str]) -> None:
@@ -190,12 +190,12 @@ class _Console:
         self._end_prompt(app)
 
     def _end_prompt(self, app: Application[str]) -> None:
-        """Leave the prompt for an interrupt or an error of the other thread, also one that came before it could hear of it."""
+        """End the prompt after an interrupt or an error of the other thread, including one from before the prompt began."""
         if (self._interrupted or self._error is not None) and app.is_running and not app.is_done:
             app.exit(exception=KeyboardInterrupt if self._interrupted else EOFError)
 
     def _hand_over(self, line: str) -> None:
-        """Let the thread send a line; what is answered at once comes before the next prompt, what takes longer above it."""
+        """Let the thread send a line, and wait briefly, so that a quick answer appears before the next prompt."""
         self._done.clear()
         self._waiting.append(line)
         self._done.wait(AT_ONCE_S)
@@ -213,13 +213,13 @@ class _Console:
                 self._done.set()
         except LeftError:
             return
-        except BaseException as error:  # noqa: BLE001 - a bug, too, ends the console: run() raises it, the heaters off
+        except BaseException as error:  # noqa: BLE001 - a bug, too, ends the console: run() raises it once the heaters are off
             self._error = error
             self._done.set()
             self._call_prompt(app)
 
     def _meant_for_us(self, line: str) -> bool:
-        """Do what a line with a slash means; True when it means to leave."""
+        """Execute a line that is addressed to the console; returns True if it ends the console."""
         word = line.lower()
         if word == "/stop" or word.split(" ")[0].split("*")[0] == "m112":
             raise StopError
@@ -234,7 +234,7 @@ class _Console:
 
 
 def _agreed(heated: str) -> bool:
-    """Whether heaters that are on are to be switched off: anything but a plain no agrees."""
+    """Ask whether to switch the heaters off; anything but an answer that begins with n means yes."""
     try:
         return not input(f"{heated}: switch off? [Y/n] ").strip().lower().startswith("n")
     except (EOFError, KeyboardInterrupt):
@@ -242,31 +242,31 @@ def _agreed(heated: str) -> bool:
 
 
 def _prompt_session() -> PromptSession[str]:
-    """A prompt that knows the lines typed in earlier consoles, by the arrow keys, and leaves its own for later ones."""
+    """A prompt with a history that is shared by all consoles."""
     from prompt_toolkit import PromptSession
     from prompt_toolkit.history import FileHistory
     from prompt_toolkit.output.defaults import create_output
 
     output = create_output()
-    setattr(output, "enable_cpr", False)  # noqa: B010 - only menus need to know where the cursor stands, and not all terminals tell
+    setattr(output, "enable_cpr", False)  # noqa: B010 - only menus need the cursor's position, which not all terminals report
     return PromptSession(history=FileHistory(str(state_folder() / "console_lines")), output=output)
 
 
 class Shown:
-    """Prints what the printer says, line by line; on a terminal in colours, and above the line that is being typed."""
+    """Prints the printer's output line by line: in colour at a terminal, and above the line that the user is typing."""
 
     def __init__(self, reports: bool) -> None:
         self.reports = reports
         self.quiet = True
         self._half = b""
-        self._busy = 0  # in a row
+        self._busy = 0  # consecutive busy messages
         self._lock = threading.Lock()
-        self._lines: list[str] = []  # that wait to be written above the prompt
-        self._app: Application[str] | None = None  # the prompt, while there is one
+        self._lines: list[str] = []  # waiting to be written above the prompt
+        self._app: Application[str] | None = None  # the active prompt
         self._colours = sys.stdout.isatty() and "NO_COLOR" not in os.environ
 
     def hear(self, data: bytes) -> None:
-        """Take what was received."""
+        """Add received bytes."""
         *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
         self._half = self._half[-4096:]
         for line in lines:
@@ -290,20 +290,20 @@ class Shown:
         self.write(f"\x1b[{colour}m{text}\x1b[0m" if colour and self._colours else text)
 
     def write(self, text: str) -> None:
-        """One line; while a person types it is put above the line that is being typed. Any thread may call this."""
+        """Print one line, above the prompt if there is one. Thread-safe."""
         with self._lock:
             self._lines.append(text)
             if self._app is None:
                 self._print_lines()
             elif len(self._lines) > 1:
-                return  # what waits is written together
-            elif (loop := self._app.loop) is not None:  # without one the prompt is about to begin and writes them first
-                with suppress(RuntimeError):  # it has just ended: above() writes them
+                return  # lines that wait are written together
+            elif (loop := self._app.loop) is not None:  # without a loop the prompt is about to begin, and writes them first
+                with suppress(RuntimeError):  # the prompt has just ended: above() writes them
                     loop.call_soon_threadsafe(self.write_above)
 
     @contextmanager
     def above(self, app: Application[str]) -> Iterator[None]:
-        """Write lines above this prompt, from its own thread, so that they never come between two moves of its cursor."""
+        """Write lines above this prompt and from its thread, so that they never interrupt its cursor movements."""
         try:
             with self._lock:
                 self._app = app
@@ -314,7 +314,7 @@ class Shown:
                 self._print_lines()
 
     def write_above(self) -> None:
-        """Write what waits; the prompt's thread calls this."""
+        """Write the waiting lines; must be called by the prompt's thread."""
         from prompt_toolkit.application import run_in_terminal
 
         def print_lines() -> None:
@@ -331,16 +331,16 @@ class Shown:
 
 
 def ports(baud: int, as_json: bool, ask: bool) -> int:
-    """List ports on stdout: those in /dev/serial/by-id first, running simulators of this user last. ask=False: none is opened.
+    """List ports on stdout: those of /dev/serial/by-id first, this user's simulators last; 0 even if there are none.
 
-    0 also when there is none.
+    ask: open each port and identify what answers.
     """
     check_baud(baud)
     devices = known_ports()
     if not devices:
         say("no serial port was found: plug the printer in and switch it on")
     elif ask:
-        say(f"asking {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {LONGEST_S:.0f} s")
+        say(f"querying {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {LONGEST_S:.0f} s")
     reports = ask_ports(devices, baud, threading.Event()) if ask else [PortReport(device) for device in devices]
     if as_json:
         write_json(STDOUT, [port_json(report) for report in reports])

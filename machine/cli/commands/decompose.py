@@ -1,4 +1,4 @@
-"""The decompose command: a model's parts as files, pictures and a table, and which way to print it is the best."""
+"""The decompose command: a model's parts as files, pictures and tables, with advice on the best way to print it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +23,7 @@ from profiles.profile import Profile
 
 
 def decompose(request: ModelRequest) -> int:
-    """Find the parts of a model and save what is asked for; to compare them they are sliced, and the model in one part."""
+    """Find the parts of a model and write the requested outputs; a comparison slices the parts, and the model in one part."""
     outputs = request.outputs
     check_model_files(request, ())
     decomposed = decompose_model(request)
@@ -53,7 +53,7 @@ def decompose(request: ModelRequest) -> int:
 
 
 def _is_same(file: Path, plan: Path | None) -> bool:
-    """Whether a file is the plan that was cut by: it stays as the person left it."""
+    """Whether a file is the plan that defined the cuts, which stays as the user wrote it."""
     return plan is not None and file.resolve() == plan.resolve()
 
 
@@ -70,8 +70,8 @@ def _draw(outputs: Outputs, decomposition: Decomposition, profile: Profile) -> N
 
 
 def advice(decomposition: Decomposition, profile: Profile) -> str:
-    """In one piece, in the parts that were made and in those that were not asked for but cost less: what each takes; then a line
-    with the best of them."""
+    """Table of support, time and filament in one part, in the chosen parts and in the cheapest parts, and a line with the
+    best."""
     advised = _advised(decomposition, profile)
     rows = [row for row in decomposition.front if row.parts == 1 or row.chosen or row is advised] or _without_front(decomposition)
     ways = [(in_parts(row.parts), row) for row in rows]
@@ -82,7 +82,7 @@ def advice(decomposition: Decomposition, profile: Profile) -> str:
 
 
 def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
-    """The row that was chosen, or the cheapest one where a person chose; None where there is no front."""
+    """The chosen row, or the cheapest one if the user chose; None without a front."""
     chosen, front = decomposition.chosen, decomposition.front
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen
@@ -91,7 +91,7 @@ def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
 
 
 def _without_front(decomposition: Decomposition) -> list[FrontRow]:
-    """The rows of parts that come from no search."""
+    """Rows for parts that come from no search."""
     whole = FrontRow((), decomposition.risky_area_mm2, 0.0, decomposition.risky_area_mm2)
     planes = tuple(part.base for part in decomposition.parts[1:])
     parts = FrontRow(planes, decomposition.residual_area_mm2, 0.0, decomposition.residual_area_mm2)
@@ -99,7 +99,7 @@ def _without_front(decomposition: Decomposition) -> list[FrontRow]:
 
 
 def _ways_table(ways: Sequence[tuple[str, FrontRow]]) -> str:
-    """Each way with what needs support then, how much less that is than in the first one, its seams, time and filament."""
+    """Table with support area, saving against the first row, seams, stair-stepping, time and filament of each way."""
     first_mm2 = ways[0][1].support_area_mm2
     rows = [["print it", "support mm²", "less", "seams mm", "stairs mm²", "about", "filament m"]]
     for number, (name, row) in enumerate(ways):

@@ -1,4 +1,4 @@
-"""The edit command: the workbench, served on this computer until Ctrl-C."""
+"""The edit command: serves the workbench until Ctrl-C."""
 
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
@@ -23,11 +23,11 @@ from profiles.errors import MeshError, OutputError, PlanError
 PLAN_SUFFIX = ".toml"
 
 
-Begin = Callable[[Session], Coroutine[Any, Any, None]]  # puts on the workbench what lies there first
+Begin = Callable[[Session], Coroutine[Any, Any, None]]  # opens the first model
 
 
 def edit(request: EditRequest) -> int:
-    """Serve the page; a model that cannot be read is told in it, a file that is not there at once."""
+    """Serve the page. A missing file is reported at once, an unreadable model in the page."""
     opening = None if request.model is None else _find(request.model)
     profile, given = request.given.profile(), request.given.given()
     lan = _lan(request)
@@ -51,7 +51,7 @@ def edit(request: EditRequest) -> int:
 
 
 def _lan(request: EditRequest) -> Lan | None:
-    """The network that the workbench is opened to, None: to none. Raises OutputError."""
+    """The network that the workbench is opened to, or None. Raises OutputError."""
     if request.lan:
         return open_lan(request.certificate, request.key)
     if request.certificate or request.key:
@@ -60,14 +60,14 @@ def _lan(request: EditRequest) -> Lan | None:
 
 
 async def _open_model(session: Session, path: Path, name: str, plan: PlanFile | None) -> None:
-    """Open a model, and cut it by a plan where there is one."""
+    """Open a model, and cut it by the plan if there is one."""
     await session.open_model(path, name)
     if plan is not None:
         await session.take_plan(plan)
 
 
 def _find(model: str) -> Begin:
-    """What opens a MODEL, a PLAN or a project. Raises UserError for files that are not there."""
+    """Return the function that opens a model, a plan or a project. Raises UserError if the file does not exist."""
     if Path(model).suffix.lower() == PLAN_SUFFIX and not model.startswith(DEMO):
         return _of_plan(Path(model), read_plan(Path(model)))
     if Path(model).suffix.lower() in GCODE_SUFFIXES:
@@ -82,7 +82,7 @@ def _find(model: str) -> Begin:
 
 
 def _of_plan(file: Path, plan: PlanFile) -> Begin:
-    """The model that a plan names: one that ships, or the file of that name beside the plan."""
+    """Return the function that opens the model named by a plan: a shipped one, or the file of that name beside the plan."""
     path = locate(plan.model) if plan.model.startswith(DEMO) else file.parent / Path(plan.model).name
     if not plan.model or not path.is_file():
         reason = f"its model {plan.model} is not beside it" if plan.model else "it names no model"

@@ -1,4 +1,4 @@
-"""The commands that write what is printed: export, G-code and the picture of one layer; save, a project in one 3MF file."""
+"""The export command, which writes G-code and a picture of a layer, and the save command, which writes a project as 3MF."""
 
 import re
 from collections.abc import Sequence
@@ -24,9 +24,9 @@ from slicer.paths import SlicedPart
 
 
 def export(request: ModelRequest) -> int:
-    """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced.
+    """Write a model's G-code and other requested outputs; refused if the dry run finds an error, unless forced.
 
-    Where the G-code goes to standard output the table goes to stderr.
+    The table goes to stderr if the G-code goes to stdout.
     """
     outputs = request.outputs
     if outputs.gcode == outputs.json == STDOUT:
@@ -58,9 +58,9 @@ def export(request: ModelRequest) -> int:
 
 
 def parse_layer(layer: str | None, has_file: bool) -> tuple[int, int]:
-    """Part and layer, both counted from 1, of a --layer option; the first layer of all when it is absent.
+    """Parse PART:LAYER, both counted from 1; (1, 1) if the option is absent.
 
-    Raises OutputError for a text that is not PART:LAYER, and when there is no picture to draw it in.
+    Raises OutputError for other texts, and if there is no picture to draw the layer in.
     """
     if layer is None:
         return 1, 1
@@ -73,7 +73,7 @@ def parse_layer(layer: str | None, has_file: bool) -> tuple[int, int]:
 
 
 def draw_layer(sliced: Sequence[SlicedPart], part: int, layer: int) -> bytes:
-    """The SVG file of a layer; raises OutputError or SliceError when there is no such part or layer."""
+    """SVG of a layer. Raises OutputError or SliceError if the part or layer does not exist."""
     for piece in sliced:
         if piece.index == part:
             return layer_svg(piece, layer).encode()
@@ -82,7 +82,7 @@ def draw_layer(sliced: Sequence[SlicedPart], part: int, layer: int) -> bytes:
 
 
 def save(request: ModelRequest, out: Path) -> int:
-    """Find the parts of a model, or cut it by its plan, and write the project. Raises OutputError."""
+    """Decompose a model, or cut it by its plan, and write the project. Raises OutputError."""
     if out.suffix.lower() != SUFFIX:
         raise OutputError(f"output {out}: a project is a 3MF file: a name that ends in {SUFFIX} is expected")
     check_writable(out)

@@ -1,4 +1,4 @@
-"""The commands print, send, follow and resume: a program on a printer or a server, what prints there, what was cut off."""
+"""The print, send, follow and resume commands."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,8 +25,8 @@ from profiles.profile import Profile
 
 
 def print_model(request: ModelRequest, port: str, asked: PrintOptions) -> int:
-    """Dry-run, then print a model or a G-code file; the printer is asked who it is before any work is done. 130 when a person has
-    ended the print, or left it to its server."""
+    """Dry-run, then print a model or a G-code file; the printer is identified first. Returns 130 if the user ended or left the
+    print."""
     destination, journal = parse_destination(port, asked.baud, asked.speed), asked.journal
     if isinstance(destination, Server) and journal is not None:
         raise ServerError(f"--journal {journal}: {port} prints from a file of its own, which needs no journal here")
@@ -41,7 +41,7 @@ def print_model(request: ModelRequest, port: str, asked: PrintOptions) -> int:
 
 
 def send(request: ModelRequest, address: str, *, start: bool, log: Path | None) -> int:
-    """Hand a G-code file to a print server. start: have it printed at once."""
+    """Send a G-code file to a print server. start: start printing at once."""
     if not request.is_gcode:
         raise GcodeError(f"{request.name} is no G-code file: export makes one of a model, print --port {address} prints it")
     server, person = parse_server_address(address), AtTerminal()
@@ -53,7 +53,7 @@ def send(request: ModelRequest, address: str, *, start: bool, log: Path | None) 
 
 
 def follow(address: str, log: Path | None = None) -> int:
-    """Show and command what a print server prints; 130 when a person has ended it or left. Raises ServerError."""
+    """Show and control the print of a print server; returns 130 if the user ended or left it. Raises ServerError."""
     server, person = parse_server_address(address), AtTerminal()
     if log is not None:
         check_writable(log)
@@ -65,7 +65,7 @@ def follow(address: str, log: Path | None = None) -> int:
 
 
 def list_resumable() -> int:
-    """The prints that can be gone on with, the newest first, on stdout; 0 also when there is none."""
+    """List the prints that can be resumed on stdout, newest first; 0 even if there are none."""
     journals = resumable_journals()
     if not journals:
         say("no print of this computer was cut off or cancelled")
@@ -76,10 +76,10 @@ def list_resumable() -> int:
 
 
 def resume(journal: Path, port: str, asked: ResumeOptions, named: Profile | None = None) -> int:
-    """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
+    """Show where a print continues, ask, and print the rest; returns 0 after printing, 1 if the answer was no.
 
-    named: the profile whose machine the user has named. asked.yes: go on without asking, unless the height of the tip is in doubt
-    or the newest records may be missing. Raises JournalError and other UserErrors.
+    named: profile of the machine that the user named. asked.yes: do not ask, unless the height of the tip is in doubt or the
+    newest records may be missing. Raises JournalError and other UserErrors.
     """
     destination = parse_destination(port, asked.baud)
     job = PrintJob(destination, Does.RESUME, profile=named, cut_off=journal, log=asked.log, journal=asked.further)
@@ -97,7 +97,7 @@ def resume(journal: Path, port: str, asked: ResumeOptions, named: Profile | None
 
 @contextmanager
 def _watched(loaded: LoadedProgram, watching: WatchOptions, person: AtTerminal) -> Iterator[Watched]:
-    """The page that follows and commands the print, where it is asked for."""
+    """Serve the page that follows and controls the print, if requested."""
     with serve_watch_page(loaded, watching.port, person.commands, not watching.no_browser) as watched:
         person.follow = watched.follow
         yield watched
@@ -106,7 +106,7 @@ def _watched(loaded: LoadedProgram, watching: WatchOptions, person: AtTerminal) 
 def _job(
     request: ModelRequest, destination: Destination, log: Path | None, journal: Path | None = None, starts: bool = True
 ) -> PrintJob:
-    """The job, when its files can be written: neither over what is read nor over another print's journal."""
+    """The job. Raises UserError if its files cannot be written, or would overwrite an input or another print's journal."""
     for file in (log, journal):
         if file is not None:
             check_writable(file)
@@ -114,5 +114,5 @@ def _job(
     if journal is not None:
         check_new_journal(journal, None if request.is_gcode else program_beside(journal))
     load: partial[LoadedProgram] = partial(load_program, request)
-    profile = None if request.is_gcode else request.profile  # a file tells its own machine
+    profile = None if request.is_gcode else request.profile  # a G-code file names its machine
     return PrintJob(destination, Does.PRINT, request.name, load, profile, starts, request.force, log=log, journal=journal)

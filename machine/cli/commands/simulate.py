@@ -1,6 +1,6 @@
-"""The simulate command: the dry run of a model or a G-code file, its plastic held against the model.
+"""The simulate command: the dry run of a model or a G-code file, with its plastic compared with the model.
 
-What only some of its options need is loaded when one of them is given.
+Modules that only some options need are imported when such an option is given.
 """
 
 from dataclasses import asdict, replace
@@ -19,9 +19,9 @@ from profiles.errors import ProfileError
 
 
 def simulate(request: ModelRequest, reference: str | None = None, baud: int | None = None) -> int:
-    """Dry-run a model or a G-code file; 1 when a finding is an error.
+    """Dry-run a model or a G-code file; returns 1 if a finding is an error.
 
-    reference: the model that a G-code file's plastic is held against. baud: of a line whose speed is judged too.
+    reference: model to compare a G-code file's plastic with. baud: check whether a line of this rate starves the printer.
     """
     outputs = request.outputs
     check_model_files(request, (), ("--model", None if reference is None else Path(reference)))

@@ -1,4 +1,4 @@
-"""The simulated printer as a program of its own: any host prints on it, through a terminal or a TCP port."""
+"""The simulator command: a simulated printer for any host, at a pseudo-terminal or a TCP port."""
 
 import threading
 from dataclasses import fields, replace
@@ -20,14 +20,14 @@ from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.machine import Machine
 
-KEPT = 10000  # moves on record; of the others only the sums are reported
+KEPT = 10000  # moves on record; older ones only count in the sums
 LOOK_S = 0.5
 PROBE_NOISE_MM = 0.005  # one sigma of a contact's height
-LEAST, MOST = {"rx_ring": 16, "queue": 1}, 65536  # bytes and lines that a firmware may be built with
+LEAST, MOST = {"rx_ring": 16, "queue": 1}, 65536  # ranges of bytes and lines that a firmware may be built with
 
 
 def simulate_printer(request: SimulatorRequest) -> int:
-    """Run until Ctrl-C or a termination request, which is its end: 0. The path to open stands on stdout, then what was done."""
+    """Run until Ctrl-C or a termination request, and return 0. Prints the path to open, and a summary at the end."""
     script = read_script(request.faults) if request.faults is not None else FaultScript()
     machine, baud = request.given.profile().machine, request.baud
     _check(request, machine)
@@ -63,7 +63,7 @@ def simulate_printer(request: SimulatorRequest) -> int:
 
 
 def _table(request: SimulatorRequest, machine: Machine) -> ProbedTable | None:
-    """What the probe of a simulated machine meets; None where nothing is said of it."""
+    """The plate that the simulated probe touches; None without a probe."""
     if request.ball is None and request.true_machine is None:
         return None
     true = machine if request.true_machine is None else machine_profile(request.true_machine).machine
@@ -74,7 +74,7 @@ def _table(request: SimulatorRequest, machine: Machine) -> ProbedTable | None:
     except ValueError:
         raise PrinterError(f"--ball is {request.ball}: four numbers X,Y,Z,D in mm are allowed") from None
     if not (all(isfinite(value) for value in (x, y, z)) and 0.0 < diameter <= 100.0):
-        raise PrinterError(f"--ball is {request.ball}: a place, and a diameter above 0 up to 100 mm, are allowed")
+        raise PrinterError(f"--ball is {request.ball}: a position, and a diameter above 0 up to 100 mm, are allowed")
     return ProbedTable(true, TrueBall(0.5 * diameter, (x, y, z)), noise_mm=PROBE_NOISE_MM)
 
 
@@ -94,7 +94,7 @@ def _check(request: SimulatorRequest, machine: Machine) -> None:
 
 
 def read_build_options(text: str, build: BuildOptions) -> BuildOptions:
-    """Build options changed by words: `no-advanced-ok,realtime,rx-ring=64,queue=16`. Raises PrinterError."""
+    """Change build options by words such as `no-advanced-ok,realtime,rx-ring=64,queue=16`. Raises PrinterError."""
     names = [field.name for field in fields(BuildOptions)]
     for word in filter(None, (part.strip() for part in text.split(","))):
         name, _, value = word.replace("-", "_").partition("=")
@@ -113,15 +113,15 @@ def read_build_options(text: str, build: BuildOptions) -> BuildOptions:
 
 
 def summary(record: Record) -> str:
-    """What a simulated print came to."""
+    """Summary of a simulated print."""
     lines = [
         f"{record.moves} moves in {duration(record.moving_s)}, {record.lines} lines, {record.strokes} strokes of "
         f"{record.pushed_mm:.1f} mm filament",
         f"{record.clamped} coordinates out of limits, {record.unknown} unknown commands",
-        f"{record.underruns} stops because no line came in time, {record.slowed} moves slowed down for want of lines",
+        f"{record.underruns} stops because no line came in time, {record.slowed} moves slowed down for lack of lines",
     ]
     if record.lost_bytes:
-        lines.append(f"{record.lost_bytes} bytes lost by a full receive ring")
+        lines.append(f"{record.lost_bytes} bytes lost because the receive ring was full")
     lines += [f"at {seconds:.1f} s: {trouble}" for seconds, trouble in record.troubles]
     heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} °C"
     return "".join(f"{line}\n" for line in [*lines, heaters])

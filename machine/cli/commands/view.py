@@ -1,4 +1,4 @@
-"""The view command: a model or a G-code file as one HTML page."""
+"""The view command: writes an HTML page of a model or a G-code file."""
 
 import webbrowser
 from pathlib import Path
@@ -16,7 +16,7 @@ from profiles.errors import GcodeError, OutputError, ProfileError
 
 
 def view(request: ModelRequest, open_browser: bool = False) -> int:
-    """Write the page, and show it in the browser where asked; what the dry run finds is shown in it and stops nothing."""
+    """Write the page, and open the browser if requested; findings of the dry run are shown in it and do not stop the command."""
     path = request.outputs.html or _default_page(request.project.name if request.project else request.name)
     check_writable(path)
     check_model_files(request, () if request.outputs.html else (("page", path),))
@@ -25,9 +25,9 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     loaded = load_program(request)
     program, profile, known = loaded.program, loaded.profile, loaded.machine_known
     if not len(program.run.program.line):
-        raise GcodeError(f"{request.model} holds no move: there is nothing to show")
+        raise GcodeError(f"{request.model} contains no move: there is nothing to show")
     if not known:
-        say(f"{request.name} does not tell its machine: shown for {profile.machine.name}, --machine names another")
+        say(f"{request.name} does not name its machine: shown for {profile.machine.name}, --machine names another")
     alternatives = compare_with_one_part(program, profile) if request.compare else ()
     content = print_page(request.name, program, profile, known=known, alternatives=alternatives)
     write_bytes(path, content)
@@ -38,7 +38,7 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
 
 
 def _in_words(program: Program, known: bool) -> str:
-    """What the page holds: moves, errors, warnings."""
+    """Phrase that counts moves, errors and warnings."""
     count, findings = len(program.run.program.line), relevant_findings(program.run, known)
     phrases = [f"{count} moves" if count > 1 else "1 move", *([f"thinned to {MOST_ROWS} or fewer"] if count > MOST_ROWS else [])]
     for severity in ("error", "warning"):
@@ -48,8 +48,8 @@ def _in_words(program: Program, known: bool) -> str:
 
 
 def _default_page(name: str) -> Path:
-    """The page's file where none is named: here, by the model's name; refused where that is a file of another kind."""
+    """Default file of the page, named after the model. Raises OutputError if another kind of file has that name."""
     path = Path(Path(name.removeprefix("demo:")).stem + ".html")
     if path.is_file() and DATA not in path.read_bytes():
-        raise OutputError(f"output {path} exists and is no page of tiltprint's: -o names another file")
+        raise OutputError(f"output {path} exists and is not a page of tiltprint: name another file with -o")
     return path

@@ -1,7 +1,4 @@
-"""At terminal: the person who attends a print at a terminal: asked on stderr, with a screen and keys or plain lines.
-
-The screen shows part, layer, pose, heat, time left, the printer's words, and keys.
-"""
+"""The user at a terminal during a print: questions on stderr, and a live screen with keys, or plain status lines."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -26,19 +23,19 @@ from machine.quantities import duration
 from profiles.errors import JournalError
 
 MOST_WORDS = 4
-WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
+WORD_LENGTH = 200  # of one message: a lost connection takes two lines to describe
 COLOURS = {"printing": "green", "finishing": "green", "paused": "yellow", "pausing": "yellow", "resuming": "yellow"}
 KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? more"
 EXIT_CODES = {PrintState.DONE: 0, PrintState.DECLINED: 1, PrintState.CANCELLED: 130, PrintState.LEFT: 130}
 
 
 def exit_code(end: End) -> int:
-    """The exit code of a command whose job has ended so."""
+    """Exit code for the end of a job."""
     return EXIT_CODES[end.state]
 
 
 class AtTerminal:
-    """The `Person` at the terminal. yes: what is asked is answered by yes; follow: told each moment, too."""
+    """Implements `Person` at the terminal. yes: answer every question with yes; follow: also called with each status."""
 
     def __init__(self, yes: bool = False) -> None:
         self.stop = Flag()
@@ -47,10 +44,10 @@ class AtTerminal:
         self._yes, self._board = yes, Keyboard(self.commands)
 
     def passed(self, sentence: str) -> None:
-        """A passed check is not shown."""
+        """Ignore a passed check."""
 
     def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
-        """Ask on stderr. Raises JournalError where nobody can answer, or look."""
+        """Ask on stderr. Raises JournalError if there is no terminal to ask at, or --yes cannot answer."""
         say_lines(question)
         listed = ", ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
         if choices and (self._yes or not sys.stdin.isatty()):
@@ -68,7 +65,7 @@ class AtTerminal:
 
     @contextmanager
     def show(self, scene: Scene) -> Iterator[Show]:
-        """The screen; Ctrl-C ends a print at a port, and asks what is to become of one on a server. An upload it breaks off."""
+        """Show the screen. Ctrl-C cancels a print at a port, asks what to do with a server's print, and aborts an upload."""
         if scene.uploads:
             with reporting() as report:
                 yield lambda status: None if status is None else report(status.message, status.share)
@@ -90,11 +87,11 @@ class AtTerminal:
             yield tell
 
     def left(self) -> bool:
-        """By the key l, or by an interrupt whose question nobody has answered."""
+        """Whether the user has left by the key l, or by an interrupt without an answer."""
         return self._board.left()
 
     def gives_up(self) -> bool:
-        """Never: a KeyboardInterrupt says so."""
+        """Always False: a KeyboardInterrupt ends the print."""
         return False
 
 
@@ -107,7 +104,7 @@ def _answer(prompt: str) -> str:
 
 @contextmanager
 def _status_lines() -> Iterator[Callable[[PrintStatus], None]]:
-    """Plain lines: one every few seconds, and at once when something has changed."""
+    """Plain status lines: one every few seconds, and at once after a change."""
     lines, last, warned = PlainLines(), (PrintState.PRINTING, ""), ""
 
     def tell(status: PrintStatus) -> None:
@@ -123,8 +120,7 @@ def _status_lines() -> Iterator[Callable[[PrintStatus], None]]:
 
 @contextmanager
 def _screen(scene: Scene, board: Keyboard) -> Iterator[Callable[[PrintStatus], None]]:
-    """The screen with keys; the terminal is as before afterwards. One that has gone away (a closed window) ends the drawing, not
-    the print."""
+    """The live screen with keys; restores the terminal at the end. If the terminal is closed, only the drawing stops."""
     keys, gone = can_type(), False
     live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
 
@@ -148,7 +144,7 @@ def _screen(scene: Scene, board: Keyboard) -> Iterator[Callable[[PrintStatus], N
 
 
 def status_line(status: PrintStatus) -> str:
-    """One line that tells where a print stands."""
+    """The status of a print in one line."""
     phrases = [f"{100 * status.share:.0f} %"] if status.share is not None else []
     if status.share is None and (status.total is not None or status.acknowledged):
         phrases.append(f"line {status.acknowledged}")
@@ -166,7 +162,7 @@ def status_line(status: PrintStatus) -> str:
 
 
 def render(scene: Scene, status: PrintStatus, hint: str, keys: bool, now: datetime) -> RenderableType:
-    """The whole screen at a moment. hint: a question or an explanation in place of the keys, which are there if there are any."""
+    """Render the whole screen. hint: text in place of the list of keys; keys: whether keys can be pressed."""
     lines = [_head(scene.title, status), _position(scene, status), _heat(status), _bar(status), _times(status, now)]
     if status.warning:
         lines.append(Text(plain_line(status.warning), style="bold red"))

@@ -1,4 +1,4 @@
-"""Interrupts: Ctrl-C, a termination request and a closed terminal, turned into a safe end."""
+"""Handling of Ctrl-C, termination requests and a closed terminal."""
 
 import atexit
 import os
@@ -16,15 +16,15 @@ from mdp.kernels.threads import harmless
 HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
 ALL: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM, *HANGUP)
 AGAIN_S = 0.1
-PATIENCE_S = 1.2  # how long work may go on after Ctrl-C: native code hears of it only when it is done
+PATIENCE_S = 1.2  # grace period after Ctrl-C: native code notices it only when it has finished
 SHOW_CURSOR = "\r\x1b[K\x1b[?25h"
-END = b"\0"  # no signal has this number
-COMPILER = f"{os.sep}llvmlite{os.sep}", f"{os.sep}numba{os.sep}"  # folders of its files
+END = b"\0"  # not a signal number
+COMPILER = f"{os.sep}llvmlite{os.sep}", f"{os.sep}numba{os.sep}"  # path components of their files
 
 
 @contextmanager
 def stopping(stop: threading.Event) -> Iterator[None]:
-    """The first interrupt sets a flag, so that the work ends by itself; a second one raises KeyboardInterrupt at once."""
+    """Set a flag at the first interrupt, so that the work can end cleanly; the second one raises KeyboardInterrupt at once."""
 
     def act() -> None:
         if stop.is_set():
@@ -37,10 +37,10 @@ def stopping(stop: threading.Event) -> Iterator[None]:
 
 @contextmanager
 def interrupting() -> Iterator[None]:
-    """Every interrupt raises KeyboardInterrupt in the main thread, also one that comes just before that begins to wait.
+    """Raise KeyboardInterrupt in the main thread at every interrupt, even at one just before a blocking call.
 
-    Python's own handlers run between two of its instructions: a signal that comes after the last one before select() or read()
-    is noted, but ends no waiting. So another signal wakes the main thread until it has heard of the first.
+    Python runs signal handlers between instructions: a signal that comes after the last one before select() or read() is noted,
+    but does not end the wait. A second signal therefore wakes the main thread until it has handled the first.
     """
     heard, over = threading.Event(), threading.Event()
 
@@ -73,10 +73,10 @@ def interrupting() -> Iterator[None]:
 
 @contextmanager
 def calling(act: Callable[[], None]) -> Iterator[None]:
-    """Every interrupt calls act in the main thread instead, for code that must not be left at any of its instructions.
+    """Call act in the main thread at every interrupt, for code that must not be left at an arbitrary instruction.
 
-    An event loop is such code: what is raised in the midst of its work leaves others waiting for that work for ever. It also
-    takes away what wakes the main thread, which is given back here.
+    An event loop is such code: an exception inside it leaves others waiting forever. A loop also replaces the file descriptor
+    that wakes the main thread, so it is restored here.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -93,10 +93,9 @@ def calling(act: Callable[[], None]) -> Iterator[None]:
 
 @contextmanager
 def outside_compiler() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, but never beneath the compiler, which would lose it or take it for an error of its own.
-    Where it comes while Python clears up, which loses it too, it comes again.
+    """Raise KeyboardInterrupt at Ctrl-C, but never inside the compiler, which would lose it or take it for an error of its own.
 
-    Work that goes on all the same, in native code or waiting for threads, is ended with the process.
+    Inside the compiler, and where Python ignores exceptions, the signal is sent again. The process ends despite native code.
     """
     main, here = threading.main_thread(), threading.current_thread()
     if here is not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -138,7 +137,7 @@ def outside_compiler() -> Iterator[None]:
 
 @contextmanager
 def _hurried(wanted: Callable[[], bool]) -> Iterator[None]:
-    """End the process when what is inside still runs PATIENCE_S after an interrupt that is wanted to end it."""
+    """End the process if the block still runs PATIENCE_S after an interrupt for which wanted() is true."""
     over = threading.Event()
 
     def hurry(number: int) -> None:
@@ -154,7 +153,7 @@ def _hurried(wanted: Callable[[], bool]) -> Iterator[None]:
 
 @contextmanager
 def _overheard(act: Callable[[int], None]) -> Iterator[None]:
-    """A thread acts on every signal by its number, whatever the main thread does: Python writes it at once to a socket."""
+    """Call act with the number of each signal in a thread of its own, even while the main thread is busy."""
     heard, noted = socket.socketpair()
     noted.setblocking(False)
 
@@ -177,8 +176,8 @@ def _overheard(act: Callable[[int], None]) -> Iterator[None]:
 
 
 def end_at_once() -> None:
-    """End this process as interrupted, whatever its threads do; its helpers end with it."""
-    with suppress(OSError, ValueError):  # the terminal, or who reads the pipe, has gone away
+    """End this process as interrupted, whatever its threads do; its child processes end, too."""
+    with suppress(OSError, ValueError):  # the terminal, or the reader of the pipe, has gone
         if sys.stderr.isatty():
             sys.stderr.write(SHOW_CURSOR)
         sys.stderr.write("tiltprint: interrupted\n")
@@ -187,7 +186,7 @@ def end_at_once() -> None:
 
 
 def leave(code: int) -> None:
-    """End this process without waiting for its threads, which have nothing to do any more; those that help it end with it."""
+    """End this process without waiting for its idle threads; exit handlers end its child processes."""
     atexit._run_exitfuncs()
     with suppress(OSError, ValueError):
         sys.stdout.flush()
@@ -203,7 +202,7 @@ def _handled(act: Callable[[], None]) -> Iterator[None]:
         act()
 
     signals = ALL if threading.current_thread() is threading.main_thread() else ()
-    # What is ignored stays ignored: that is what nohup asks for.
+    # Ignored signals stay ignored, which is the purpose of nohup.
     before = {number: signal.signal(number, handle) for number in signals if signal.getsignal(number) is not signal.SIG_IGN}
     try:
         yield
@@ -213,7 +212,7 @@ def _handled(act: Callable[[], None]) -> Iterator[None]:
 
 
 def leave_terminal() -> None:
-    """The window is closed: what is still said must not end in an error before the heaters are off."""
+    """Redirect the closed terminal's descriptors to nowhere, so that output fails nowhere before the heaters are off."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in (0, 1, 2):
         with suppress(OSError):

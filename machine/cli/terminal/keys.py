@@ -1,4 +1,4 @@
-"""Keys: what a person presses while a print runs, read from the terminal as it is pressed, and what it asks for."""
+"""Keys pressed while a print runs, and the commands that they stand for."""
 
 import os
 import re
@@ -17,46 +17,46 @@ from machine.notices import say
 
 STEP_PERCENT = 10.0
 LOOK_S = 0.05
-HINT_S = 10.0  # a question that was not answered by then is void
-ALONE_S = 2.0  # where nobody can press a key, a second interrupt is waited for so long
+HINT_S = 10.0  # a question expires after this time
+ALONE_S = 2.0  # time for a second interrupt if no keys can be pressed
 SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
 CANCELLING = "cancel this print? c or y: the server ends it; any other key: go on"
 LEAVING = "the print goes on without this program. c or Ctrl-C: cancel it, l: leave it printing; any other key: go on following"
 MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e stops the machine at once (M112)"
-SEQUENCE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O[A-Z])")  # arrow and function keys: the letters in them are no keys
-BEGUN = re.compile(rb"\x1b(\[[0-9;]*|O)?$")  # over a slow line a sequence comes in pieces
+SEQUENCE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O[A-Z])")  # arrow and function keys, whose letters are not keys
+BEGUN = re.compile(rb"\x1b(\[[0-9;]*|O)?$")  # a slow line may split a sequence
 SAME = {"=": "+", "_": "-", "?": "q"}
 
 
 class Keyboard:
-    """press() one key after the other; `hint` is what the screen shows in place of the list of keys, for a while.
+    """Turns keys into commands; `hint` temporarily replaces the list of keys on the screen.
 
-    server: the name of a print server that goes on when this program ends: the person may leave it printing, Ctrl-C asks first.
+    server: name of the print server, which continues without this program: the user may leave it printing, and Ctrl-C asks first.
     """
 
     def __init__(self, control: Control, server: str = "", now_s: Callable[[], float] = monotonic) -> None:
         self._control, self._server, self._now_s = control, server, now_s
         self._hint, self._hint_until_s = "", 0.0
-        self._sure = self._leaving = False  # questions that stand
+        self._sure = self._leaving = False  # open questions
         self._left = self._cancelled = False
-        self._deadline_s: float | None = None  # of the question that Ctrl-C has asked
+        self._deadline_s: float | None = None  # of the question that Ctrl-C asked
         self._state, self._feed, self._flow = PrintState.PRINTING, 100.0, 100.0
         self._reported = (100.0, 100.0)
 
     @property
     def hint(self) -> str:
-        """A question, an explanation, or what was just asked for; "" when there is none or it is old."""
+        """The current question, explanation or command; "" if there is none, or it has expired."""
         return self._hint if self._now_s() < self._hint_until_s else ""
 
     def follow(self, status: PrintStatus) -> None:
-        """Know what the print does, so that one key can mean pause and resume."""
+        """Update the state, on which the meaning of some keys depends."""
         self._state = status.state
         percents = (status.feed_percent, status.flow_percent)
-        if percents != self._reported:  # the program may set them too
+        if percents != self._reported:  # the program may set them, too
             self._reported, (self._feed, self._flow) = percents, percents
 
     def press(self, key: str) -> None:
-        """Ask for what a key means; unknown keys mean nothing, but any key answers what Ctrl-C has asked."""
+        """Execute a key's command; unknown keys have none, but any key answers the question of Ctrl-C."""
         self._deadline_s = None
         key = SAME.get(key, key).lower()
         sure, self._sure = self._sure and bool(self.hint), False
@@ -70,8 +70,8 @@ class Keyboard:
             act(self)
 
     def interrupt(self) -> None:
-        """Take a Ctrl-C or a request to end, in the main thread, while a server prints: the first one asks, the second one
-        cancels. Raises KeyboardInterrupt at the third."""
+        """Handle an interrupt in the main thread while a server prints: the first asks, the second cancels, the third raises
+        KeyboardInterrupt."""
         if self._cancelled:
             raise KeyboardInterrupt
         if self._deadline_s is not None:
@@ -85,11 +85,11 @@ class Keyboard:
             say(f"the print goes on at {self._server}: interrupt again within {ALONE_S:g} s to cancel it")
 
     def left(self) -> bool:
-        """Whether the person has left the server printing: by l, or by a Ctrl-C whose question nobody has answered."""
+        """Whether the user has left the server printing, by l or by a Ctrl-C without an answer."""
         return self._left or (self._deadline_s is not None and self._now_s() > self._deadline_s)
 
     def _answer(self, key: str) -> None:
-        """Take a key as the answer to the question that stands."""
+        """Handle a key as the answer to the open question."""
         leaving, self._leaving = self._leaving, False
         if leaving and key == "l":
             self._left = True
@@ -136,10 +136,10 @@ _ACTS: dict[str, Callable[[Keyboard], None]] = {
 
 @contextmanager
 def typing(press: Callable[[str], None], named: Mapping[bytes, bytes] = MappingProxyType({})) -> Iterator[None]:
-    """Hand keys to press() from a thread of its own while the block runs; the terminal is as before afterwards.
+    """Call press() with each key from a thread while the block runs; restores the terminal at the end.
 
-    named: by its sequence the key that an arrow or function key counts as; others are none. Ctrl-C still interrupts; Ctrl-Z is
-    switched off, for a stopped sender leaves a hot nozzle standing on the print.
+    named: escape sequence -> key, for arrow and function keys; others are ignored. Ctrl-C still interrupts; Ctrl-Z is disabled,
+    because a suspended sender leaves a hot nozzle on the print.
     """
     console = _windows_console()
     with _terminal_keys(press, named) if console is None else _windows_keys(press, console):
@@ -167,12 +167,12 @@ def _terminal_keys(press: Callable[[str], None], named: Mapping[bytes, bytes]) -
         thread.join()
         os.close(end)
         os.close(wake)
-        with suppress(termios.error, OSError):  # the terminal has gone away
+        with suppress(termios.error, OSError):  # the terminal has gone
             termios.tcsetattr(terminal, termios.TCSAFLUSH, before)
 
 
 def _read_keys(terminal: int, end: int, press: Callable[[str], None], named: Mapping[bytes, bytes]) -> None:
-    """Read keys until something comes from `end`, or the terminal has gone away."""
+    """Read keys until `end` becomes readable, or the terminal has gone."""
     begun = b""
     while end not in select.select([terminal, end], [], [])[0]:
         try:
@@ -190,14 +190,14 @@ def _read_keys(terminal: int, end: int, press: Callable[[str], None], named: Map
 
 @contextmanager
 def _windows_keys(press: Callable[[str], None], console: Any) -> Iterator[None]:
-    """The same on Windows, whose console gives keys one by one and is never changed. console: its module msvcrt."""
+    """Call press() with each key of the Windows console, whose mode needs no change. console: the module msvcrt."""
     over = threading.Event()
 
     def read_keys() -> None:
         while not over.wait(LOOK_S):
             while console.kbhit():
                 key = console.getwch()
-                if key in ("\x00", "\xe0"):  # an arrow or a function key: the next character says which
+                if key in ("\x00", "\xe0"):  # an arrow or a function key: the next character identifies it
                     console.getwch()
                 else:
                     press(key)
@@ -212,18 +212,18 @@ def _windows_keys(press: Callable[[str], None], console: Any) -> Iterator[None]:
 
 
 def is_terminal() -> bool:
-    """Whether stderr is a terminal on which lines can be rewritten."""
+    """Whether stderr is a terminal whose lines can be rewritten."""
     return sys.stderr.isatty() and os.environ.get("TERM", "") not in ("", "dumb")
 
 
 def can_type() -> bool:
-    """Whether keys can be read: stdin is a terminal, and this program stands in its foreground."""
+    """Whether keys can be read: stdin is a terminal, and this process is in its foreground."""
     try:
         if not sys.stdin.isatty():
             return False
         if _windows_console() is not None:
             return True
-        import termios  # noqa: F401 - some systems have neither
+        import termios  # noqa: F401 - not on Windows
 
         return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except (ImportError, OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Options: values whose fields are options of the command line, those that several commands share, and what they ask for."""
+"""Options shared by several commands: dataclasses whose fields are options, and the requests made from them."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def option(names: str, meaning: str, **further: Any) -> Any:
-    """An option of the command line. names: as `-o --out FILE`, the placeholder of its value last where it has one."""
+    """An option of the command line. names: flags and the placeholder of the value, such as `-o --out FILE`."""
     *flags, last = names.split(" ")
     if not last.startswith("-"):
         further["metavar"] = last
@@ -30,9 +30,9 @@ def option(names: str, meaning: str, **further: Any) -> Any:
 
 
 def with_option_groups(command: Callable[..., int]) -> Callable[..., int]:
-    """The command as typer reads it: every parameter that is a dataclass becomes an option for each of its fields.
+    """Expand each dataclass parameter of a command into one option per field, for typer.
 
-    A field may be such a dataclass itself. A tuple of any length becomes an option that can be repeated, empty by default.
+    Dataclasses can be nested. A tuple of any length becomes a repeatable option, empty by default.
     """
     annotations = {name: parameter.annotation for name, parameter in signature(command).parameters.items()}
     parameters: list[Parameter] = []
@@ -68,17 +68,17 @@ def _parameters(name: str, annotation: Any, default: Any) -> list[Parameter]:
 
 
 def _value(name: str, annotation: Any, given: Mapping[str, Any]) -> Any:
-    """What was given for a parameter: of a group an instance, of an option that can be repeated a tuple."""
+    """The value of a parameter: an instance for a dataclass, a tuple for a repeatable option."""
     if _is_group(annotation):
         return annotation(**{field.name: _value(field.name, field.type, given) for field in fields(annotation)})
-    if isinstance(given[name], float) and isnan(given[name]):  # no bound refuses it
-        asked = get_args(annotation)[1]  # to typer the first name is the default
+    if isinstance(given[name], float) and isnan(given[name]):  # passes every bound
+        asked = get_args(annotation)[1]  # typer stores the first name as the default
         raise typer.BadParameter(f"{(asked.default, *asked.param_decls)[-1]} is nan: it must be a number")
     return tuple(given[name] or ()) if _is_repeatable(annotation) else given[name]
 
 
 def _names_of(kind: str) -> Callable[[str], list[str]]:
-    """What the shell offers where the name of a profile is typed: those that ship and those of the user."""
+    """Shell completion for the names of shipped profiles and the user's own."""
 
     def complete(incomplete: str) -> list[str]:
         from profiles.places import known
@@ -88,7 +88,7 @@ def _names_of(kind: str) -> Callable[[str], list[str]]:
     return complete
 
 
-OF_FILE = "; else the project's or G-code file's own, else {}"
+OF_FILE = "; default: that of the project or G-code file, else {}"
 
 
 def _profile_option(kind: str, otherwise: str = "") -> Any:
@@ -102,54 +102,54 @@ Models = Annotated[
     typer.Argument(
         metavar="MODEL",
         show_default=False,
-        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 is three of it",
+        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 prints three",
     ),
 ]
 ModelsOrGcode = Annotated[
     list[str],
     typer.Argument(
-        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as of export, or a G-code file"
+        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as for export, or a G-code file"
     ),
 ]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
 Settings = Annotated[tuple[str, ...], option("--set KEY=VALUE", "override a profile key; repeatable")]
 JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
-HtmlFile = Annotated[Path | None, option("--html FILE", "page that shows it in a browser, see view")]
+HtmlFile = Annotated[Path | None, option("--html FILE", "page to write for a browser, see view")]
 Force = Annotated[bool, option("--force", "go on although the dry run found errors")]
 ForceAll = Annotated[bool, option("--force", "go on although dry run, printer, machine and program do not agree")]
-LogFile = Annotated[Path | None, option("--log FILE", "what is sent and received; else a new file in the state folder")]
-Baud = Annotated[int, option("--baud N", "bits a second")]
+LogFile = Annotated[
+    Path | None, option("--log FILE", "log of what is sent and received; default: a new file in the state folder")
+]
+Baud = Annotated[int, option("--baud N", "bits per second")]
 PortOrSim = Annotated[str, option("--port PORT|sim", "serial port; sim: the simulated printer")]
 SimSpeed = Annotated[float, option("--sim-speed X", "X times real time; 0: as fast as possible")]
-NoBrowser = Annotated[bool, option("--no-browser", "only tell the address")]
+NoBrowser = Annotated[bool, option("--no-browser", "only print the address")]
 
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """How a model is cut into parts."""
+    """Options that control the search for parts."""
 
     beam_width: Annotated[int | None, option("--beam-width B", "decompositions followed at a time")] = None
-    search: Annotated[str | None, option("--search best|published", "published: as the 2020 paper searches")] = None
-    time_limit: Annotated[float | None, option("--time-limit SECONDS", "then the best parts so far are used")] = None
+    search: Annotated[str | None, option("--search best|published", "published: the search of the 2020 paper")] = None
+    time_limit: Annotated[float | None, option("--time-limit SECONDS", "stop then, and use the best parts so far")] = None
     ranker: Annotated[
         str,
         option(
             "--ranker classic|learned|FILE.onnx",
-            "which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
+            "how to rank candidates: in the 2020 paper's order, by the shipped network, or by your own",
         ),
     ] = "classic"
-    orient: Annotated[
-        bool | None, option("--orient/--as-is", "lay the model down in the cheapest orientation, or print it as its file has it")
-    ] = None
-    parts: Annotated[int | None, option("--parts N", "into N parts at most, not as many as pay")] = None
+    orient: Annotated[bool | None, option("--orient/--as-is", "choose the cheapest orientation, or keep that of the file")] = None
+    parts: Annotated[int | None, option("--parts N", "cut into at most N parts; default: as many as pay off")] = None
     part: Annotated[
-        tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, as 2:walls=4; repeatable")
+        tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, such as 2:walls=4; repeatable")
     ] = ()
 
     @property
     def settings(self) -> list[str]:
-        """Those of the profile that are given as options of their own."""
+        """The search options as settings of the profile."""
         values = {"beam_width": self.beam_width, "method": self.search, "time_limit_s": self.time_limit}
         return [f"search.{key}={value}" for key, value in values.items() if value is not None]
 
@@ -159,32 +159,33 @@ class FileOptions(SearchOptions):
     """Options of a command for one model: how to cut it, and which plate and settings of a slicer file to use."""
 
     plate: Annotated[
-        int | None, option("--plate N", "plate of a .3mf of Bambu Studio or OrcaSlicer; else the first that holds something")
+        int | None, option("--plate N", "plate of a .3mf of Bambu Studio or OrcaSlicer; default: the first that is not empty")
     ] = None
     settings_of_file: Annotated[
-        bool, option("--settings-of-file", "print by the settings inside a .3mf of another slicer; see profiles import")
+        bool, option("--settings-of-file", "use the settings inside a .3mf of another slicer; see profiles import")
     ] = False
 
 
 @dataclass(frozen=True)
 class ProgramOptions(FileOptions):
-    """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
+    """Options between a model and its G-code; invalid for a G-code file."""
 
     plan: Annotated[
         tuple[Path, ...], option("--plan FILE", "cut by this plan of decompose, without a search; one for each model")
     ] = ()
     pause: Annotated[
-        tuple[str, ...], option("--pause PART:LAYER", "wait for a person before this layer, or at a height: 1:8.4mm; repeatable")
+        tuple[str, ...], option("--pause PART:LAYER", "wait for the user before this layer, or at a height: 1:8.4mm; repeatable")
     ] = ()
     filament_change: Annotated[
-        tuple[str, ...], option("--filament-change PART:LAYER", "the same, for another filament; repeatable")
+        tuple[str, ...],
+        option("--filament-change PART:LAYER", "change the filament before this layer, or at a height; repeatable"),
     ] = ()
     copies: Annotated[int | None, option("--copies N", "number of copies of each model on the plate, 1 by default")] = None
 
 
 @dataclass(frozen=True)
 class ProfileOptions:
-    """The profile, by its names and settings over it; what is None is that of the project or G-code file, else the default."""
+    """The profiles by name, and settings over them; None means that of the project or G-code file, else the default."""
 
     machine: MachineGiven = None
     material: Annotated[str | None, _profile_option("material", OF_FILE)] = None
@@ -193,29 +194,29 @@ class ProfileOptions:
 
     @property
     def names(self) -> tuple[str | None, str | None, str | None]:
-        """The names of machine, material and process as they were given."""
+        """Names of machine, material and process as given."""
         return self.machine, self.material, self.process
 
     def given(self, search: SearchOptions | None = None) -> Given:
-        """The names with the defaults in the place of those that are None, and all settings."""
+        """Names, with defaults in place of None, and all settings."""
         names = {
             kind: name for kind, name in zip(("machine", "material", "process"), self.names, strict=True) if name is not None
         }
         return Given(**names, settings=(*self.settings, *(search.settings if search else ())))
 
     def over(self, given: Given) -> "ProfileOptions":
-        """These options over what a project was made with."""
+        """These options on top of those that a project was made with."""
         new = given.replaced(self.names, self.settings)
         return ProfileOptions(new.machine, new.material, new.process, new.settings)
 
     @property
     def sections(self) -> frozenset[str]:
-        """The sections of the profile that the user has said something about."""
+        """Sections of the profile that the user has set."""
         named = {kind for kind in ("machine", "material", "process") if getattr(self, kind) is not None}
         return frozenset(named | {setting.partition(".")[0] for setting in self.settings})
 
     def profile(self, search: SearchOptions | None = None) -> "Profile":
-        """The profile, with what the options of a search set in it. Raises ProfileError."""
+        """The profile, including the search options. Raises ProfileError."""
         from profiles.part_settings import parse_part_settings
         from profiles.profile import load, with_part_settings
 
@@ -225,7 +226,7 @@ class ProfileOptions:
 
 @dataclass(frozen=True)
 class DefaultProfileOptions(ProfileOptions):
-    """The same of a command that reads neither a model nor G-code."""
+    """Profile options of a command that reads neither a model nor G-code."""
 
     machine: MachineName = Given.machine
     material: Annotated[str, _profile_option("material")] = Given.material
@@ -233,12 +234,11 @@ class DefaultProfileOptions(ProfileOptions):
 
     @property
     def names(self) -> tuple[str, str, str]:
-        """The names of machine, material and process."""
         return self.machine, self.material, self.process
 
 
 def named_models(models: list[str]) -> list[str]:
-    """The models of a plate as often as they are to stand there: MODEL:N is a model N times. Raises PlanError."""
+    """Expand MODEL:N to N times MODEL. Raises PlanError."""
     named: list[str] = []
     for text in models:
         counted = re.fullmatch(r"(.*[^:]):([-+\d.]*)", text)
@@ -253,7 +253,7 @@ def named_models(models: list[str]) -> list[str]:
 
 
 def check_model(model: str) -> None:
-    """Refuse what is no model file before the command is loaded, which takes a second. Raises MeshError."""
+    """Refuse an invalid model file before the command is imported, which takes a second. Raises MeshError."""
     from mdp.model_file import check_file, locate
 
     check_file(locate(model))
@@ -262,9 +262,9 @@ def check_model(model: str) -> None:
 def model_request(
     model: str, search: SearchOptions, given: ProfileOptions, copies: int | None = 1, **further: Any
 ) -> ModelRequest:
-    """What is asked for of a model; further: other fields of the request. A project decides what the options leave open.
+    """The request for a model; further: other fields of the request. A project provides what the options leave open.
 
-    copies: None for one, or as many as a project has. Raises ProfileError, and PlanError for a project that is damaged.
+    copies: None for one, or for the number in the project. Raises ProfileError, and PlanError for a damaged project.
     """
     from machine.pipeline.project import open_project
 
@@ -291,7 +291,7 @@ def model_request(
 def _over_project(
     given: ProfileOptions, of_project: Given, search: SearchOptions, model: str
 ) -> "tuple[ProfileOptions, Profile]":
-    """The options over what a project was made with, and their profile. Raises ProfileError, which names whose fault it is."""
+    """The options on top of a project's, and their profile. Raises ProfileError, which names the project if that is at fault."""
     from profiles.errors import ProfileError
 
     given.profile(search)
@@ -303,7 +303,7 @@ def _over_project(
 
 
 def _given_by(model: str, given: ProfileOptions) -> Given:
-    """The settings inside a slicer file for the profiles that no option names; a note on stderr says how many are used.
+    """Settings inside a slicer file for the profiles that no option names; prints a note on how many are used.
 
     Raises ProfileError if the model has no settings, or if both profiles are named.
     """
@@ -325,7 +325,7 @@ def _given_by(model: str, given: ProfileOptions) -> Given:
 
 
 def program_request(models: list[str], program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
-    """The request for the program of models on a plate, or of a G-code file. Raises PlanError, SliceError, ProfileError."""
+    """The request for a plate of models or a G-code file. Raises PlanError, SliceError, ProfileError."""
     from machine.pipeline.project import is_project
     from machine.planning.stops import parse_stops
 
@@ -343,5 +343,5 @@ def program_request(models: list[str], program: ProgramOptions, given: ProfileOp
 
 
 def machine_profile(machine: str, settings: tuple[str, ...] = ()) -> "Profile":
-    """The profile where only the machine matters."""
+    """A profile in which only the machine matters."""
     return ProfileOptions(machine, settings=settings).profile()

@@ -1,4 +1,4 @@
-"""Report: the tables that the commands print on stdout."""
+"""Tables that the commands print."""
 
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
@@ -12,17 +12,17 @@ from machine.quantities import duration, filament_g, minutes, newtons, percent, 
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
 
-if TYPE_CHECKING:  # what only models have is loaded with them
+if TYPE_CHECKING:  # imported with the models that need them
     from machine.dryrun.agreement import Agreement
     from mdp.decomposition import Decomposition, FrontRow
     from mdp.joint import Joint
 
-WIDEST = 100  # characters of a line
-NO_BREAK = "\u00a0"  # a space at which no line ends
+WIDEST = 100  # characters per line
+NO_BREAK = "\u00a0"  # where wrap() breaks no line
 
 
 def table(rows: list[list[str]]) -> str:
-    """Rows as right-aligned columns, the first column left-aligned."""
+    """Rows as columns, the first left-aligned, the others right-aligned."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for row in rows:
@@ -32,10 +32,7 @@ def table(rows: list[list[str]]) -> str:
 
 
 def parts_table(decomposition: "Decomposition", angle_deg: float = 45.0, count_platform_faces: bool = False) -> str:
-    """The parts in print order, what would be risky of their faces straight up and what is; then the front.
-
-    angle_deg and count_platform_faces as the search had them.
-    """
+    """Table of the parts in print order, with risky areas before (printed straight up) and after the cuts; then the front."""
     from machine.view.parts import risky_before_mm2
 
     rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm³", "share", "risky before", "after mm²"]]
@@ -52,8 +49,7 @@ def parts_table(decomposition: "Decomposition", angle_deg: float = 45.0, count_p
 
 
 def joints_table(joints: "Sequence[Joint]") -> str:
-    """Every joint: its area and seam, how its first layer lies where it is sliced, what it bears, and which is the weakest;
-    nothing for a model in one piece."""
+    """Table of joints with area, seam, contact, strength, and the weakest one; "" for a model in one piece."""
     from mdp.joint import weakest_of
 
     weakest = weakest_of(joints)
@@ -74,7 +70,7 @@ def joints_table(joints: "Sequence[Joint]") -> str:
 
 
 def front_table(front: "Sequence[FrontRow]") -> str:
-    """The best decomposition for every number of parts, the one taken marked and why."""
+    """Table of the best decomposition for each number of parts; the chosen one is marked with the reason."""
     rows = [["in parts", "needs support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "filament m"]]
     rows += [
         [
@@ -93,7 +89,7 @@ def front_table(front: "Sequence[FrontRow]") -> str:
 
 
 def estimates(row: "FrontRow") -> list[str]:
-    """About how long a decomposition prints, and metres of filament; dashes where that is not known."""
+    """Estimated time and metres of filament; dashes if unknown."""
     return [
         "-" if row.time_s is None else minutes(row.time_s),
         "-" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}",
@@ -105,7 +101,7 @@ def _number(area_mm2: float) -> str:
 
 
 def print_table(program: Program, profile: Profile) -> str:
-    """What there is to say of a print: its dry run, what its cuts take, the settings of single parts."""
+    """Tables of the dry run, the cost, the interfaces, and part settings."""
     said = (
         run_table(program.run)
         + _costs_line(program, profile)
@@ -116,7 +112,7 @@ def print_table(program: Program, profile: Profile) -> str:
 
 
 def print_price(program: Program, profile: Profile) -> dict[str, float | str]:
-    """What a print's filament costs, for its JSON; nothing where the material has no price."""
+    """Cost of the filament for JSON; {} if the material has no price."""
     return price_json(_filament_mm(program), profile.material)
 
 
@@ -131,7 +127,7 @@ def _filament_mm(program: Program) -> float:
 
 
 def run_table(run: DryRun) -> str:
-    """What a dry run found."""
+    """Table of the dry run's figures and findings."""
     values = summary(run)
     lines = [
         f"time {duration(values['time_s'])}, filament {values['filament_mm'] / 1000:.2f} m, "
@@ -151,20 +147,20 @@ def run_table(run: DryRun) -> str:
 
 
 def part_settings_lines(profile: Profile) -> str:
-    """The parts with settings of their own."""
+    """Lines with the settings of single parts."""
     lines = (wrap(f"part {settings.part} with {settings.in_words}", WIDEST, subsequent_indent="  ") for settings in profile.parts)
     return "".join(line + "\n" for several in lines for line in several)
 
 
 def _wrap_finding(severity: str, message: str) -> list[str]:
-    """A finding in lines that can be read, the words after the severity below each other; keys of a profile stay whole."""
+    """A finding wrapped to lines with a hanging indent; profile keys are not broken."""
     indent = " " * len(f"{severity}: ")
     lines = wrap(message, WIDEST, initial_indent=f"{severity}: ", subsequent_indent=indent, break_long_words=False)
     return [line.replace(NO_BREAK, " ") for line in lines]
 
 
 def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
-    """What cutting costs in plastic, by the part that stands on each interface; nothing for a model in one piece."""
+    """Line with the additional plastic of each interface; "" for a model in one piece."""
     if not interface_mm3:
         return ""
     of_parts = ", ".join(f"part{NO_BREAK}{index} {mm3 / 1000:.2f}" for index, mm3 in interface_mm3.items())
@@ -174,13 +170,13 @@ def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
 
 
 def pins_line(sliced: Sequence[SlicedPart]) -> str:
-    """How many pins the parts fill; nothing where none does."""
+    """Line with the number of pins per part; "" if there are none."""
     of_parts = ", ".join(f"part{NO_BREAK}{part.index} {part.pins}" for part in sliced if part.pins)
     return "\n".join(wrap(f"pins: {of_parts}", WIDEST)).replace(NO_BREAK, " ") + "\n" if of_parts else ""
 
 
 def agreement_line(agreed: "Agreement") -> str:
-    """How the plastic agrees with the model."""
+    """Sentence on how well the plastic agrees with the model."""
     sentence = (
         f"the beads fill {100 * agreed.filled:.1f} % of the model; of their length {100 * agreed.outside:.2f} % lie outside it "
         f"by more than half a line ({agreed.farthest_mm:.2f} mm at the worst), {100 * agreed.unsupported:.2f} % hang in air, "
@@ -194,7 +190,7 @@ def _count(number: int, things: str) -> str:
 
 
 def compare_table(alternatives: tuple[Alternative, ...]) -> str:
-    """The alternatives for a person."""
+    """Table of the alternatives."""
     rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
     rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm²"] for way in alternatives]
     head, *lines = table(rows).splitlines()
@@ -203,7 +199,7 @@ def compare_table(alternatives: tuple[Alternative, ...]) -> str:
 
 
 def _costs(alternative: Alternative) -> list[str]:
-    """Time, filament, mass, support and interfaces; dashes where it cannot be printed."""
+    """Time, filament, mass, support and interfaces; dashes if it cannot be printed."""
     if alternative.time_s is None:
         return ["-"] * 5
     filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000

@@ -1,4 +1,4 @@
-"""Requests: what each command is asked for, as values whose fields are the options of the command line."""
+"""Requests of the commands: dataclasses whose fields are options of the command line."""
 
 from dataclasses import dataclass
 from os.path import exists  # pathlib's raises for a name that is too long
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mdp.batch.pool import Workers
     from profiles.profile import Profile
 
-Replace = Annotated[bool, option("--replace", "write over a file that exists")]
+Replace = Annotated[bool, option("--replace", "overwrite existing files")]
 
 
 @dataclass(frozen=True)
@@ -23,20 +23,18 @@ class DecomposeOptions:
     """Files that decompose reads and writes besides the model."""
 
     out: Annotated[Path | None, option("-o --out DIR", "folder for part-NN.stl, 3MF, JSON")] = None
-    plan: Annotated[Path | None, option("--plan FILE", "where FILE exists: cut by it without a search; else write it")] = None
+    plan: Annotated[Path | None, option("--plan FILE", "cut by FILE without a search if it exists; otherwise write it")] = None
     planes: Annotated[Path | None, option("--planes FILE", "planes by hand, cut first; the search finds the others")] = None
     json: options.JsonFile = None
     png: Annotated[Path | None, option("--png FILE", "picture of the parts")] = None
     sheet: Annotated[Path | None, option("--sheet FILE", "picture of the print order, tilted as printed")] = None
-    front: Annotated[Path | None, option("--front FILE", "picture of how every number of parts would cut the model")] = None
+    front: Annotated[Path | None, option("--front FILE", "picture of the best cuts for each number of parts")] = None
     html: options.HtmlFile = None
-    record: Annotated[Path | None, option("--record FILE", "what the search saw, as .npz for training")] = None
-    compare: Annotated[
-        bool, option("--compare", "slice the parts: tell how their joints lie, and time and material in one part")
-    ] = False
+    record: Annotated[Path | None, option("--record FILE", "record of the search, as .npz for training")] = None
+    compare: Annotated[bool, option("--compare", "slice the parts: report joints, time and material, also in one part")] = False
 
     def request(self, model: str, search: options.FileOptions, given: options.ProfileOptions) -> ModelRequest:
-        """What is asked for of a model: a plan that exists is cut by, another is written."""
+        """The request for a model: an existing plan defines the cuts, otherwise the plan is written."""
         known = self.plan if self.plan is not None and exists(self.plan) else None
         outputs = Outputs(
             folder=self.out,
@@ -59,28 +57,24 @@ class ExportOptions:
     json: options.JsonFile = None
     svg: Annotated[Path | None, option("--svg FILE", "picture of one layer, see --layer")] = None
     html: options.HtmlFile = None
-    layer: Annotated[str | None, option("--layer PART:LAYER", "which layer; else the first, 1:1")] = None
-    compare: Annotated[bool, option("--compare", "tell also time, material, support and risky area printed in one part")] = False
+    layer: Annotated[str | None, option("--layer PART:LAYER", "layer to draw; default: the first, 1:1")] = None
+    compare: Annotated[bool, option("--compare", "also report time, material, support and risky area in one part")] = False
     force: options.Force = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class EditRequest:
-    """The workbench. model: a model, a plan or a project to begin with; lan: open it to the local network, too."""
+    """Options of edit. model: the model, plan or project to open first; lan: also open it to the local network."""
 
     model: Annotated[
         str | None, typer.Argument(metavar="[MODEL|PLAN]", show_default=False, help="a model file, demo:NAME, or a plan (.toml)")
     ] = None
-    port: Annotated[
-        int, option("--port N", "serve it on this port; else on any free one", min=0, max=65535, show_default=False)
-    ] = 0
+    port: Annotated[int, option("--port N", "port of the page; default: any free one", min=0, max=65535, show_default=False)] = 0
     no_browser: options.NoBrowser = False
-    upload_mib: Annotated[int, option("--upload-mib N", "the largest file that is taken from a page", min=1, max=1024)] = (
-        UPLOAD_MIB
+    upload_mib: Annotated[int, option("--upload-mib N", "size limit of uploaded files, MiB", min=1, max=1024)] = UPLOAD_MIB
+    lan: Annotated[bool, option("--lan", "open it to devices of the local network, too, each paired by a code shown here")] = (
+        False
     )
-    lan: Annotated[
-        bool, option("--lan", "open it to devices of the local network, too, each paired by a code that is told here")
-    ] = False
     certificate: Annotated[Path | None, option("--certificate FILE", "PEM file: encrypts --lan, with --key")] = None
     key: Annotated[Path | None, option("--key FILE", "PEM file: the key of the certificate")] = None
     given: options.ProfileOptions
@@ -88,26 +82,26 @@ class EditRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchRequest:
-    """Every model of a folder. do: decompose, export or estimate; out: folder for the table and the files."""
+    """Options of batch. do: decompose, export or estimate; out: folder for the table and the files."""
 
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", show_default=False, help="folder of models")]
-    out: Annotated[Path, option("-o --out DIR", "folder for DO.csv, a row a model, and what is made")]
-    do: Annotated[str, option("--do decompose|export|estimate", "what to make of each; estimate: the row alone")] = "export"
-    scheduler: Annotated[str | None, option("--scheduler ADDRESS", "dask scheduler whose workers do it, as tcp://HOST:8786")] = (
-        None
-    )
-    processes: Annotated[int | None, option("--workers N", "processes here; else one a core", min=1, max=1024)] = None
-    retries: Annotated[int, option("--retries N", "how often a model that was killed is tried again", min=0, max=100)] = 2
-    limit_s: Annotated[float | None, option("--limit-s SECONDS", "a model that takes longer is given up", min=1.0)] = None
+    out: Annotated[Path, option("-o --out DIR", "folder for DO.csv, with a row per model, and the files")]
+    do: Annotated[str, option("--do decompose|export|estimate", "what to do with each model; estimate: only the row")] = "export"
+    scheduler: Annotated[
+        str | None, option("--scheduler ADDRESS", "dask scheduler whose workers do the work: tcp://HOST:8786")
+    ] = None
+    processes: Annotated[int | None, option("--workers N", "local processes; default: one per core", min=1, max=1024)] = None
+    retries: Annotated[int, option("--retries N", "how often to retry a model whose process was killed", min=0, max=100)] = 2
+    limit_s: Annotated[float | None, option("--limit-s SECONDS", "abandon a model that takes longer", min=1.0)] = None
     search: options.SearchOptions
     given: options.ProfileOptions
 
     def asked(self) -> ModelRequest:
-        """What is asked for of each model, without a model's name."""
+        """The request for each model, without the model's name."""
         return options.model_request("", self.search, self.given)
 
     def workers(self) -> "Workers":
-        """Where the work is done."""
+        """The workers that do the work."""
         from mdp.batch.pool import Workers
         from mdp.kernels.threads import THREADS
 
@@ -116,70 +110,74 @@ class BatchRequest:
 
 @dataclass(frozen=True)
 class WatchOptions:
-    """The page that follows and commands a print."""
+    """Options of the page that follows and controls a print."""
 
-    watch: Annotated[bool, option("--watch", "open a page of this computer that follows and commands the print")] = False
-    watch_port: Annotated[
-        int | None, option("--watch-port N", "serve it on this port; else on any free one", min=0, max=65535)
-    ] = None
+    watch: Annotated[bool, option("--watch", "open a page on this computer that follows and controls the print")] = False
+    watch_port: Annotated[int | None, option("--watch-port N", "port of the page; default: any free one", min=0, max=65535)] = (
+        None
+    )
     no_browser: options.NoBrowser = False
 
     @property
     def port(self) -> int | None:
-        """Where the page is served, 0: at any free port; None: nowhere."""
+        """Port of the page, 0: any free one; None: no page."""
         return (self.watch_port or 0) if self.watch or self.watch_port is not None else None
 
 
 @dataclass(frozen=True)
 class PrintOptions:
-    """How a print is recorded and watched, and how fast a simulated printer is."""
+    """Options of print: how it is recorded and watched, and the speed of a simulated printer."""
 
     baud: options.Baud = BAUD
     speed: options.SimSpeed = 0.0
     watching: WatchOptions = WatchOptions()
     log: options.LogFile = None
-    journal: Annotated[Path | None, option("--journal FILE", "for resume; else a new file in the state folder")] = None
+    journal: Annotated[Path | None, option("--journal FILE", "journal for resume; default: a new file in the state folder")] = (
+        None
+    )
     force: options.ForceAll = False
 
 
 @dataclass(frozen=True)
 class ResumeOptions:
-    """A print that was cut off, and how its rest is printed; further: the journal of the rest."""
+    """Options of resume. further: journal of the rest."""
 
     journal: Annotated[
-        Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
+        Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the interrupted print; without it all are listed")
     ] = None
     port: Annotated[str | None, option("--port PORT", "serial port")] = None
     baud: options.Baud = BAUD
-    yes: Annotated[bool, option("--yes", "go on without asking, where nothing is in doubt")] = False
+    yes: Annotated[bool, option("--yes", "continue without asking if nothing is in doubt")] = False
     watching: WatchOptions = WatchOptions()
-    further: Annotated[Path | None, option("--journal FILE", "journal of the rest; else a new file in the state folder")] = None
+    further: Annotated[Path | None, option("--journal FILE", "journal of the rest; default: a new file in the state folder")] = (
+        None
+    )
     log: options.LogFile = None
     machine: options.MachineGiven = None
 
 
 @dataclass(frozen=True)
 class MachineOptions:
-    """A machine and settings over it, where nothing else of a profile matters."""
+    """A machine and settings over it, for commands that use nothing else of a profile."""
 
     machine: options.MachineName = Given.machine
     settings: options.Settings = ()
 
     def profile(self) -> "Profile":
-        """The profile. Raises ProfileError."""
+        """The machine's profile. Raises ProfileError."""
         return options.machine_profile(self.machine, self.settings)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConsoleRequest:
-    """A printer to talk to line by line. reports: show temperature reports; log as for a print."""
+    """Options of console. reports: show temperature reports."""
 
     port: options.PortOrSim
     baud: options.Baud = BAUD
     sim_speed: options.SimSpeed = 0.0
     reports: Annotated[bool, option("--reports/--no-reports", "show temperatures that the printer reports")] = True
     leave_heaters: Annotated[
-        bool, option("--leave-heaters", "heaters stay as they are on leaving; else they are switched off")
+        bool, option("--leave-heaters", "leave the heaters as they are; default: switch them off at the end")
     ] = False
     log: options.LogFile = None
     given: MachineOptions = MachineOptions()
@@ -187,41 +185,39 @@ class ConsoleRequest:
 
 @dataclass(frozen=True)
 class SimulatorRequest:
-    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script.
+    """Options of simulator. link: symbolic link to the pseudo-terminal; tcp: port instead of a terminal; faults: fault script.
 
-    ball: X,Y,Z,D of one on its plate, true_machine: what its probe senses; with either of them it has a probe.
+    ball: X,Y,Z,D of a ball on the plate; true_machine: the machine that the probe senses. Either of them adds a probe.
     """
 
-    link: Annotated[Path | None, option("--pty PATH", "a link to keep on the terminal's path")] = None
+    link: Annotated[Path | None, option("--pty PATH", "symbolic link to the pseudo-terminal")] = None
     tcp: Annotated[int | None, option("--tcp PORT", "for socket://localhost:PORT; 0: a free one")] = None
     faults: Annotated[Path | None, option("--faults FILE", "fault script: what goes wrong")] = None
     speed: Annotated[float, option("--speed X", "X times real time; 0: as fast as possible")] = 1.0
-    baud: Annotated[int | None, option("--baud N", "bytes are as slow as on such a line")] = None
+    baud: Annotated[int | None, option("--baud N", "simulate the speed of a line of N bits/s")] = None
     habits: Annotated[str | None, option("--habits LIST", "how the firmware was built: no-advanced-ok,no-busy,...")] = None
-    ball: Annotated[str | None, option("--ball X,Y,Z,D", "it has a probe, and a ball on the plate: centre and diameter, mm")] = (
-        None
-    )
-    true_machine: Annotated[str | None, option("--true-machine NAME|FILE", "what its probe senses is this machine's")] = None
+    ball: Annotated[str | None, option("--ball X,Y,Z,D", "add a probe and a ball on the plate: centre and diameter, mm")] = None
+    true_machine: Annotated[str | None, option("--true-machine NAME|FILE", "machine that the probe senses")] = None
     given: MachineOptions = MachineOptions()
 
 
 @dataclass(frozen=True)
 class ProbeOptions:
-    """A machine that measures a ball on its plate by itself."""
+    """Options of calibrate with a probe and a ball on the plate."""
 
     probe: Annotated[bool, option("--probe", "the machine at --port measures a ball on its plate by itself")] = False
     port: Annotated[str | None, option("--port PORT|sim", "serial port of the machine to measure; sim: simulated")] = None
     baud: options.Baud = BAUD
     ball_mm: Annotated[float, option("--ball-mm MM", "diameter of the ball", min=4, max=60)] = 20.0
     probe_offset: Annotated[
-        str, option("--probe-offset X,Y,Z", "from the nozzle's tip to what touches; 0,0,0: the nozzle senses")
+        str, option("--probe-offset X,Y,Z", "from the nozzle's tip to the contact point; 0,0,0: the nozzle senses")
     ] = "0,0,0"
-    png: Annotated[Path | None, option("--png FILE", "of --probe: picture of what is left over")] = None
+    png: Annotated[Path | None, option("--png FILE", "with --probe: picture of the residuals")] = None
     log: options.LogFile = None
 
     @property
     def offset_mm(self) -> tuple[float, float, float]:
-        """From the nozzle's tip to what touches; 0 where the nozzle senses. Raises BadParameter."""
+        """From the nozzle's tip to the contact point, 0 for the nozzle itself. Raises BadParameter."""
         try:
             x, y, z = (float(word) for word in self.probe_offset.split(","))
         except ValueError:
@@ -233,14 +229,14 @@ class ProbeOptions:
 
 @dataclass(frozen=True)
 class CalibrationRequest:
-    """A machine profile by name, the mark that is touched on it (None: the usual one), and where the result goes.
+    """Options of calibrate: machine, mark (None: the default), and where the result goes.
 
-    save: name of the user's own profile, None: the machine's. replace: write over files that exist. force: save although the
-    touches are far off. directions: find those of the axes, too.
+    save: name of the user's own profile, None: the machine's. replace: overwrite files. force: save despite large residuals.
+    directions: also find the directions of the axes.
     """
 
     out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
-    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml or .csv: work out the numbers")] = None
+    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml or .csv: compute the axes")] = None
     mark_height_mm: Annotated[float | None, option("--mark-height MM", "height of the mark over the plate", min=0, max=200)] = (
         None
     )
@@ -251,10 +247,10 @@ class CalibrationRequest:
         tuple[Path, ...], option("--printed FILE.gcode", "program of demo:calibration that was printed; repeatable")
     ] = ()
     readings: Annotated[
-        tuple[str, ...], option("--readings TEXT", "of each --printed: right,up,height of its four pads; else asked for")
+        tuple[str, ...], option("--readings TEXT", "for each --printed: right,up,height of its four pads; default: ask")
     ] = ()
     html: Annotated[Path | None, option("--html FILE", "with --printed: page to type the readings on")] = None
-    save: Annotated[str | None, option("--save NAME", "name of your profile; else the machine's")] = None
+    save: Annotated[str | None, option("--save NAME", "name of your profile; default: the machine's")] = None
     replace: Replace = False
     force: Annotated[bool, option("--force", "save although touches or readings are far off")] = False
     directions: Annotated[bool, option("--directions", "find the directions of the axes, too")] = False
@@ -264,25 +260,26 @@ class CalibrationRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class CouponRequest:
-    """Bars that tell what joints hold. shape: how the bars are broken; vary: KEY=VALUE that half of them are printed with, none:
-    the usual ones; html, png: what shows them; report: a table and nothing else.
+    """Options of coupon. shape: how the bars are broken; vary: KEY=VALUE of half of the bars, none: the usual ones.
 
-    save: name of the user's own material and process, None: theirs. replace: write over files that exist. force: write a program
-    although its dry run found errors.
+    html, png: views of the bars; report: only write a table; save: name of the user's own material and process, None: theirs.
+    replace: overwrite files. force: write the program despite errors of its dry run.
     """
 
     out: Annotated[Path | None, option("-o --out OUT.gcode", "program to write, with a sheet beside it to fill in")] = None
-    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml: work out what holds, and save it")] = None
-    report: Annotated[
-        Path | None, option("--report FILE.md", "with --measured: only write it as a table; - for standard output")
-    ] = None
+    measured: Annotated[Path | None, option("--measured FILE", "filled sheet, .toml: evaluate it and save the result")] = None
+    report: Annotated[Path | None, option("--report FILE.md", "with --measured: only write a table; - for standard output")] = (
+        None
+    )
     shape: Annotated[str, option("--shape bend|tensile", "bars for a luggage scale, or ISO 527-2 type 5A")] = "bend"
     vary: Annotated[
-        tuple[str, ...], option("--vary KEY=VALUE", "what half of the bars have, not the usual four; repeatable, at most 5")
+        tuple[str, ...], option("--vary KEY=VALUE", "setting of half of the bars, replaces the usual four; repeatable, at most 5")
     ] = ()
     html: options.HtmlFile = None
     png: Annotated[Path | None, option("--png FILE", "picture of the bars in print order")] = None
-    save: Annotated[str | None, option("--save NAME", "name of your material and process profiles; else theirs")] = None
+    save: Annotated[str | None, option("--save NAME", "name of your material and process profiles; default: the originals'")] = (
+        None
+    )
     replace: Replace = False
     force: options.Force = False
     given: options.DefaultProfileOptions
@@ -290,32 +287,32 @@ class CouponRequest:
 
 @dataclass(frozen=True)
 class ImportRequest:
-    """Another slicer's settings to read, with the presets of a bundle: empty: its only or its active one."""
+    """Options of profiles import: file, and presets of a bundle (empty: the only or the active one)."""
 
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="config.ini, bundle or G-code of PrusaSlicer; JSON of OrcaSlicer; .curaprofile")
     ]
-    process: Annotated[str, option("--process-preset NAME", "of a bundle's print presets")] = ""
-    material: Annotated[str, option("--material-preset NAME", "of a bundle's filament presets")] = ""
-    printer: Annotated[str, option("--printer-preset NAME", "of a bundle's printers, for its nozzle")] = ""
-    name: Annotated[str, option("--name NAME", "of both profiles; else as there")] = ""
-    out: Annotated[Path | None, option("-o --out FOLDER", "where to; else your own profiles")] = None
+    process: Annotated[str, option("--process-preset NAME", "print preset of a bundle")] = ""
+    material: Annotated[str, option("--material-preset NAME", "filament preset of a bundle")] = ""
+    printer: Annotated[str, option("--printer-preset NAME", "printer preset of a bundle, for its nozzle")] = ""
+    name: Annotated[str, option("--name NAME", "name of both profiles; default: that of the file")] = ""
+    out: Annotated[Path | None, option("-o --out FOLDER", "folder to write to; default: your own profiles")] = None
     replace: Replace = False
-    json: Annotated[bool, option("--json", "what became of every setting as JSON")] = False
+    json: Annotated[bool, option("--json", "report the result for each setting as JSON")] = False
 
 
 @dataclass(frozen=True)
 class DetectRequest:
-    """A firmware that tells of its machine, at a port or in a file. base: profile that is inherited, None: the nearest shipped
-    one; out: file to write, None: in the user's own folder; replace: write over it."""
+    """Options of profiles detect. base: profile to inherit, None: the nearest shipped one; out: file to write, None: in the
+    user's own folder; replace: overwrite it."""
 
     file: Annotated[
         Path | None,
         typer.Argument(metavar="FILE", help="printer.cfg, config.g, a log of M503, a dump of $$, LinuxCNC's .ini"),
     ] = None
-    port: Annotated[str | None, option("--port PORT", "of a printer; moonraker:HOST, duet:HOST; or sim")] = None
+    port: Annotated[str | None, option("--port PORT", "port of a printer; moonraker:HOST, duet:HOST; or sim")] = None
     baud: options.Baud = BAUD
-    base: Annotated[str | None, option("--base NAME", "inherit it, else the nearest shipped one")] = None
-    out: Annotated[Path | None, option("-o --out FILE.toml", "profile to write; else one of your own")] = None
+    base: Annotated[str | None, option("--base NAME", "profile to inherit; default: the nearest shipped one")] = None
+    out: Annotated[Path | None, option("-o --out FILE.toml", "profile to write; default: one of your own")] = None
     replace: Replace = False
-    json: Annotated[bool, option("--json", "what was found, what not and what to measure as JSON")] = False
+    json: Annotated[bool, option("--json", "report as JSON what was found, what was not, and what to measure")] = False

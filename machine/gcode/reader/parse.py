@@ -260,7 +260,7 @@ def _feeds(given: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floa
 
 
 def _turn_starts(program: ParsedProgram, followed: Indices) -> NDArray[np.bool_]:
-    """(n,) False for a row that continues the turn of the row before, in the same direction with the head at rest."""
+    """(n,) False for a row that continues the turn of the previous row, in the same direction with the head at rest."""
     start, end = program.start, program.end
     turn = end[:, 3:] - start[:, 3:]
     size = np.hypot(turn[:, 0], turn[:, 1])

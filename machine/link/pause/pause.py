@@ -1,6 +1,6 @@
 """Pause: leave the print, wait until the user resumes, return to the same place.
 
-Meanwhile the motors are kept on; the nozzle of an unattended pause is switched off, for it would ooze and char.
+Meanwhile the motors are kept on; the nozzle of an unattended pause is switched off because it would ooze and char.
 """
 
 from collections.abc import Iterable, Iterator

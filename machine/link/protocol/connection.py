@@ -10,7 +10,7 @@ answer must be assigned to its line; only lines known to be missing are sent aga
     N8 G1 X1*105  ----------------->  ok                  OPEN
     N9 G1 X2*107  -------##--------   Resend: 9           damaged in transit; N10 is in flight, too:
     N10 G1 X3*82  ----------------->  Resend: 9           not accepted, for 9 is missing
-                                                          QUIET: nothing is sent until no answer comes any more
+                                                          QUIET: nothing is sent until no more answers come
     N9 G1 X2*107  ----------------->  ok                  REPEAT: from the history, one by one
     N10 G1 X3*82  ----------------->  ok                  then OPEN again, at first with one line at a time
     N11 G1 X4*84  ----------------->  (ok gets lost)      PROBING: silence for too long, so a question with a number
@@ -247,7 +247,7 @@ class Connection:
             self._follow(Signal.IMPLAUSIBLE, now_s)
 
     def _refusal(self, number: int, too_much: str) -> PrinterError:
-        """The error when lines are not repeated any more: the printer refuses one as it is, or too many."""
+        """The error when lines are no longer repeated: the printer refuses one as it is, or too many."""
         line, command = self.window.wire_number(number), self.window.command(number)
         if self.resends.same_line and command:
             return verdict.refused_line(line, command, ASKED_LIMIT, self.resends.words)

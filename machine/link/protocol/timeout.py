@@ -9,7 +9,7 @@ from machine.link.protocol.states import Signal, State
 from machine.link.protocol.window import LineInFlight, Window
 
 QUIET_MOST_S = 2.0  # a printer with messages of its own must not hold up a repeat for ever
-TURNS = 3.0  # round trips of silence after which nothing is in flight any more
+TURNS = 3.0  # round trips of silence after which nothing is left in flight
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Timeouts:
         timing = self._timing
         if state is State.DRAIN:  # silence, or other messages for long enough
             return Signal.HUSH if self._silent_for(timing.drain_s, timing.sync_s, now_s) else None
-        if state is State.QUIET:  # no late lines any more
+        if state is State.QUIET:  # no more late lines
             silence_s = max(timing.quiet_s, TURNS * self._round_trip_s)
             return Signal.HUSH if self._silent_for(silence_s, QUIET_MOST_S, now_s) else None
         waited_s = now_s - self.progress_s

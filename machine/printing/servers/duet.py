@@ -116,7 +116,7 @@ class Duet(PrintServer):
         return path.removeprefix(FOLDER) if isinstance(path, str) else ""
 
     def _since_start(self, phase: PrintState, before: PrintState | None) -> PrintState:
-        """The phase, with idle after a print as its end: a cancelled print was paused before. before: the phase before."""
+        """The phase, with idle after a print as its end: a cancelled print was paused before. before: the previous phase."""
         if phase in ACTIVE:
             self._last = phase
         if phase is not PrintState.READY or before is None or self._last is None:

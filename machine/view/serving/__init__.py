@@ -1,2 +1,1 @@
-"""Serving: pages for this computer alone, by an address that holds a token. Public: `guard.guarded`, `browser.lead_browser`,
-`watch_page.serve_watch_page`."""
+"""Serving: pages for this computer alone, at an address that contains a token."""

@@ -1,6 +1,6 @@
-"""Browser: the person's own one, led to a page of this computer by a file.
+"""Opens a page of this computer in the user's browser through a redirecting file.
 
-What a browser is started with every user of the computer can read, and the address holds the token; Jupyter does it so, too
+All users of a computer can read the arguments of a process, and the address contains the token. Jupyter does the same
 (jupyter_server/serverapp.py, write_browser_open_file).
 """
 
@@ -18,7 +18,7 @@ from profiles.files import remove_older
 from profiles.folders import state_folder
 
 PREFIX, SUFFIX = "workbench-", ".html"
-OLD_S = 24 * 3600.0  # no browser takes so long to start: what a program that was killed has left goes
+OLD_S = 24 * 3600.0  # files of killed programs are deleted after this time, long after any browser has started
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>tiltprint</title><meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0; url={address}"></head>
@@ -28,10 +28,10 @@ PAGE = """<!doctype html>
 
 @contextmanager
 def redirecting(address: str) -> Iterator[Path]:
-    """A redirecting page that this user alone can read, until the program ends. Raises OSError where none can be written."""
+    """Write a redirecting page that only this user can read, and delete it at the end. Raises OSError."""
     folder = state_folder()
     remove_older(folder.glob(f"{PREFIX}*{SUFFIX}"), OLD_S)
-    opened, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=folder)  # of mode 0600
+    opened, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=folder)  # with mode 0600
     path = Path(name)
     try:
         with os.fdopen(opened, "w", encoding="utf-8") as file:
@@ -42,7 +42,7 @@ def redirecting(address: str) -> Iterator[Path]:
 
 
 def lead_browser(address: str, until_end: ExitStack) -> None:
-    """Open a browser beside all else, by a file that is there until the program ends."""
+    """Open a browser in the background, through a file that is deleted at the end of the program."""
     try:
         file = until_end.enter_context(redirecting(address))
     except OSError as error:

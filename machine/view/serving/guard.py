@@ -1,7 +1,7 @@
-"""Guard: only pages of this server are answered, under a name of this computer, by an address that holds the token.
+"""Guard: answers only requests from the server's own pages, to a name of this computer, at an address with the token.
 
-Other users of this computer reach its ports too, so the address is secret. A page from elsewhere could reach the server by the
-person's own browser: its Origin is refused, and a name of its own that points here (DNS rebinding) is no name of this computer.
+Other users of this computer can reach its ports, so the address is secret. A page from elsewhere could reach the server through
+the user's browser: its Origin is refused, and so is a host name of its own that resolves to this computer (DNS rebinding).
 """
 
 import re
@@ -25,24 +25,24 @@ HEADERS = {
 SAFE = ("GET", "HEAD")
 REFUSED_SOCKET = 1008  # policy violation, RFC 6455
 FOREIGN = "this page is for this computer only\n"
-LONG_NUMBER = re.compile(r"/\d{17}\d*(/|$)")  # in no path here: keys are 16 hexadecimal digits, at times all decimal
+LONG_NUMBER = re.compile(r"/\d{17}\d*(/|$)")  # not in any path here: keys are 16 hexadecimal digits, sometimes all decimal
 UNKNOWN = "this page is at the address that tiltprint has told, which is another one with each start\n"
 
 Headers = Iterable[tuple[bytes, bytes]]
 
 
 def values_of(headers: Headers, wanted: bytes) -> list[str]:
-    """What stands in all headers of a name, in small letters."""
+    """Values of all headers with a name (lower case)."""
     return [value.decode("latin-1") for name, value in headers if name.lower() == wanted]
 
 
 def method_of(scope: "Scope") -> str:
-    """The kind of a request; WEBSOCKET for a websocket."""
+    """The method of a request; WEBSOCKET for a websocket."""
     return "WEBSOCKET" if scope["type"] == "websocket" else scope["method"]
 
 
 def own_hosts(names: Iterable[str], port: int, scheme: str = "http") -> tuple[str, ...]:
-    """What the header Host of a request to a server may be. Browsers leave out the default port of a scheme (RFC 9110, 4.2.3).
+    """Allowed values of the Host header. Browsers leave out the default port of a scheme (RFC 9110, 4.2.3).
 
     >>> own_hosts(["localhost"], 8123), own_hosts(["localhost"], 80)
     (('localhost:8123',), ('localhost:80', 'localhost'))
@@ -52,20 +52,20 @@ def own_hosts(names: Iterable[str], port: int, scheme: str = "http") -> tuple[st
 
 
 def is_foreign(headers: Headers, method: str, own: Collection[str], scheme: str = "http") -> bool:
-    """Whether a request goes to a name that is not the server's own, or comes from a page that is not.
+    """Whether a request has a host name other than the server's, or comes from another server's page.
 
-    own: as own_hosts() gives them, in small letters; scheme: of the server's pages.
+    own: result of own_hosts(), lower case; scheme: of the server's pages.
     """
     headers = list(headers)
     hosts, origins = values_of(headers, b"host"), values_of(headers, b"origin")
     if len(hosts) != 1 or hosts[0].lower() not in own:
         return True
-    origin = f"{scheme}://{hosts[0].lower().removesuffix(f':{DEFAULT_PORTS[scheme]}')}"  # it names no default port either
+    origin = f"{scheme}://{hosts[0].lower().removesuffix(f':{DEFAULT_PORTS[scheme]}')}"  # Origin has no default port either
     return bool(origins or method not in SAFE) and origins != [origin]
 
 
 def refusal(headers: Headers, method: str, path: str, token: str, port: int) -> tuple[int, str] | None:
-    """Status and sentence for a request that gets no answer, None for one that does. method: WEBSOCKET for a websocket."""
+    """Status and message for a refused request, None for a permitted one. method: WEBSOCKET for a websocket."""
     if is_foreign(headers, method, own_hosts(NAMES, port)):
         return 403, FOREIGN
     first = path.removeprefix("/").partition("/")[0]
@@ -75,7 +75,7 @@ def refusal(headers: Headers, method: str, path: str, token: str, port: int) -> 
 
 
 def guarded(app: "ASGIApp", token: str, port: int) -> "ASGIApp":
-    """An ASGI application that lets through to another one what may pass, with headers that keep its answers to its pages."""
+    """Wrap an ASGI application: refuse foreign requests, and add security headers to its answers."""
 
     async def guard(scope: "Scope", receive: "Receive", send: "Send") -> None:
         if scope["type"] == "lifespan":
@@ -91,7 +91,7 @@ def guarded(app: "ASGIApp", token: str, port: int) -> "ASGIApp":
 
 
 async def refuse(scope: "Scope", send: "Send", status: int, sentence: str) -> None:
-    """Answer a request with a sentence alone, a websocket by closing it before it is open."""
+    """Answer a request with a message; close a websocket before it is open."""
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": REFUSED_SOCKET})
         return
@@ -101,7 +101,7 @@ async def refuse(scope: "Scope", send: "Send", status: int, sentence: str) -> No
 
 
 def with_headers(send: "Send", headers: Mapping[str, str] = HEADERS) -> "Send":
-    """Answers with the headers of ours that they do not have themselves."""
+    """Add these headers to answers that lack them."""
 
     async def wrapped(message: "Message") -> None:
         if message["type"] == "http.response.start":

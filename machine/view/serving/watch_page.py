@@ -1,6 +1,6 @@
-"""Watch page: the page and the state of a running print, served to this computer alone while the print lasts.
+"""Watch page: serves the page and the state of a running print to this computer while the print lasts.
 
-Its buttons ask of the print what keys in the terminal do. Who is answered: see `machine.view.serving.guard`.
+Its buttons give the same commands as keys at the terminal. `machine.view.serving.guard` decides which requests are answered.
 """
 
 import json
@@ -25,8 +25,8 @@ from profiles.messages import option
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
-LAST_WORD_S = 2.0  # a page that is open asks twice in this time, so it sees how the print ended
-GRACE_S = 1  # for answers under way when the print ends
+LAST_WORD_S = 2.0  # an open page polls twice in this time, so it sees how the print ended
+GRACE_S = 1  # for pending answers when the print ends
 FRAMED = {"Content-Security-Policy": "frame-ancestors 'none'"}
 ORDERS = {
     "pause": Command.PAUSE,
@@ -37,7 +37,7 @@ ORDERS = {
 
 
 class Watched:
-    """A running print as watchers see it. follow() is called from the printing thread, state() from any."""
+    """State of a running print for its page. The printing thread calls follow(); any thread may call state()."""
 
     def __init__(self, page: bytes = b"") -> None:
         self.page = page
@@ -48,7 +48,7 @@ class Watched:
         self._asked, self._end_reported = Event(), Event()
 
     def follow(self, status: PrintStatus) -> None:
-        """Take note of where the print stands."""
+        """Set the newest status."""
         self._status = status
 
     def state(self) -> bytes:
@@ -62,7 +62,7 @@ class Watched:
         return json.dumps((replace(status, state=ended) if ended else status).json()).encode()
 
     def end(self, state: PrintState) -> None:
-        """Say once how the print ended, and wait a moment for those who have asked before to hear it."""
+        """Set the final state once, and wait briefly until a page that has polled before receives it."""
         self._ended = self._ended or state
         if self._asked.is_set():
             self._end_reported.wait(LAST_WORD_S)
@@ -70,8 +70,8 @@ class Watched:
 
 @contextmanager
 def serve_watch_page(loaded: LoadedProgram, port: int | None, control: Control, browser: bool = True) -> Iterator[Watched]:
-    """Serve the page of a print on a port of this computer, 0: on any free one; None: nobody watches. control: of the print,
-    asked by the page's buttons; browser: open it there. Raises OutputError."""
+    """Serve the page of a print on a local port, 0: any free one, None: no page. control: receives the commands of the page's
+    buttons; browser: open the page. Raises OutputError."""
     if port is None:
         yield Watched()
         return
@@ -85,8 +85,8 @@ def serve_watch_page(loaded: LoadedProgram, port: int | None, control: Control, 
 
 @contextmanager
 def serve(page: bytes, port: int = 0, control: Control | None = None) -> Iterator[Watched]:
-    """Serve the page on a port of this computer, 0: any free one, until the block ends. control: of the print; None: nothing can
-    be asked of it. Raises OutputError for a port in use."""
+    """Serve the page on a local port, 0: any free one, until the block ends. control: receives its commands, None: it has none.
+    Raises OutputError for a port in use."""
     from uvicorn import Config, Server
 
     watched = Watched(page)
@@ -115,7 +115,7 @@ def serve(page: bytes, port: int = 0, control: Control | None = None) -> Iterato
 
 
 def _application(watched: Watched, control: Control | None) -> "ASGIApp":
-    """The page, the state and what may be asked of the print, below the token."""
+    """Routes of the page, the state and the commands, below the token."""
     from starlette.applications import Starlette
     from starlette.requests import Request
     from starlette.responses import Response

@@ -1,4 +1,4 @@
-"""Access: who is answered: pages of this computer by the secret address, devices of the local network once they are paired.
+"""Access: this computer's pages have a secret address, devices of the local network must be paired.
 
-Public: `network.open_lan`, `pairing.Door` and `gate.Gate` for the network, `limits`, what a paired device may not ask for.
+Public: `network.open_lan`, `pairing.Door` and `gate.Gate` for the network, `limits` for what a paired device may not request.
 """

@@ -1,4 +1,4 @@
-"""Gate: who is answered from the local network: a paired device, known by its cookie; others get the pairing page alone."""
+"""Gate to the local network: paired devices, known by their cookies, pass; others only get the pairing page."""
 
 import asyncio
 from contextlib import suppress
@@ -14,23 +14,23 @@ from machine.workbench.access.limits import DEVICE
 from machine.workbench.access.network import Lan
 from machine.workbench.access.pairing import Device, Door, Verdict, pairing_page
 
-PAIRED = "/paired/"  # below it stands what this computer's page has below its token
-UNPAIRED_CODE = 4403  # of a websocket whose device is let go
+PAIRED = "/paired/"  # prefix of the paths that this computer's page has below its token
+UNPAIRED_CODE = 4403  # closes the websocket of an unpaired device
 UNPAIRED = "this device is not paired"
 FOREIGN = "the workbench is asked for by an address or a name of its computer, and by its own pages only\n"
 NOTHING = f"the workbench is below {PAIRED}\n"
-MOST_TYPED = 200  # bytes of a code that is sent
-TIMEOUT_S = 10.0  # within which it is there
+MOST_TYPED = 200  # bytes of a submitted code
+TIMEOUT_S = 10.0  # for receiving a code
 
 
 class Gate:
-    """An ASGI application that lets paired devices through to another one."""
+    """An ASGI application that passes the requests of paired devices to another one."""
 
     def __init__(self, app: ASGIApp, door: Door, lan: Lan, port: int) -> None:
         self._app, self._door, self._scheme = app, door, lan.scheme
-        unheeded = "" if lan.certificate else "cross-origin-opener-policy"  # browsers say so on an open line
+        unheeded = "" if lan.certificate else "cross-origin-opener-policy"  # browsers log that an unencrypted page cannot use it
         self._headers = {name: value for name, value in HEADERS.items() if name != unheeded}
-        self._own, self._cookie = lan.hosts(port), f"tiltprint-{port}"  # of a host, whatever the port, a browser has one cookie
+        self._own, self._cookie = lan.hosts(port), f"tiltprint-{port}"  # browsers share the cookies of a host among its ports
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if is_foreign(scope["headers"], method_of(scope), self._own, self._scheme):
@@ -70,7 +70,7 @@ class Gate:
         await answer(scope, receive, with_headers(send, self._headers))
 
     async def _pair(self, request: Request) -> Response:
-        """What a device gets that sends a code."""
+        """Answer a device that sends a code."""
         try:
             async with asyncio.timeout(TIMEOUT_S):
                 typed = await _typed(request)
@@ -89,7 +89,7 @@ def _leading_to(path: str) -> Response:
 
 
 async def _typed(request: Request) -> str:
-    """The code of a form. Raises ValueError for what is none."""
+    """The code in a form. Raises ValueError for other content."""
     content = b""
     async for piece in request.stream():
         content += piece
@@ -99,7 +99,7 @@ async def _typed(request: Request) -> str:
 
 
 def _until_gone(device: Device, kind: str, receive: Receive, send: Send) -> Receive:
-    """What a device says, until it is let go: then its line ends, and what it was sending is broken off."""
+    """Receive a device's messages until it is unpaired, which ends its connection and aborts what it is sending."""
 
     async def received() -> Message:
         hearing, going = asyncio.ensure_future(receive()), asyncio.ensure_future(device.gone.wait())

@@ -1,5 +1,4 @@
-"""Network: how the workbench is reached from the local network: by which addresses (IPv4 only, which every such network has), at
-which sockets, encrypted or not."""
+"""Network: the addresses (IPv4 only, which all local networks support), sockets and encryption of the workbench."""
 
 import os
 import socket
@@ -16,21 +15,20 @@ from machine.view.serving.guard import HOST, own_hosts
 from profiles.errors import OutputError, reason
 from profiles.messages import option
 
-ELSEWHERE = "198.51.100.1"  # of documentation, RFC 5737: nobody is there, and nothing is sent
+ELSEWHERE = "198.51.100.1"  # reserved for documentation (RFC 5737); nothing is sent to it
 SIOCGIFADDR = 0x8915  # Linux, netdevice(7)
 INTERFACES = Path("/sys/class/net")
-TRIES = 20  # ports of the system's choice, each free here, until one is free at all addresses
+TRIES = 20  # ports chosen by the system until one is free at all addresses
 
 
 def network_addresses() -> tuple[str, ...]:
-    """Addresses of private networks, that by which this computer goes out first. None that the internet reaches: who has such a
-    one has no door of his own before it."""
+    """Addresses in private networks, that of the outgoing route first. Public addresses are left out: no router shields them."""
     found = dict.fromkeys([*_outgoing(), *_of_name(), *_of_interfaces()])
     return tuple(address for address in found if _is_private(address))
 
 
 def host_names() -> tuple[str, ...]:
-    """Names by which a network may know this computer, in small letters."""
+    """Names by which a network may know this computer, in lower case."""
     name = socket.gethostname().lower()
     first = name.partition(".")[0]
     return () if first in ("", "localhost") else tuple(dict.fromkeys([name, first, f"{first}.local"]))
@@ -45,20 +43,20 @@ def _is_private(address: str) -> bool:
 
 
 def _outgoing() -> Iterator[str]:
-    """The address that a packet to elsewhere would have; connecting a datagram socket sends none."""
+    """Source address of a packet to the internet; connecting a datagram socket sends nothing."""
     with suppress(OSError), closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as own:
         own.connect((ELSEWHERE, 9))
         yield own.getsockname()[0]
 
 
 def _of_name() -> Iterator[str]:
-    """Those that the system has for its own name: all of them where it is Windows or macOS."""
+    """Addresses that the system has for its host name; on Windows and macOS these are all."""
     with suppress(OSError):
         yield from socket.gethostbyname_ex(socket.gethostname())[2]
 
 
 def _of_interfaces() -> Iterator[str]:
-    """On Linux those of network cards; bridges and tunnels of programs have no device."""
+    """Addresses of network cards on Linux; virtual bridges and tunnels have no device."""
     if sys.platform != "linux":
         return
     from fcntl import ioctl
@@ -66,21 +64,21 @@ def _of_interfaces() -> Iterator[str]:
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as own:
         for _, name in socket.if_nameindex():
             if (INTERFACES / name / "device").exists():
-                with suppress(OSError):  # it has none
+                with suppress(OSError):  # it has no address
                     answer = ioctl(own.fileno(), SIOCGIFADDR, struct.pack("256s", name.encode()[:15]))
                     yield socket.inet_ntoa(answer[20:24])
 
 
 def listen(port: int, host: str = HOST) -> socket.socket:
-    """A socket at a port of an address of this computer, 0: any free one. Raises OutputError for one that cannot be had."""
+    """Listen at a port of an address of this computer, 0: any free one. Raises OutputError if that is impossible."""
     own = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
-        if os.name == "posix":  # lines of a server that died keep its port for a minute; a second listener is refused as ever
+        if os.name == "posix":  # a dead server's connections block its port for a minute; a second listener is still refused
             own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        elif hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows keeps no port, and would let a second program listen there
+        elif hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows blocks no port, but would let a second program listen there
             own.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
         own.bind((host, port))
-        own.listen()  # at once: of two that are bound so, the second is refused here
+        own.listen()  # listen at once, so that a second bound socket is refused here
     except (OSError, OverflowError) as error:
         own.close()
         why = reason(error) if isinstance(error, OSError) else str(error)
@@ -90,7 +88,7 @@ def listen(port: int, host: str = HOST) -> socket.socket:
 
 
 def listen_at_all(port: int, hosts: Iterable[str]) -> tuple[socket.socket, list[socket.socket]]:
-    """The socket at this computer alone, and one at the same port of every other address. Raises OutputError as `listen`."""
+    """Listen at this computer's own address, and at the same port of the others. Raises OutputError."""
     hosts = tuple(hosts)
     for left in reversed(range(TRIES)):
         own = listen(port)
@@ -112,7 +110,7 @@ def listen_at_all(port: int, hosts: Iterable[str]) -> tuple[socket.socket, list[
 
 @dataclass(frozen=True)
 class Certificate:
-    """Files in PEM."""
+    """PEM files."""
 
     chain: Path
     key: Path
@@ -120,7 +118,7 @@ class Certificate:
 
 @dataclass(frozen=True)
 class Lan:
-    """addresses: of this computer; names: by which it may be known, too; certificate: None: not encrypted."""
+    """addresses: of this computer; names: further host names; certificate: None: not encrypted."""
 
     addresses: tuple[str, ...]
     names: tuple[str, ...] = ()
@@ -128,20 +126,19 @@ class Lan:
 
     @property
     def scheme(self) -> str:
-        """The scheme of its addresses: http or https."""
         return "http" if self.certificate is None else "https"
 
     def hosts(self, port: int) -> tuple[str, ...]:
-        """What a browser may call the server at a port."""
+        """Allowed values of the Host header of requests to a port."""
         return own_hosts((*self.addresses, *self.names), port, self.scheme)
 
     def urls(self, port: int) -> tuple[str, ...]:
-        """What a person types."""
+        """URLs to open on a device."""
         return tuple(f"{self.scheme}://{address}:{port}/" for address in self.addresses)
 
 
 def open_lan(chain: Path | None, key: Path | None) -> Lan:
-    """The network that is there now. Raises OutputError where there is none, and for a certificate that cannot be used."""
+    """Find the local network. Raises OutputError if there is none, or the certificate cannot be used."""
     certificate = None if chain is None and key is None else _checked(chain, key)
     addresses = network_addresses()
     if not addresses:
@@ -165,7 +162,7 @@ def _checked(chain: Path | None, key: Path | None) -> Certificate:
 
 
 def _check_pair(chain: Path, key: Path) -> None:
-    """Raises OutputError for what is no certificate, no key, or not the certificate's."""
+    """Raise OutputError unless both files are PEM and the key is the certificate's."""
     asked = []
 
     def password() -> str:

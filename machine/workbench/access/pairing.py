@@ -1,6 +1,6 @@
-"""Pairing: a code that is typed on a device is judged, the device gets a cookie, and the door keeps the devices of one run.
+"""Pairing: checks the code typed on a device, gives the device a cookie, and keeps the list of paired devices.
 
-Wrong codes are counted over all devices: an address can be forged, and shared. At most 20 of 31 ** 8 codes are ever tried.
+Wrong codes are counted over all devices, because addresses can be forged and shared. At most 20 of 31 ** 8 codes are ever tried.
 """
 
 import asyncio
@@ -25,8 +25,8 @@ from profiles.messages import option
 LETTERS = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"  # without I, L, O, 0 and 1, which look alike
 CODE_LENGTH = 8
 WRONG_OF_A_CODE, WRONG_IN_ALL = 5, 20
-FIRST_WAIT_S = 30.0  # after the first code that was used up by wrong ones; doubled after every further one
-# What a user agent has -> the word for it; the first that fits, for Android names Linux, too, and most browsers Safari.
+FIRST_WAIT_S = 30.0  # after too many wrong codes; doubled each time
+# Text in a user agent -> name. The first match wins: Android also names Linux, and most browsers name Safari.
 SYSTEMS = (
     *(("iPhone", "iPhone"), ("iPad", "iPad"), ("Android", "Android"), ("Windows", "Windows"), ("CrOS", "Chromebook")),
     *(("Mac OS X", "Mac"), ("Linux", "Linux")),
@@ -36,16 +36,16 @@ BROWSERS = (
     *(("Chrom", "Chrome"), ("CriOS", "Chrome"), ("Safari", "Safari")),
 )
 COOKIE_BYTES = 24
-# With all that a device may see; pairing_page() leaves out what does not concern it.
+# Contains all that a device may see; pairing_page() removes what does not apply.
 PAGE = (Path(__file__).parent / "pairing.html").read_text("utf-8").replace("{length}", str(CODE_LENGTH))
 STYLE = PAGE.partition("<style>")[2].partition("</style>")[0]
 TOLD, FORM = re.compile(r'<p class="error".*?</p>\n', re.DOTALL), re.compile(r"<form.*?</form>\n", re.DOTALL)
-AFTER_ERROR = 'told hint" aria-invalid="true"'  # of the field, as it is described
+AFTER_ERROR = 'told hint" aria-invalid="true"'  # attribute of the field while it has an error
 OPEN_NETWORK = re.compile(r'<p class="soft" id="open-network">.*?</p>\n', re.DOTALL)
 
 
 class Verdict(StrEnum):
-    """What becomes of a code that was typed. spent: wrong, and the code is another one now; waits, closed: not compared."""
+    """Result of a typed code. spent: wrong, and the code has been replaced; waits, closed: it was not compared."""
 
     PAIRED = "paired"
     WRONG = "wrong"
@@ -56,8 +56,8 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Pairing:
-    """code: the one that pairs next; wrong, wrong_in_all: how many others were typed since it is the code, and since pairing is
-    open; waits: how often codes were used up; waits_until_s: codes are refused until then."""
+    """State of pairing. code: the valid code; wrong: wrong codes typed since it became valid; wrong_in_all: since pairing was
+    opened; waits: number of codes used up; waits_until_s: time until which codes are refused."""
 
     code: str = field(repr=False)
     wrong: int = 0
@@ -67,22 +67,21 @@ class Pairing:
 
     @property
     def closed(self) -> bool:
-        """Whether no device is paired any more."""
+        """Whether no more devices are paired."""
         return self.wrong_in_all >= WRONG_IN_ALL
 
 
 def fresh_code() -> str:
-    """A random code."""
     return "".join(secrets.choice(LETTERS) for _ in range(CODE_LENGTH))
 
 
 def grouped(code: str) -> str:
-    """A code as it is read: ABCD-EFGH."""
+    """Format a code for reading, such as ABCD-EFGH."""
     return f"{code[: CODE_LENGTH // 2]}-{code[CODE_LENGTH // 2 :]}"
 
 
 def judge(pairing: Pairing, typed: str, now_s: float, fresh: str) -> tuple[Pairing, Verdict]:
-    """The state after a code was typed at a time, and what becomes of it. fresh: the code that follows one that is used up."""
+    """Check a code typed at a time; returns the new state and the result. fresh: replaces a code that is used or spent."""
     if pairing.closed:
         return pairing, Verdict.CLOSED
     if now_s < pairing.waits_until_s:
@@ -99,13 +98,13 @@ def judge(pairing: Pairing, typed: str, now_s: float, fresh: str) -> tuple[Pairi
 
 
 def _plain(typed: str) -> bytes:
-    """What a person has typed, without the strokes and spaces between and in capitals."""
+    """The typed code in upper case, without separators."""
     return "".join(letter for letter in typed.upper() if letter.isalnum()).encode()
 
 
 @dataclass(frozen=True)
 class Device:
-    """number: from 1 on, not given again; paired_s: since the epoch; digest: of its cookie; gone: set when it is let go."""
+    """number: from 1, never reused; paired_s: since the epoch; digest: of its cookie; gone: set when it is unpaired."""
 
     number: int
     name: str
@@ -115,19 +114,19 @@ class Device:
 
 
 def device_name(user_agent: str) -> str:
-    """In words of our own alone, for everybody can send any text: 'iPhone, Safari'."""
+    """Name such as 'iPhone, Safari', made of our own words only, because anyone can send any text."""
     found = [next((word for sign, word in table if sign in user_agent), "") for table in (SYSTEMS, BROWSERS)]
     return ", ".join(filter(None, found)) or "a device"
 
 
 def digest_of(cookie: str) -> bytes:
-    """What is kept of a cookie."""
+    """Hash of a cookie, which is stored in its place."""
     return sha256(cookie.encode()).digest()
 
 
 class Door(Observable):
-    """All from the event loop of the server. say: tells the person at the terminal, who alone learns the code; addresses: those
-    that a device is to open; encrypted: by https; clock: seconds, as `time.monotonic`."""
+    """Pairs devices; used from the server's event loop. say: prints to the terminal, which alone shows the code; addresses: for
+    devices to open; encrypted: by https; clock: seconds, as `time.monotonic`."""
 
     def __init__(
         self, say: Callable[[str], None], addresses: tuple[str, ...], encrypted: bool, clock: Callable[[], float] = monotonic
@@ -136,15 +135,15 @@ class Door(Observable):
         self.pairing, self.devices = Pairing(fresh_code()), list[Device]()
         self.encrypted = encrypted
         self._say, self._addresses, self._clock = say, addresses, clock
-        self._last = 0  # number that was given
+        self._last = 0  # last number given
 
     @property
     def wait_s(self) -> float:
-        """How long codes are still refused."""
+        """Time until which codes are refused, from now."""
         return max(0.0, self.pairing.waits_until_s - self._clock())
 
     def announce(self) -> None:
-        """Say what to do."""
+        """Explain how to pair a device."""
         self._say(f"open to the network, too: a device that opens {' or '.join(self._addresses)} asks for a code: {self._code}")
         if not self.encrypted:
             self._say(
@@ -153,7 +152,7 @@ class Door(Observable):
             )
 
     def attempt(self, typed: str, user_agent: str) -> tuple[Verdict, str]:
-        """Judge a code that was typed on a device; its cookie where it is paired now, else ""."""
+        """Check a code typed on a device; returns the result, and the cookie if it is now paired, else ""."""
         self.pairing, verdict = judge(before := self.pairing, typed, self._clock(), fresh_code())
         if verdict == Verdict.PAIRED:
             return verdict, self._admit(device_name(user_agent))
@@ -169,13 +168,13 @@ class Door(Observable):
         return verdict, ""
 
     def device_of(self, cookie: str) -> Device | None:
-        """The paired device that has this cookie; all are compared, in the same time for every cookie."""
+        """The paired device with this cookie; compares all devices, so that the time reveals nothing."""
         digest = digest_of(cookie)
         same = [device for device in self.devices if secrets.compare_digest(device.digest, digest)]
         return same[0] if same else None
 
     def unpair(self, *, device: int) -> None:
-        """Let a device go: its lines end now. Raises PlanError where it is not there."""
+        """Unpair a device and close its connections. Raises PlanError if it is not paired."""
         paired = next((paired for paired in self.devices if paired.number == device), None)
         if paired is None:
             raise PlanError("this device is not paired any more")
@@ -185,19 +184,19 @@ class Door(Observable):
         self.notify()
 
     def reopen(self) -> None:
-        """Begin anew with the counting of wrong codes, and with another code."""
+        """Reset the count of wrong codes, and replace the code."""
         self.pairing = Pairing(fresh_code())
         self._say(f"devices can pair again; the code: {self._code}")
         self.notify()
 
     def snapshot(self) -> dict[str, Any]:
-        """What the page of this computer is told; never the code."""
+        """State for the page of this computer; never contains the code."""
         return {
             "version": self.version,
             "addresses": self._addresses,
             "encrypted": self.encrypted,
             "closed": self.pairing.closed,
-            "waits_until_s": time() + self.wait_s if self.wait_s else 0.0,  # since the epoch: a page may hear of it later
+            "waits_until_s": time() + self.wait_s if self.wait_s else 0.0,  # since the epoch, because a page may receive it late
             "devices": [{"number": each.number, "name": each.name, "paired_s": each.paired_s} for each in self.devices],
         }
 
@@ -218,7 +217,7 @@ STATUS = {Verdict.WRONG: 403, Verdict.SPENT: 403, Verdict.WAITS: 429, Verdict.CL
 
 
 def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
-    """The page. verdict: on the code that this device has typed, None where it has typed none."""
+    """The pairing page. verdict: on the code that this device sent, None: it sent none."""
     told, wait_s = _told(door, verdict), door.wait_s
     body = FORM.sub("", PAGE) if door.pairing.closed else PAGE
     body = OPEN_NETWORK.sub("", body) if door.encrypted else body
@@ -226,14 +225,14 @@ def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
     rest = "img-src data:; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
     headers = {
         "content-security-policy": f"default-src 'none'; style-src {hash_source(STYLE)}; {rest}",
-        "referrer-policy": "same-origin",  # else the form would be sent without its origin
+        "referrer-policy": "same-origin",  # otherwise the form would be sent without its origin
         **({"retry-after": f"{wait_s:.0f}"} if wait_s else {}),
     }
     return HTMLResponse(body, 200 if verdict is None else STATUS[verdict], headers)
 
 
 def _told(door: Door, verdict: Verdict | None) -> str:
-    """What keeps this device from being paired, "" where nothing does."""
+    """Sentence on why this device cannot be paired, or ""."""
     if door.pairing.closed:
         return "Too many wrong codes were typed: no device is paired any more. The page on the computer can let them again."
     if door.wait_s:

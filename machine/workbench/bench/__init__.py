@@ -1,4 +1,4 @@
-"""Bench: what lies on the workbench and what a page may change of it, as values; nothing here writes or waits.
+"""Bench: the model on the workbench and what a page may change of it, as values; no I/O, no waiting.
 
 Public: `bench.Bench`, `bench.History`, the commands that change it in `changes`, `settings.settings_list`.
 """

@@ -1,4 +1,4 @@
-"""Bench: what lies on the workbench, as one value. Every command gives a new one, so undo and redo are values too."""
+"""Bench: the state of the workbench as one immutable value. Every command returns a new one, so undo and redo are values, too."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,19 +26,19 @@ from profiles.part_settings import PartSettings
 from profiles.profile import Profile
 
 USUAL = Given()
-MOST_STEPS = 200  # that can be undone
-MOST_KEPT_FACES = 5_000_000  # of the models of these steps together, some 25 bytes each: every other scale is a model of its own
+MOST_STEPS = 200  # undo steps
+MOST_KEPT_FACES = 5_000_000  # of the models of all steps, some 25 bytes each: every scale makes a model of its own
 
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A model, how it is turned, and how it is cut.
+    """A model, its orientation, and its cuts.
 
-    rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
-    None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
-    search would take, 0: no search has been; priced: times and plastic of the rows are for this profile, as far as there are any.
-    locked: those of the cuts that a search begins with and nobody moves. stops: where the print waits for a person, each with its
-    part wherever that goes; copies: how many of the model on the plate; both stay until another model is opened.
+    rotation: rows of the matrix that turns the model as read. cuts: base planes of parts 2, 3, ... in print order; None: not cut
+    yet. rows: the front from which the cuts were chosen, with increasing numbers of parts; recommended: number of parts that the
+    search prefers, 0: no search yet; priced: times and filament of the rows are those for this profile. locked: cuts that a
+    search keeps and that cannot be moved. stops: pauses, each of which follows its part; copies: of the model on the plate; both
+    remain until another model is opened.
     """
 
     profile: Profile
@@ -56,38 +56,38 @@ class Bench:
 
     @property
     def parts(self) -> int:
-        """How many parts the cuts make; 0: it is not cut yet."""
+        """Number of parts; 0: not cut yet."""
         return 0 if self.cuts is None else len(self.cuts) + 1
 
     @property
     def planned(self) -> bool:
-        """Whether there is anything on it that only a plan's file says: how it is cut, or what is marked."""
+        """Whether it has cuts or zones, which only a plan file can store."""
         return self.cuts is not None or self.zones != NO_ZONES
 
     @property
     def turned(self) -> Floats | None:
-        """(3, 3) how the model is turned; None: it stands as it is read, so a plan needs not say it."""
+        """(3, 3) rotation of the model; None: as read, which a plan need not contain."""
         return None if self.rotation == STANDING else np.array(self.rotation)
 
     @property
     def sought(self) -> tuple[object, ...]:
-        """Everything that decides what a search finds, except the locked planes."""
+        """Everything that determines the result of a search, except the locked planes."""
         return self.model, self.rotation, self.profile, self.zones
 
     @property
     def shaped(self) -> tuple[object, ...]:
-        """Everything that decides the parts."""
+        """Everything that determines the parts."""
         return self.model, self.rotation, self.cuts, self.profile, self.zones
 
     @property
     def printed(self) -> tuple[object, ...]:
-        """Everything that decides what is printed."""
+        """Everything that determines the print."""
         return *self.shaped, self.stops, self.copies
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A command's word, the bench after it, and a sentence for what it has taken away beside what it was for."""
+    """A command's name, the bench after it, and a sentence about what else it removed."""
 
     word: str
     bench: Bench
@@ -96,15 +96,14 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The bench with all that came before it and all that was undone; the last of each is the nearest."""
+    """The current step, previous steps and undone steps; the last of each tuple is the nearest."""
 
     now: Step
     before: tuple[Step, ...] = ()
     undone: tuple[Step, ...] = ()
 
     def do(self, word: str, bench: Bench) -> "History":
-        """Take a further step, none if the bench has not changed. Pauses of parts that are gone are dropped, as is what was
-        undone."""
+        """Add a step, unless the bench is unchanged. Drops the undone steps, and pauses of parts that no longer exist."""
         if bench is self.now.bench:
             return self
         before = self.now.bench if _have_one_model(self.now.bench, bench) else bench
@@ -116,20 +115,20 @@ class History:
         return History(Step(word, after, gone_in_words(word, lost)), _nearest_steps((*self.before, self.now)[-MOST_STEPS:]))
 
     def undo(self) -> "History":
-        """One step back; unchanged where there is none."""
+        """One step back; unchanged if there is none."""
         if not self.before:
             return self
         return History(self.before[-1], self.before[:-1], (*self.undone, self.now))
 
     def redo(self) -> "History":
-        """One step forward again; unchanged where there is none."""
+        """One step forward; unchanged if there is none."""
         if not self.undone:
             return self
         return History(self.undone[-1], (*self.before, self.now), self.undone[:-1])
 
 
 def _nearest_steps(steps: tuple[Step, ...]) -> tuple[Step, ...]:
-    """The nearest steps whose models are not too much for the memory; the nearest of all whatever it is."""
+    """The nearest steps whose models fit into memory; always includes the nearest one."""
     models, faces = set[Model](), 0
     for back, step in enumerate(reversed(steps)):
         model = step.bench.model
@@ -146,11 +145,11 @@ def _have_one_model(before: Bench, after: Bench) -> bool:
 
 
 def _gone(before: Bench, after: Bench) -> list[PartSettings]:
-    """The settings of single parts that are not there any more where the same model is turned or cut otherwise."""
+    """Settings of single parts that were lost because the same model was turned or cut differently."""
     if not _have_one_model(before, after):
         return []
     if (before.cuts, before.rotation) == (after.cuts, after.rotation):
-        return []  # a person has taken them back
+        return []  # the user has reset them
     left = {own.part for own in after.profile.parts}
     return [own for own in before.profile.parts if number_after(before.cuts or (), after.cuts or (), own.part) not in left]
 
@@ -161,31 +160,31 @@ def emptied(bench: Bench) -> Bench:
 
 
 def with_model(bench: Bench, model: Model) -> Bench:
-    """Another model on the bench, as it is read and uncut, with what its file marks."""
+    """The bench with another model, as read and uncut, with the zones of its file."""
     lift_mm = np.array([0.0, 0.0, bench.profile.search.pedestal_mm])
     return replace(emptied(bench), model=model, zones=model.zones.transform(np.eye(3), lift_mm))
 
 
 def with_model_anew(bench: Bench, model: Model | None) -> Bench:
-    """The same model read, turned or cut anew: pauses and copies stay, and what part 1 has of its own."""
+    """The bench with the same model read, turned or cut again: keeps pauses, copies and the settings of part 1."""
     profile = renumbered(bench.profile, bench.cuts or (), ())
     return replace(emptied(bench), model=model, profile=profile, stops=bench.stops, copies=bench.copies)
 
 
 def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
-    """The same model scaled by a factor, its planes and zones in proportion; its front was for the size before."""
+    """Scale the model by a factor, with planes and zones in proportion; drops the front, which was for the old size."""
     bare = replace(with_model_anew(bench, model), profile=bench.profile, rotation=bench.rotation)
     return _with_places_of(bare, bench, factor)
 
 
 def with_model_turned_as_read(bench: Bench, model: Model, turn: Floats, factor: float = 1.0) -> Bench:
-    """The same model turned otherwise, (3, 3), and scaled as it is read, with its zones; its cuts were for the way before."""
+    """Turn the model, (3, 3), and scale it as read, with its zones; drops its cuts."""
     anew = replace(with_model_anew(bench, model), rotation=bench.rotation)
     return _with_places_of(anew, _uncut(bench), factor, turn)
 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
-    """The model turned otherwise, with its zones; its cuts were for the way that it stood before."""
+    """Turn the model to this rotation, with its zones; drops its cuts, which were for the previous orientation."""
     rows = tuple(vector_of(row) for row in rotation)
     if rows == bench.rotation:
         return bench
@@ -198,8 +197,8 @@ def _uncut(bench: Bench) -> Bench:
 
 
 def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floats | None = None) -> Bench:
-    """The planes and zones of a bench before at the same places of its model, which is now scaled by `factor` and turned by
-    `turn` as it is read. Raises PlanError where a box would leave what a plan may have."""
+    """Move planes and zones of the bench `before` with the model, which is now scaled by `factor` and turned as read by `turn`.
+    Raises PlanError if a box would exceed the limits of a plan."""
     if before.model is None or bench.model is None:
         return bench
     if not before.cuts and before.zones == NO_ZONES:
@@ -215,14 +214,13 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
 
 
 def _placing(bench: Bench, factor: float = 1.0) -> Placing:
-    """How the model on a bench stands on the platform."""
+    """Placement of the model on the build plate."""
     assert bench.model is not None
     return Placing.of(bench.model, bench.turned, bench.profile.search.pedestal_mm, factor)
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """The front of a search with its prices, cut by the row that it has chosen. A limb may be named by another point there than
-    it was before."""
+    """Set the front of a search with its prices, and cut by its chosen row. Limbs may get other reference points."""
     chosen = next(row for row in rows if row.chosen)
     parts = planned_parts(chosen)
     names = {before: _same_cut(before, parts) for before in bench.cuts or ()}
@@ -232,7 +230,7 @@ def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
 
 
 def _same_cut(part: PlannedPart, parts: Sequence[PlannedPart]) -> PlannedPart:
-    """The part that has the plane of another and as many limbs above it, named by the nearest points; else that other."""
+    """The part with the same plane and number of limbs whose limb points are nearest; the given part if there is none."""
     plane = part.normal, part.offset_mm, len(part.limbs_mm)
     same = [other for other in parts if (other.normal, other.offset_mm, len(other.limbs_mm)) == plane]
     limbs_mm = np.array(part.limbs_mm)
@@ -240,19 +238,19 @@ def _same_cut(part: PlannedPart, parts: Sequence[PlannedPart]) -> PlannedPart:
 
 
 def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:
-    """Other planes; what is locked of them stays so, and settings of single parts go with their planes."""
+    """Replace the planes; locked ones stay locked, and settings of single parts follow their planes."""
     profile = renumbered(bench.profile, bench.cuts or (), cuts)
     return replace(bench, cuts=cuts, locked=bench.locked & frozenset(cuts), profile=profile)
 
 
 def with_zones(bench: Bench, zones: Zones) -> Bench:
-    """Other zones: the figures of the front were for those before."""
+    """Replace the zones; drops the front, whose figures were for the previous zones."""
     return replace(bench, zones=zones, rows=(), recommended=0)
 
 
 def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
-    """Another profile. The front goes where a search may find another one now, its times and plastic where they may be others;
-    the planes may serve all the same. On another pedestal planes and zones stay with the model."""
+    """Replace the profile. Drops the front if a search might find another one, or its times and filament if they might change.
+    The planes stay; if the pedestal changes, planes and zones move with the model."""
     changed = replace(bench, given=given, profile=profile)
     if profile.search.pedestal_mm != bench.profile.search.pedestal_mm:
         changed = _with_places_of(changed, bench)
@@ -265,17 +263,17 @@ def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
 
 
 def with_rows(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """Fewer rows of the front; which of them is recommended is seen when they are priced."""
+    """Keep only these rows of the front; pricing them determines the recommended one."""
     return replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
 
 
 def rows_to_price(bench: Bench) -> list[int]:
-    """Places of the rows of the front whose time and plastic are shown."""
+    """Indices of the rows of the front whose time and filament are shown."""
     return [row for row, good in enumerate(pareto_optimal(bench.rows)) if good]
 
 
 def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
-    """The front with times and plastic of the rows that were measured, by their places, and what is recommended by them."""
+    """Set time and filament of the measured rows of the front, by index, and the recommendation that follows."""
     rows = [
         replace(row, time_s=prices[number].time_s, filament_mm=prices[number].filament_mm) if number in prices else row
         for number, row in enumerate(bench.rows)
@@ -292,29 +290,29 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
 
 
 def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: Profile) -> Bench:
-    """The planes of a plan. rows: its front, measured; profile: with the plan's settings of single parts."""
+    """Apply the planes of a plan. rows: its measured front; profile: includes the plan's settings of single parts."""
     rotation = STANDING if plan.orientation is None else plan.orientation
     bare = with_model_anew(bench, bench.model)
     return replace(bare, profile=profile, rotation=rotation, cuts=plan.parts, zones=plan.zones, rows=tuple(rows))
 
 
 def plan_of_bench(bench: Bench, name: str) -> PlanFile:
-    """What is to be cut, as a plan's file says it. The model is the one on the bench, so it needs no sha256."""
+    """The cuts and zones as a plan. Its model is the one on the bench, so it needs no hash."""
     orientation = None if bench.rotation == STANDING else bench.rotation
     model = "" if bench.model is None else bench.model.name
     return PlanFile(name, model, "", orientation, bench.cuts or (), bench.zones, bench.rows, tuple(bench.profile.parts))
 
 
 def locked_plan(bench: Bench) -> PlanFile:
-    """What a search begins with: the locked planes, cut first, and the zones."""
+    """Plan with the locked planes, which a search keeps as its first cuts, and the zones."""
     parts = tuple(part for part in bench.cuts or () if part in bench.locked)
     return PlanFile("the locked planes", parts=parts, zones=bench.zones)
 
 
 def laid_down(bench: Bench, normal: Floats) -> Floats:
-    """(3, 3) the rotation that lays a face of this outward normal, of the model as it is read, on the platform the short way."""
+    """(3, 3) rotation that turns a face with this outward normal, of the model as read, down by the smallest angle."""
     now = np.array(bench.rotation)
     across = np.cross(now @ normal, -UP)
     length = float(np.linalg.norm(across))
-    axis = across / length if length > 0.0 else np.eye(3)[0]  # half a turn about any axis across, or none
+    axis = across / length if length > 0.0 else np.eye(3)[0]  # half a turn about any horizontal axis, or none
     return np.asarray(about(axis, atan2(length, float(now @ normal @ -UP))) @ now)

@@ -1,7 +1,6 @@
-"""Changes: the commands of a page that change the bench: at once, its cuts when they have been tried, or its zones.
+"""Changes: commands that change the bench at once, commands that change its cuts after a trial, and commands for its zones.
 
-Each takes a bench on which a model lies, and what the page sends by name. They raise PlanError for what cannot be done. Nothing
-here writes or waits.
+Each takes a bench with a model and the page's arguments, and raises PlanError if it is impossible. No I/O, no waiting.
 """
 
 from collections.abc import Callable
@@ -28,13 +27,13 @@ from profiles.messages import option
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
-TURN_DIGITS = 15  # so that quarter turns are exact
+TURN_DIGITS = 15  # makes quarter turns exact
 MOST_STOPS = 1000
 Cuts = tuple[PlannedPart, ...]
 TurnDeg = Annotated[float, Field(ge=-360, le=360)]
 Kind = Literal["keep", "no_seam", "no_support", "support"]
 GrownDeg = Annotated[float, Field(ge=0, le=MOST_GROWN_DEG)]
-WORDS = {  # for the step in the history of a mark of each kind
+WORDS = {  # name of the history step that marks each kind
     "keep": "mark: no cut here",
     "no_seam": "mark: no seam here",
     "no_support": "mark: no support here",
@@ -48,17 +47,17 @@ def turn(bench: Bench, *, axis: Literal["x", "y", "z"], deg: TurnDeg) -> Bench:
 
 
 def stand(bench: Bench, *, rotation: Rotation) -> Bench:
-    """Turn the model as the rows of a rotation say."""
+    """Turn the model to the rotation with these rows."""
     return with_rotation(bench, rotation)
 
 
 def lay(bench: Bench, *, normal: Direction) -> Bench:
-    """Lay the model down on a side of this outward normal, in its own frame."""
+    """Lay the model on the face with this outward normal, in the model's own frame."""
     return with_rotation(bench, _rounded(laid_down(bench, np.array(normal))))
 
 
 def take(bench: Bench, *, parts: int) -> Bench:
-    """Take the row of the front that has this number of parts."""
+    """Choose the row of the front with this number of parts."""
     rows = {row.parts: row for row in bench.rows}
     if parts not in rows:
         expected = f"one of {', '.join(map(str, rows))} is expected" if rows else "no parts have been found yet"
@@ -68,24 +67,23 @@ def take(bench: Bench, *, parts: int) -> Bench:
 
 
 def lock(bench: Bench, *, part: int, locked: bool = False) -> Bench:
-    """Lock the plane of a part, or unlock it."""
     plane = frozenset({planned_part(bench, part)})
     after = bench.locked | plane if locked else bench.locked - plane
     return bench if after == bench.locked else replace(bench, locked=after)
 
 
 def set_part(bench: Bench, *, part: int, key: str, value: str | None = None) -> Bench:
-    """Give a part alone another value of a key of the process; null: as all parts have it."""
+    """Set a process key for one part; null: use the common value."""
     return _with_settings(bench, with_part_setting(bench.profile, _part(bench, part), key, value))
 
 
 def reset_part(bench: Bench, *, part: int) -> Bench:
-    """Clear what a part has of its own."""
+    """Clear the settings of one part."""
     return _with_settings(bench, without_part_settings(bench.profile, _part(bench, part)))
 
 
 def add_stop(bench: Bench, *, kind: Literal["pause", "filament_change"], at: str) -> Bench:
-    """A pause before a layer or height, written as the options of `export` take it; pauses come first, as they do there."""
+    """Add a pause before a layer or height, written like the options of `export`; pauses precede filament changes, as there."""
     (stop,) = parse_stops([at], []) if kind == "pause" else parse_stops([], [at])
     if stop in bench.stops:
         return bench
@@ -95,14 +93,14 @@ def add_stop(bench: Bench, *, kind: Literal["pause", "filament_change"], at: str
 
 
 def remove_stop(bench: Bench, *, number: int) -> Bench:
-    """Take a pause away, numbered from 1."""
+    """Remove a pause, numbered from 1."""
     check_number("number", number, 1, len(bench.stops))
     return replace(bench, stops=(*bench.stops[: number - 1], *bench.stops[number:]))
 
 
 def copies(bench: Bench, *, count: int) -> Bench:
-    """Another number of copies on the plate."""
-    check_number(option("copies"), count, 1, MOST_COPIES)  # as the option is refused
+    """Set the number of copies on the plate."""
+    check_number(option("copies"), count, 1, MOST_COPIES)  # same message as for the option
     return bench if count == bench.copies else replace(bench, copies=count)
 
 
@@ -115,7 +113,7 @@ def _with_settings(bench: Bench, profile: Profile) -> Bench:
 
 
 def _rounded(matrix: Floats) -> list[list[float]]:
-    """Rows of a rotation made orthogonal again after many turns, without the noise of the last digit."""
+    """Rows of a rotation, orthogonalised after many turns, without rounding noise."""
     left, _, right = np.linalg.svd(matrix)
     rows: list[list[float]] = (np.round(left @ right, TURN_DIGITS) + 0.0).tolist()
     return rows
@@ -123,11 +121,11 @@ def _rounded(matrix: Floats) -> list[list[float]]:
 
 @dataclass(frozen=True)
 class Edit:
-    """Other cuts, which are tried before they are taken.
+    """Other cuts, to be tried before they are applied.
 
-    word: for its step in the history. orders: the cuts in the print orders that will do, the wanted one first, each with the
-    number of the part whose plane is put somewhere, 0: none is. near: the nearest place that can be cut will do for that plane.
-    reason: how the sentence begins that tells why it cannot be done, where the planes alone do not say it.
+    word: name of the history step. orders: the cuts in acceptable print orders, the wanted one first, each with the number of the
+    part whose plane was placed, 0: none. near: shift that plane to the nearest position that can be cut. reason: beginning of the
+    sentence that reports a failure, if the planes alone do not explain it.
     """
 
     word: str
@@ -137,12 +135,12 @@ class Edit:
 
     @property
     def cuts(self) -> Cuts:
-        """The cuts that are wanted."""
+        """The cuts in the wanted order."""
         return self.orders[0][0]
 
 
 def add(bench: Bench, *, normal: Direction, offset_mm: Mm, after: int | None = None, near: bool = False) -> Edit:
-    """A plane for a new part printed after the part `after`, without that as the last one."""
+    """Add a plane for a new part, printed after the part `after`, by default last."""
     cuts, plane = bench.cuts or (), PlannedPart(normal, offset_mm)
     most = len(cuts) + 1
     wanted = most + 1 if after is None else check_number("after", after, 1, most) + 1
@@ -153,30 +151,30 @@ def add(bench: Bench, *, normal: Direction, offset_mm: Mm, after: int | None = N
 
 
 def move(bench: Bench, *, part: int, normal: Direction, offset_mm: Mm, near: bool = False) -> Edit:
-    """The plane of a part becomes another one; its limbs stay."""
+    """Replace the plane of a part; its limbs stay."""
     plane = PlannedPart(normal, offset_mm, limbs_mm=planned_part(bench, part).limbs_mm)
     return Edit("move a plane", [(_replaced(bench, part, plane), part)], near)
 
 
 def snap(bench: Bench, part: int, neck: PlannedPart) -> Edit:
-    """The plane of a part becomes the neck that was found near it."""
+    """Replace the plane of a part by the neck found near it."""
     reason = f"the neck near the plane of part {part} is no place for a cut: "
     return Edit("snap to the neck", [(_replaced(bench, part, neck), part)], reason=reason)
 
 
 def limb(bench: Bench, *, part: int, point_mm: Point | None = None) -> Edit:
-    """A part becomes the piece above its plane at a point alone, or without a point all that lies above."""
+    """Restrict a part to the piece above its plane at a point; without a point, to everything above."""
     limbs_mm = () if point_mm is None else (point_mm,)
     return Edit("choose a limb", [(_replaced(bench, part, replace(planned_part(bench, part), limbs_mm=limbs_mm)), 0)])
 
 
 def remove(bench: Bench, *, part: int) -> Edit:
-    """Without the plane of a part."""
+    """Remove the plane of a part."""
     return Edit("remove a plane", [(_replaced(bench, part), 0)])
 
 
 def reorder(bench: Bench, *, part: int, to: int) -> Edit:
-    """A part is printed as number `to`."""
+    """Print a part as number `to`."""
     moved = planned_part(bench, part)
     others = [cut for cut in bench.cuts or () if cut is not moved]
     others.insert(check_number("to", to, 2, bench.parts) - 2, moved)
@@ -185,12 +183,12 @@ def reorder(bench: Bench, *, part: int, to: int) -> Edit:
 
 
 def planned_part(bench: Bench, part: int) -> PlannedPart:
-    """The part of a number, which has a plane. Raises PlanError."""
+    """The part with this number, which has a plane. Raises PlanError."""
     return (bench.cuts or ())[check_number("part", part, 2, bench.parts) - 2]
 
 
 def check_unlocked(bench: Bench, part: int) -> None:
-    """Raises PlanError where the plane of a part is locked, or it has none."""
+    """Raise PlanError if the plane of a part is locked or does not exist."""
     if planned_part(bench, part) in bench.locked:
         raise PlanError(f"the plane of part {part} is locked: unlock it first")
 
@@ -212,8 +210,8 @@ def mark(
     point_mm: Point | None = None,
     angle_deg: GrownDeg | None = None,
 ) -> Zones:
-    """With a further zone: a box, along `axes` where it leans, or the faces around a point as far as an angle; in place of the
-    zone `number`, if one is given. Reads the model's mesh. Raises PlanError."""
+    """Add a zone, or replace the zone `number`: a box, along `axes` if tilted, or the faces around a point within an angle. Reads
+    the model's mesh. Raises PlanError."""
     zone = _box(min_mm, max_mm, axes) if point_mm is None else _grown(bench, point_mm, angle_deg)
     zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
     index = len(zones) if number is None else check_number("number", number, 1, len(zones)) - 1
@@ -240,7 +238,7 @@ def _grown(bench: Bench, point_mm: Point, angle_deg: float | None) -> Grown:
 
 
 def unmark(bench: Bench, *, kind: Kind, number: int) -> Zones:
-    """Without the zone `number` of a kind. Raises PlanError."""
+    """Remove the zone `number` of a kind. Raises PlanError."""
     zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
     index = check_number("number", number, 1, len(zones)) - 1
     return _with(bench.zones, kind, (*zones[:index], *zones[index + 1 :]))
@@ -252,14 +250,14 @@ def _with(zones: Zones, kind: str, several: tuple[AnyZone, ...]) -> Zones:
 
 
 def workpiece_mesh(bench: Bench) -> Mesh:
-    """The model as it stands on the platform or a pedestal, in the workpiece frame."""
+    """The model on the build plate or pedestal, in the workpiece frame."""
     assert bench.model is not None
     standing = set_on_plate(bench.model.mesh(), bench.turned)
     lift_mm = bench.profile.search.pedestal_mm
     return standing.transform(np.eye(3), (0.0, 0.0, lift_mm)) if lift_mm > 0.0 else standing
 
 
-# The name of a command -> the function that does it, and the word for its step in the history.
+# Command -> its function, and the name of its history step.
 CHANGES: dict[str, tuple[Callable[..., Bench], str]] = {
     "turn": (turn, "turn the model"),
     "stand": (stand, "lay the model down"),
@@ -272,7 +270,7 @@ CHANGES: dict[str, tuple[Callable[..., Bench], str]] = {
     "remove_stop": (remove_stop, "take a pause away"),
     "copies": (copies, "print another number of copies"),
 }
-# Those that give other cuts.
+# Commands that return other cuts.
 EDITS: dict[str, Callable[..., Edit]] = {"add": add, "move": move, "limb": limb, "remove": remove, "reorder": reorder}
-# The commands that give other zones by their names; each runs in a process, for it may read the model's mesh.
+# Commands that return other zones; each runs in a worker process, because it may read the model's mesh.
 MARKINGS: dict[str, Callable[..., Zones]] = {"mark": mark, "unmark": unmark}

@@ -1,5 +1,5 @@
-"""Model: a model as it is read, its triangles in a file, so that they go through no pipe and lie in no memory for longer than
-they are worked with; planes and zones go along when it is turned, scaled or lifted."""
+"""Model: a model as read, whose triangles are in a file, so that they pass through no pipe and use memory only while needed; and
+its placement, which moves planes and zones along."""
 
 import pickle
 from collections.abc import Iterator, Mapping
@@ -19,17 +19,17 @@ from mdp.zone import NO_ZONES, AnyZone, Grown, MeshVolume, Modifier, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 
-POINT_DIGITS, BOX_DIGITS = 3, 9  # of the mm of a mark's place and of a box's sides
-LEVEL = 1e-9  # of a cosine: a box turned by quarters is along the platform's axes again
+POINT_DIGITS, BOX_DIGITS = 3, 9  # digits after the point of mm, for points of marks and sides of boxes
+LEVEL = 1e-9  # of a cosine: after quarter turns a box is along the plate's axes again
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A model as it is read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for every repair.
+    """A model as read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for each repair.
 
-    key: what tells it from every other reading; a page asks for its triangles by it. zones: the boxes that its file marks;
-    shapes_file: with what else it marks, None: nothing. plate: of a slicer file, None: the first of `plates`, which are their
-    names by their numbers. has_settings: its file keeps some.
+    key: identifies this reading; a page requests its triangles by it. zones: boxes marked in its file; shapes_file: other marks,
+    None: there are none. plate: of a slicer file, None: the first of `plates`, number -> name. has_settings: its file contains
+    settings.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Model:
     def stored(
         cls, name: str, path: Path, read: ReadModel, mesh_file: Path, plate: int | None = None, has_settings: bool = False
     ) -> "Model":
-        """One whose mesh is written to a file first, and marks that are no boxes to another; boxes move with the bench."""
+        """Write the mesh, and marks other than boxes, to files; boxes stay in memory, because they move with the bench."""
         mesh, zones = read.mesh, read.zones
         with mesh_file.open("wb") as file:
             file.writelines(mesh_blocks(mesh))
@@ -75,14 +75,14 @@ class Model:
         )
 
     def shapes(self) -> Zones:
-        """What its file marks that is no box, on the model as it is read."""
+        """Marks of its file other than boxes, on the model as read."""
         if self.shapes_file is None:
             return NO_ZONES
         shapes: Zones = pickle.loads(self.shapes_file.read_bytes())  # written by this program into its own folder
         return shapes
 
     def mesh(self) -> Mesh:
-        """Its triangles, read anew."""
+        """Read its triangles."""
         with self.mesh_file.open("rb") as file:
             points, count = np.fromfile(file, "<u4", 2)
             vertices = np.fromfile(file, "<f8", 3 * points).reshape(-1, 3)
@@ -92,8 +92,8 @@ class Model:
 
 
 def mesh_blocks(mesh: Mesh) -> Iterator[memoryview]:
-    """A mesh as its file and the page have it: two counts as uint32, vertices (n, 3) float64 in mm, faces (m, 3) int32, and what
-    the model's file paints each face with, (m,) int32, if anything; all little-endian."""
+    """A mesh in the format of its file and the page, little-endian: two counts as uint32, vertices (n, 3) float64 in mm, faces
+    (m, 3) int32, and the face colours of the model's file, (m,) int32, if any."""
     blocks: list[NDArray[np.generic]] = [
         np.array([len(mesh.vertices), len(mesh.faces)], "<u4"),
         mesh.vertices.astype("<f8", copy=False),
@@ -106,7 +106,7 @@ def mesh_blocks(mesh: Mesh) -> Iterator[memoryview]:
 
 @dataclass(frozen=True, eq=False)
 class Placing:
-    """How a model as it is read is put on the platform: turned (3, 3), scaled, shifted by mm."""
+    """Transformation from a model as read to the build plate: rotation (3, 3), scale, shift in mm."""
 
     turn: Floats
     factor: float
@@ -114,8 +114,8 @@ class Placing:
 
     @classmethod
     def of(cls, model: Model, turned: Floats | None, lift_mm: float, factor: float = 1.0) -> "Placing":
-        """A model set on the platform, or on a pedestal. turned: None, it stands as it is read; factor: by how much it was scaled
-        when it was read."""
+        """Place a model on the build plate or a pedestal. turned: None: as read; factor: scale that was applied when it was
+        read."""
         lift = np.array([0.0, 0.0, lift_mm])
         if turned is None:
             return cls(np.eye(3), factor, lift)
@@ -124,13 +124,13 @@ class Placing:
         return cls(turned, factor, lift - (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]))
 
     def after(self, before: "Placing") -> "Placing":
-        """What brings places of the same model from where they were before to where they are now."""
+        """Transformation from the model's previous placement to this one."""
         turn, factor = _between(before.turn, self.turn), self.factor / before.factor
         return Placing(turn, factor, self.shift_mm - factor * turn @ before.shift_mm)
 
 
 def _between(before: Floats, after: Floats) -> Floats:
-    """The rotation from one turn to another, which a person may have rounded; it is not rounded, so that errors do not add up."""
+    """Rotation between two turns that may be rounded; it is not rounded itself, so that errors do not accumulate."""
     if np.array_equal(before, after):
         return np.eye(3)
     left, _, right = np.linalg.svd(after @ before.T)
@@ -139,7 +139,7 @@ def _between(before: Floats, after: Floats) -> Floats:
 
 
 def moved_zones(zones: Zones, move: Placing) -> Zones:
-    """The zones on the same places of the model. Raises PlanError for a box that a plan could not have there, and for a mesh."""
+    """Move zones with the model. Raises PlanError for a mesh, and for a box outside the limits of a plan."""
     kinds: dict[str, Any] = {
         kind: tuple(_moved(zone, move, f"{kind} {number}") for number, zone in enumerate(getattr(zones, kind), start=1))
         for kind in ZONE_KINDS
@@ -149,7 +149,7 @@ def moved_zones(zones: Zones, move: Placing) -> Zones:
 
 
 def moved_part(part: PlannedPart, move: Placing) -> PlannedPart:
-    """A part whose plane, where it is given whole, goes through the same places of the model."""
+    """Move the plane of a part with the model, if it is fully given."""
     if part.normal is None or part.offset_mm is None:
         return part
     normal = move.turn @ np.array(part.normal)
@@ -181,7 +181,7 @@ def _immovable(volume: MeshVolume, label: str) -> str:
 
 def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
     room = None if box.room is None else _moved_box(box.room, move, label)
-    axes = box.along(move.turn).T  # the box's own, which go along, as rows
+    axes = box.along(move.turn).T  # the box's own axes as rows
     low, high = (move.factor * np.array(corner) + axes @ move.shift_mm for corner in (box.min_mm, box.max_mm))
     level = np.round(axes)
     if np.abs(axes - level).max() > LEVEL:
@@ -192,7 +192,7 @@ def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
 
 
 def _sides(low: Floats, high: Floats, label: str) -> tuple[Vector, Vector]:
-    """The corners as a plan may have them, which end a box that reaches farther. Raises PlanError where nothing is left of it."""
+    """Corners clipped to the limits of a plan. Raises PlanError if nothing of the box is left."""
     least, most = (vector_of(np.round(np.clip(corner, -MOST_MM, MOST_MM), BOX_DIGITS) + 0.0) for corner in (low, high))
     if not all(x < y for x, y in zip(least, most, strict=True)):
         corners = " and ".join(f"{key} [{', '.join(f'{x:g}' for x in at)}]" for key, at in (("min_mm", low), ("max_mm", high)))

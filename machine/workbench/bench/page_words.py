@@ -1,6 +1,6 @@
-"""Page words: the marks of a message (see profiles/messages.py) as the workbench's page shows them.
+"""Renders the marks of a message (see profiles/messages.py) in the words of the workbench's page.
 
-A key is shown by its label, an option by the field that does what the option does.
+A key is shown by its label, an option by the field that does the same.
 """
 
 from typing import Any
@@ -11,7 +11,7 @@ from profiles.profile import SECTIONS
 from profiles.wording import keys
 
 LABELS = {key: field.title or "" for section, model in SECTIONS.items() for key, field in keys(model, f"{section}.")}
-# By the name of a mark. An option has two texts, without its value and with it; a phrase has one.
+# By the name of a mark. An option has two texts, without and with its value; a phrase has one.
 OPTIONS = {
     "--as-is": ("Undo", ""),
     "--baud": ("the baud rate", "the baud rate {}"),
@@ -54,7 +54,7 @@ PHRASES = {
 
 
 def page_words(message: str) -> str:
-    """The message with the page's fields in the place of options, and labels in that of keys.
+    """The message with the page's fields in place of options, and labels in place of keys.
 
     >>> from profiles.messages import advice, key_name
     >>> page_words(f"{key_name('process.walls')} is -3: it must be a whole number from 0 to 50")
@@ -66,7 +66,7 @@ def page_words(message: str) -> str:
 
 
 def in_page_words(value: Any) -> Any:
-    """The same for all texts of plain values, in lists and tables, too; what is no text stays."""
+    """Apply page_words() to all texts in nested lists and dicts; other values are unchanged."""
     if isinstance(value, str):
         return page_words(value)
     if isinstance(value, dict):
@@ -75,7 +75,7 @@ def in_page_words(value: Any) -> Any:
 
 
 def _words(name: str, value: str, terminal: str) -> str:
-    """What the page has in place of a mark; what it has no field for is shown as at a terminal."""
+    """The page's text for a mark, or the terminal's if the page has no such field."""
     if name.endswith("--set") and "=" in value:
         key, _, given = value.partition("=")
         return f"set {_label(key)} to {given}" if name.startswith("advice") else f"{_label(key)} = {given}"

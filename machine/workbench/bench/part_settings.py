@@ -1,4 +1,4 @@
-"""Part settings: what a person sets for one part alone, and which part it is for when planes come, go or change their order."""
+"""Settings of single parts, and their renumbering when planes are added, removed, moved or reordered."""
 
 from collections.abc import Sequence
 
@@ -13,8 +13,8 @@ Cuts = Sequence[PlannedPart]
 
 
 def number_after(before: Cuts, after: Cuts, part: int) -> int | None:
-    """The number that a part has among other planes: a part goes with its plane, also where that was moved alone, and part 1
-    stays on the platform. None: it is gone."""
+    """The number of a part after the planes have changed; None: it no longer exists. A part keeps its plane, even if that alone
+    was moved; part 1 stays on the build plate."""
     index = part - 2
     if index < 0:
         return part
@@ -26,8 +26,7 @@ def number_after(before: Cuts, after: Cuts, part: int) -> int | None:
 
 
 def renumbered_stops(stops: Sequence[Stop], before: Cuts, after: Cuts) -> tuple[tuple[Stop, ...], tuple[Stop, ...]]:
-    """The stops among other planes, and those whose parts are gone. One that was typed for a part that has not been there yet
-    stays as it is."""
+    """Renumbered stops, and those whose parts no longer exist. Stops of parts that did not exist before are unchanged."""
     stays, gone = list[Stop](), list[Stop]()
     for stop in stops:
         part = stop.part if stop.part > len(before) + 1 else number_after(before, after, stop.part)
@@ -39,7 +38,7 @@ def renumbered_stops(stops: Sequence[Stop], before: Cuts, after: Cuts) -> tuple[
 
 
 def gone_in_words(word: str, gone: Sequence[tuple[int, str]]) -> str:
-    """What a step has taken away with its parts, each with the number of its part, as options spell it; "" for nothing."""
+    """Sentence about what a step removed with its parts: pairs of part and option; "" for nothing."""
     if not gone:
         return ""
     numbers, options = {part for part, _ in gone}, ", ".join(option for _, option in gone)
@@ -48,7 +47,7 @@ def gone_in_words(word: str, gone: Sequence[tuple[int, str]]) -> str:
 
 
 def with_part_setting(profile: Profile, part: int, key: str, value: str | None) -> Profile:
-    """The profile with another value of a key of the process for one part; None: as all parts have it. Raises ProfileError."""
+    """Set a process key of one part; None: use the common value. Raises ProfileError."""
     name = key.removeprefix("process.")
     values = own_values(profile, part)
     values.pop(name, None)
@@ -58,23 +57,23 @@ def with_part_setting(profile: Profile, part: int, key: str, value: str | None) 
 
 
 def without_part_settings(profile: Profile, part: int) -> Profile:
-    """The profile with that part as all parts are."""
+    """The profile without settings of this part."""
     others = [own for own in profile.parts if own.part != part]
     return profile.model_copy(update={"parts": others})
 
 
 def own_values(profile: Profile, part: int) -> dict[str, object]:
-    """What a part has of its own, by the keys of the process."""
+    """Process keys and values of one part."""
     return next((dict(own.process) for own in profile.parts if own.part == part), {})
 
 
 def option(own: PartSettings) -> str:
-    """What `--part` is given for them: `2:walls=5,seam=rear`."""
+    """Value of the option `--part`, such as `2:walls=5,seam=rear`."""
     return f"{own.part}:{','.join(f'{key}={_typed(value)}' for key, value in own.process.items())}"
 
 
 def values_in_words(own: PartSettings) -> str:
-    """The settings of a part alone: `walls=5, seam=rear`, with marked keys."""
+    """The settings of a part with marked keys, such as `walls=5, seam=rear`."""
     return ", ".join(f"{key_name(f'process.{key}', key)}={_typed(value)}" for key, value in own.process.items())
 
 
@@ -83,8 +82,7 @@ def _typed(value: object) -> str:
 
 
 def renumbered(profile: Profile, before: Cuts, after: Cuts) -> Profile:
-    """The profile with settings for the parts that they were made for, among other planes; what a part that is gone had goes with
-    it."""
+    """The profile with its part settings renumbered after the planes have changed; drops those of parts that no longer exist."""
     places = ((own, number_after(before, after, own.part)) for own in profile.parts)
     values = [own.model_copy(update={"part": part}) for own, part in places if part is not None]
     values.sort(key=lambda own: own.part)

@@ -1,4 +1,4 @@
-"""Settings: the profile as a page shows it, what a person changes of it, and the command that does what lies on the bench."""
+"""Settings: the profile as a page shows it, the user's changes to it, and the command line that reproduces the bench."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -24,7 +24,7 @@ from profiles.profile import DEFAULTS, SECTIONS, Profile, load, with_part_settin
 from profiles.toml_text import read_value, rows_text, value_text
 
 BLOCKS_OF = "machine.gcode."
-ORDER = ("process", "material", "search", "machine")  # what is changed most comes first
+ORDER = ("process", "material", "search", "machine")  # most often changed first
 BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
 
 
@@ -34,30 +34,30 @@ def key_of(setting: str) -> str:
 
 
 def with_setting(given: Given, key: str, value: str | None) -> Given:
-    """The same with another value for a key, spelled in one line; None: as the profile has it."""
+    """Set a key to a value, written in one line; None: reset it to the profile's value."""
     others = tuple(setting for setting in given.settings if key_of(setting) != key)
     return replace(given, settings=others if value is None else (*others, f"{key}={_in_one_line(value)}"))
 
 
 def with_given(given: Given, inside: Given) -> Given:
-    """The same with another material and further settings, which replace those of the same keys."""
+    """Replace the material, and add settings, which override those of the same keys."""
     keys = set(map(key_of, inside.settings))
     others = (setting for setting in given.settings if key_of(setting) not in keys)
     return replace(given, material=inside.material, settings=(*others, *inside.settings))
 
 
 def with_typed(given: Given, key: str, value: str | None, before: Profile) -> Given:
-    """The same for what a person types: what the profile has without it is no change. Raises ProfileError."""
+    """Set a key to a typed value; a value that equals the profile's is not a change. Raises ProfileError."""
     changed, unchanged = (with_setting(given, key, new) for new in (value, None))
     typed = profile_as_given(changed, before)
     try:
         return unchanged if typed == profile_as_given(unchanged, before) else changed
-    except ProfileError:  # what is typed mends the profile
+    except ProfileError:  # the change makes an invalid profile valid
         return changed
 
 
 def _in_one_line(value: str) -> str:
-    """A value as it is best typed at a terminal: text without quotation marks where it is text without them, too."""
+    """A value in its shortest form at a terminal: text without quotation marks if it is unambiguous."""
     meant = read_value(value.strip())
     if isinstance(meant, str):
         plain = "\n" not in meant and meant == meant.strip() and read_value(meant) == meant
@@ -66,37 +66,37 @@ def _in_one_line(value: str) -> str:
 
 
 def without_settings(given: Given, kind: str | None) -> Given:
-    """The same with none of what is set for a machine, a material or a process; None: for all three."""
+    """Reset the settings of a machine, a material or a process; None: of all three."""
     gone = given.settings if kind is None else settings_of(given, kind)
     return replace(given, settings=tuple(setting for setting in given.settings if setting not in gone))
 
 
 def settings_of(given: Given, kind: str) -> list[str]:
-    """Those of a machine, a material or a process alone."""
+    """Settings of a machine, a material or a process."""
     return [setting for setting in given.settings if setting.partition(".")[0].strip() in OF_KIND[kind]]
 
 
 def with_name(given: Given, kind: str, name: str) -> Given:
-    """The same with another machine, material or process. Raises ProfileError for one that is not known."""
+    """Choose another machine, material or process. Raises ProfileError for an unknown one."""
     if name not in known(kind):
         raise ProfileError(f"{name!r} is no {kind}: {', '.join(known(kind))} are known")
     return named(given, kind, name)
 
 
 def named(given: Given, kind: str, name: str) -> Given:
-    """The same with another machine, material or process, by its name or its file."""
+    """Choose another machine, material or process, by name or file."""
     change: dict[str, Any] = {kind: name}
     return replace(given, **change)
 
 
 def profile_as_given(given: Given, before: Profile) -> Profile:
-    """The profile, with the settings of single parts that the one before had. Raises ProfileError."""
+    """Load the profile, with the part settings of the previous one. Raises ProfileError."""
     profile = load(given.machine, given.material, given.process, given.settings)
     return with_part_settings(profile, before.parts)
 
 
 def check_block(profile: Profile, key: str) -> None:
-    """Raises ProfileError where the key is that of a G-code block that cannot be written, or of a dialect not the blocks'."""
+    """Raise ProfileError if a key's G-code block cannot be written, or if a new dialect does not fit the blocks."""
     blocks = [key.removeprefix(BLOCKS_OF)] if key.startswith(BLOCKS_OF) else []
     problems = block_problems(profile, *blocks) if blocks or key == "machine.dialect" else []
     if problems:
@@ -104,9 +104,8 @@ def check_block(profile: Profile, key: str) -> None:
 
 
 def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[str, Any]]:
-    """Every key in its group (a matter, or a table of a machine): its label, level, unit, meaning, kind, range or choices, value,
-    whether a person has changed it, and then what the profile has. part: of this part alone, what it may have of its own; 0: of
-    all."""
+    """Rows of all keys with group (topic, or table of a machine), label, level, unit, meaning, kind, range or choices, value,
+    whether the user has changed it, and if so the profile's value. part: list this part's keys instead, 0: those of all parts."""
     if part == 0:
         changed = set(map(key_of, given.settings))
         unchanged = {row["key"]: row["value"] for row in _all_rows(_unchanged(given))} if changed else {}
@@ -114,7 +113,7 @@ def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[st
         for row in rows:
             key = row["key"]
             row |= {"changed": key in changed, "unchanged": unchanged.get(key) if key in changed else None}
-            # what a G-code block may name in braces
+            # names that a G-code block may contain in braces
             row["placeholders"] = list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
         return rows
     own, allowed = own_values(profile, part), set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
@@ -127,7 +126,7 @@ def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[st
 
 
 def _unchanged(given: Given) -> Profile | None:
-    """The profiles as they are named; None where they are right only with what is set."""
+    """The profile without changes; None if it is only valid with them."""
     try:
         return load(given.machine, given.material, given.process)
     except ProfileError:
@@ -145,7 +144,7 @@ def _process_rows(profile: Profile) -> dict[str, dict[str, Any]]:
 
 
 def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str = "", about: str = "") -> Iterator[dict[str, Any]]:
-    """group, about: of the table that the model is, "" for the section itself, whose keys are in groups by their matters."""
+    """group, about: of the table that the model is; "" for a section, whose keys are grouped by topic."""
     schema = _schema(model)
     for name, field in model.model_fields.items():
         table = field.annotation
@@ -172,14 +171,14 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
 
 @cache
 def _schema(model: type[Frozen]) -> dict[str, Any]:
-    """What pydantic says of every key: it works that out anew each time, which takes longer than all the rest."""
+    """JSON schema of every key, cached because pydantic takes longer to compute it than all the rest."""
     properties: dict[str, Any] = model.model_json_schema()["properties"]
     return properties
 
 
 def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
-    """How a page has a value typed or chosen. kind: `number`, `integer`, `boolean`, `choice`; `numbers`: several with commas
-    between; `text`: a line of it; `block`: lines of G-code; `rows`: a list or a table as TOML."""
+    """Input field for a value. kind: `number`, `integer`, `boolean`, `choice`; `numbers`: separated by commas; `text`: one line;
+    `block`: lines of G-code; `rows`: a list or a table as TOML."""
     way = next(way for way in schema.get("anyOf", [schema]) if way.get("type") != "null")
     kind = "choice" if "enum" in way else str(way.get("type"))
     numbers = kind == "array" and all(item.get("type") in ("number", "integer") for item in way.get("prefixItems", [{}]))
@@ -194,19 +193,19 @@ def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
 
 
 def _sentence(model: type[Frozen]) -> str:
-    """The first sentence of what a table says of itself."""
+    """First paragraph of a table's docstring."""
     return (model.__doc__ or "").strip().partition("\n\n")[0].replace("\n    ", " ").rstrip(".")
 
 
 def file_stem(bench: Bench) -> str:
-    """The model's name for that of a file."""
+    """File name after the model."""
     name = "" if bench.model is None else Path(bench.model.name.removeprefix("demo:")).stem
     return plain_name(name) or "model"
 
 
 def export_command(bench: Bench) -> str:
-    """The line for a shell; "" without a model. A plan, as the workbench saves it, holds how the model is cut and turned, what is
-    marked on it, and what single parts have of their own."""
+    """The `export` command for a shell; "" without a model. Cuts, orientation, marks and part settings are in the plan that the
+    workbench saves."""
     if bench.model is None:
         return ""
     given, stem = bench.given, file_stem(bench)
@@ -232,5 +231,5 @@ def export_command(bench: Bench) -> str:
 
 
 def turns_deg(bench: Bench) -> tuple[float, float, float]:
-    """The turns about x, then y, then z that `process.rotate_deg` needs for the model to stand as it does on the bench."""
+    """Rotations about x, then y, then z with which `process.rotate_deg` reproduces the model's orientation."""
     return turned_further(bench.profile.process.rotate_deg, np.array(bench.rotation))

@@ -1,4 +1,4 @@
-"""Values: what typed commands of a page are made of; what they do not allow is refused in a sentence like those of profiles."""
+"""Types of the arguments of page commands; invalid values are refused in sentences like those of profiles."""
 
 from collections.abc import Callable, Iterable, Mapping
 from inspect import Parameter, signature
@@ -12,7 +12,7 @@ from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.wording import sentences
 
-Asked = dict[str, Any]  # a command `{"do": NAME, ...}` as it comes from a page
+Asked = dict[str, Any]  # a command `{"do": NAME, ...}` from a page
 MOST_MM = 1e5
 ROTATION_ERROR = 1e-6
 
@@ -33,19 +33,19 @@ def _rotation(rows: tuple[Vector, Vector, Vector]) -> tuple[Vector, Vector, Vect
 
 Mm = Annotated[float, Field(ge=-MOST_MM, le=MOST_MM)]
 Point = Annotated[tuple[Mm, Mm, Mm], Field(strict=False)]  # a list in JSON
-Direction = Annotated[tuple[float, float, float], Field(strict=False), AfterValidator(_direction)]  # its length is made 1
+Direction = Annotated[tuple[float, float, float], Field(strict=False), AfterValidator(_direction)]  # normalised
 Row = Annotated[tuple[float, float, float], Field(strict=False)]
 Rotation = Annotated[tuple[Row, Row, Row], Field(strict=False), AfterValidator(_rotation)]
 
 
 class Arguments(BaseModel):
-    """What a page sends with a command. What its function does not take, as the name of the page, is not read."""
+    """The arguments of a page command. Fields that its function does not take, such as the name of the page, are ignored."""
 
     model_config = ConfigDict(frozen=True, strict=True, allow_inf_nan=False)
 
 
 def arguments_of(command: Callable[..., Any], base: type[Arguments] = Arguments) -> type[Arguments]:
-    """The type of what a page sends with a command: the keyword-only parameters of the function that does it, beside the base."""
+    """Argument type of a command: the keyword-only parameters of its function, in addition to the base."""
     parameters = [given for given in signature(command).parameters.values() if given.kind is Parameter.KEYWORD_ONLY]
     fields: dict[str, Any] = {
         given.name: (given.annotation, ... if given.default is Parameter.empty else given.default) for given in parameters
@@ -54,7 +54,7 @@ def arguments_of(command: Callable[..., Any], base: type[Arguments] = Arguments)
 
 
 def read_command(asked: Asked, commands: Mapping[str, type[Arguments]]) -> tuple[str, Arguments]:
-    """The name of a command that a page has sent, and its arguments. Raises PlanError."""
+    """Name and arguments of a page command. Raises PlanError."""
     name = asked.get("do")
     if not isinstance(name, str):
         raise PlanError("what the page has sent names no command: docs/workbench.md lists them")
@@ -67,7 +67,7 @@ def read_command(asked: Asked, commands: Mapping[str, type[Arguments]]) -> tuple
 
 
 def check_number(key: str, value: int, least: int, most: int) -> int:
-    """A number from `least` to `most`; where that is less there is nothing to be numbered. Raises PlanError."""
+    """Return a number from `least` to `most`; `most` below `least` means that there is nothing to number. Raises PlanError."""
     if not least <= value <= most:
         allowed = f"{least} to {most} is allowed" if least <= most else "there is none yet"
         raise PlanError(f"{key} is {value}: {allowed}")
@@ -75,6 +75,5 @@ def check_number(key: str, value: int, least: int, most: int) -> int:
 
 
 def vector_of(values: Iterable[float]) -> Vector:
-    """Three numbers as floats."""
     x, y, z = map(float, values)
     return x, y, z

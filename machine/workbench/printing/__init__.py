@@ -1,4 +1,4 @@
-"""Printing: prints that the workbench has started, each in a process of its own, and the pages that command them.
+"""Printing: prints started by the workbench, each in its own process, and the pages that control them.
 
-Public: `prints.Prints`, and `commands`, the table of what a page may ask for.
+Public: `prints.Prints`, and `commands`, the table of page commands.
 """

@@ -1,8 +1,8 @@
-"""At hand: a printer that a person heats and moves from a page, with nothing printed.
+"""Manual control: a page heats and moves a printer while nothing prints.
 
-The rules: nothing is homed while the table is tilted or nobody knows how it stands; the head is moved only after it was homed
-here, inside the machine's limits and above the table; heaters that nobody has asked anything of for half an hour go off, and so
-do all at the end unless the person says otherwise.
+Nothing is homed while the table is tilted or its position is unknown; the head moves only after homing in this session, within
+the machine's limits and above the table; the heaters go off after half an hour without a command, and at the end unless the user
+wants them on.
 """
 
 from contextlib import ExitStack
@@ -31,7 +31,7 @@ from profiles.errors import MoveError, PrinterError, UserError
 from profiles.machine import Machine
 from profiles.profile import Profile
 
-LOOK_S = 1.0  # between questions after temperatures and place
+LOOK_S = 1.0  # between queries of temperatures and position
 IDLE_S = 1800.0
 LEVEL_DEG = 0.05  # M114 reports hundredths
 MOST_JOG_MM = 100.0
@@ -40,23 +40,23 @@ LET_GO = "let go of; the heaters are off"
 
 
 def by_hand(job: PrintJob, person: AtPage) -> End:
-    """Do what the person asks for until it is let go of; how it ended."""
+    """Execute the user's commands until the session ends; returns how it ended."""
     assert job.profile is not None
     at, machine = at_printer(job.destination), job.profile.machine
     with ExitStack() as stack:
-        stack.enter_context(calling(person.leave))  # a termination request lets go of the printer, its heaters off
+        stack.enter_context(calling(person.leave))  # a termination request ends the session and switches the heaters off
         wire = stack.enter_context(open_line(at, machine))
         answer = identify_printer(wire, rate_of(at))
         check_machine(None if isinstance(at, Simulated) else answer, machine)
         person.passed(describe_answer(answer, rate_of(at)))
         session = CommandSession(wire, dialect_of(machine).longest_line)
         person.interrupt = lambda word: session.order(StopError if word == Command.EMERGENCY_STOP else LeftError)
-        person.agreed = True  # from now on it may be heated and moved
+        person.agreed = True  # it may now be heated and moved
         return Hand(job.profile, session, person).serve()
 
 
 class Hand:
-    """A session at a printer that a person heats and moves."""
+    """A session in which the user heats and moves a printer."""
 
     def __init__(self, profile: Profile, session: CommandSession, person: AtPage) -> None:
         self._profile, self._session, self._person = profile, session, person
@@ -66,9 +66,9 @@ class Hand:
         self._looked_s = -inf
 
     def serve(self) -> End:
-        """Greet the printer and do what the person asks for until he lets go or has asked for nothing for IDLE_S; how it ended.
+        """Greet the printer and execute commands until the user ends the session, or has been idle for IDLE_S.
 
-        However it ends, the heaters go off unless he let go and wants them on. Raises UserError.
+        Switches the heaters off at the end unless the user wants them on. Raises UserError.
         """
         with self._session as session:
             try:
@@ -80,7 +80,7 @@ class Hand:
         return End(PrintState.DONE, sentence)
 
     def _until_let_go(self) -> str:
-        """Command after command; the sentence of the end."""
+        """Execute commands; returns the sentence about the end."""
         while not self._person.lets_go():
             try:
                 command = self._person.by_hand.get_nowait()
@@ -102,7 +102,7 @@ class Hand:
         return LET_GO
 
     def _look(self) -> None:
-        """Ask after temperatures and place, and tell them."""
+        """Query and report temperatures and position."""
         for command in ("M105", "M114"):
             self._session.command(command)
         self._looked_s = monotonic()
@@ -120,12 +120,12 @@ class Hand:
         return dict(self._session.position or {})
 
     def _do(self, command: HandCommand) -> None:
-        """One command; what cannot be done is told, and nothing moves. Raises PrinterError."""
+        """Execute a command; one that is impossible is reported, and nothing moves. Raises PrinterError."""
         try:
             lines = self._lines(command)
         except PrinterError:
             raise
-        except UserError as error:  # a start block that cannot be filled in, too
+        except UserError as error:  # also for a start block that cannot be filled in
             self._problem = f"{error}"
         else:
             self._problem = ""
@@ -152,8 +152,8 @@ class Hand:
 
 
 def check_level(machine: Machine, at: dict[str, float], *, homing: bool) -> None:
-    """Raises MoveError where the table is tilted, or the printer does not tell how it stands. One that has just been switched on
-    tells where its firmware believes itself then: it may be homed, for the page has asked whether the table is level."""
+    """Raise MoveError if the table is tilted, or its position is unknown. A printer that has just been switched on reports its
+    firmware's initial position: it may be homed, because the page asks whether the table is level."""
     if not machine.tilts or (homing and _has_just_begun(machine, at)):
         return
     tilt = at.get(machine.tilt.letter)
@@ -169,8 +169,8 @@ def _has_just_begun(machine: Machine, at: dict[str, float]) -> bool:
 
 
 def homing_lines(start: list[str], dialect: Dialect) -> list[str]:
-    """How a start block homes: its lines up to the last that does, without those that heat, and what calls the table level right
-    after it. Raises MoveError where it homes nothing, or not without what may heat."""
+    """Homing lines of a start block: up to the last that homes, without heating, and the following G92 that define the level
+    table. Raises MoveError if it does not home, or not without lines that may heat."""
     last = max((index for index, line in enumerate(start) if homes(line, dialect)), default=-1)
     if last < 0:
         raise MoveError("the start block of this machine homes nothing (G28): home it at the machine")
@@ -183,7 +183,7 @@ def homing_lines(start: list[str], dialect: Dialect) -> list[str]:
 
 
 def jog_target_mm(machine: Machine, at: dict[str, float], axis: str, by_mm: float) -> float:
-    """Where a jog ends. Raises MoveError outside the limits, or below the table."""
+    """Target of a jog. Raises MoveError outside the limits, or below the table."""
     axes = {"X": machine.x, "Y": machine.y, "Z": machine.z}
     if axis not in axes or axis not in at or not abs(by_mm) <= MOST_JOG_MM:
         raise MoveError(f"X, Y and Z are moved by up to {MOST_JOG_MM:g} mm at a time")

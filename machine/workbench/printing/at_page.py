@@ -1,4 +1,4 @@
-"""At page: a job as pages of the workbench see it, the loading of a bench's slices, and the user who attends it there."""
+"""The user at a page during a print: state for pages, commands from them, and loading of a bench's slices."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -27,21 +27,21 @@ from mdp.kernels.workers import frame
 from profiles.errors import JournalError, PlanError
 from profiles.profile import Profile
 
-LAST_WORD_S = 5.0  # a server that stands still is not waited for any longer
-LINES_KEPT = 100  # of what the program says
-BEGIN, LEAVE = "begin", "leave"  # LEAVE: a print on a server goes on without this program
+LAST_WORD_S = 5.0  # a server that hangs is not waited for any longer
+LINES_KEPT = 100  # of the program's messages
+BEGIN, LEAVE = "begin", "leave"  # LEAVE: a print on a server continues without this program
 ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the question whether to begin
 
 
 @dataclass(frozen=True)
 class JobState:
-    """A print as pages see it. resumes: the journal of the print whose rest it is; key: of the slices; starts: False where a
-    print server only gets the file; server: whether a print server prints it.
+    """State of a print for pages. resumes: journal of the print that it completes; key: of the slices; starts: False if a print
+    server only stores the file; server: whether a print server prints it.
 
-    question: what a person is asked before it begins; log, journal: files; webcam: where its picture is; sentence: how it ended;
-    checks: what was found before, forced where it speaks against the print; words: what the printer has said; said: what the
-    program has; figures: of the program; progress: the newest moment, told_s: when it was, seconds since 1970; forcible: force
-    goes past why it was refused; stop_given: an emergency stop was heard.
+    question: asked before it begins; log, journal: files; webcam: URL of its picture; sentence: how it ended; checks: results of
+    the checks, forced if they speak against the print; words: the printer's messages; said: the program's messages; figures: of
+    the program; progress: the newest status, received at told_s, seconds since 1970; forcible: force overrides the refusal;
+    stop_given: an emergency stop was executed.
     """
 
     state: PrintState = PrintState.CHECKING
@@ -67,12 +67,12 @@ class JobState:
     stop_given: bool = False
 
     def json(self) -> dict[str, Any]:
-        """The state for a page. over: whether nothing of it goes on; heat_s: since when the temperatures are known, seconds since
-        1970, for the page goes on counting when nothing more comes."""
+        """The state for a page. over: whether it has ended; heat_s: time of the temperatures, seconds since 1970, so that the
+        page can show their age."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         checks = [{"text": check.text, "forced": check.forced} for check in self.checks]
         moment = self.progress
-        if moment is not None and self.state.is_over:  # an upload that has ended says nothing of a print
+        if moment is not None and self.state.is_over:  # the status of an upload is not that of a print
             moment = None if moment.state is PrintState.UPLOADING else replace(moment, state=self.state)
         progress = moment and moment.json() | {"heat_s": self.told_s - moment.heat_age_s}
         return values | {"checks": checks, "progress": progress, "over": self.state.is_over}
@@ -94,7 +94,7 @@ def first_state(job: PrintJob) -> JobState:
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """A bench's slices, called to load them. gcode: a file as `export` writes it; known: what a dry run has found of it."""
+    """The slices of a bench, loaded by a call. gcode: a file as `export` writes it; known: findings of its dry run."""
 
     name: str
     gcode: Path
@@ -102,8 +102,8 @@ class Slices:
     known: KnownFindings | None = None
 
     def __call__(self) -> LoadedProgram:
-        """These very lines, dry-run; what the dry run of the very same has found for the very same profile is not looked for
-        again. Raises PlanError where they are not there any more."""
+        """Load and dry-run the lines; known findings for the same lines and profile are reused. Raises PlanError if the file is
+        gone."""
         try:
             text = self.gcode.read_bytes().decode()
         except FileNotFoundError:
@@ -115,8 +115,6 @@ class Slices:
 
 
 class HandDoes(StrEnum):
-    """Actions of a person at a printer in hand."""
-
     HEAT = "heat"
     COOL = "cool"
     HOME = "home"
@@ -126,7 +124,7 @@ class HandDoes(StrEnum):
 
 @dataclass(frozen=True)
 class HandCommand:
-    """axis, by_mm: of a jog; keep_heat: of letting go, the heaters stay as they are."""
+    """axis, by_mm: of a jog; keep_heat: the heaters stay on after the session."""
 
     does: HandDoes
     axis: str = ""
@@ -135,9 +133,9 @@ class HandCommand:
 
 
 class StateReporter:
-    """Tells the server the newest state, from a thread of its own: who prints never waits for who listens.
+    """Sends the newest state to the server from its own thread, so that printing never waits for a reader.
 
-    tell() from any thread; what comes while the server does not read is put together, so nothing is ever held back.
+    `tell()` is thread-safe; changes are merged while the server does not read, so nothing blocks.
     """
 
     def __init__(self, out: BinaryIO, state: JobState) -> None:
@@ -147,13 +145,13 @@ class StateReporter:
         self._thread.start()
 
     def tell(self, **values: Any) -> None:
-        """Change parts of the state."""
+        """Change fields of the state."""
         with self._lock:
             self._state = replace(self._state, **values)
         self._changed.set()
 
     def close(self) -> None:
-        """Say the last word."""
+        """Send the final state."""
         self._over = True
         self._changed.set()
         self._thread.join(LAST_WORD_S)
@@ -167,14 +165,14 @@ class StateReporter:
             try:
                 self._out.write(frame(self._state))
                 self._out.flush()
-            except (OSError, ValueError):  # the server is gone: the print ends by what it hears, not by what it says
+            except (OSError, ValueError):  # the server is gone: the print ends through its input, not its output
                 return
 
 
 class AtPage:
-    """The `Person` at a page. hear() and leave() come from the thread that listens to the server, all else from the other.
+    """Implements `Person` at a page. One thread, which reads from the server, calls hear() and leave(), another one all else.
 
-    cut_off: the journal of the print whose rest it is. agreed: to what was found: from then on something may move.
+    cut_off: journal of the print to be resumed. agreed: the user has confirmed, so that something may move.
     """
 
     def __init__(self, reporter: StateReporter, cut_off: Path | None = None) -> None:
@@ -186,11 +184,11 @@ class AtPage:
         self._lines: deque[str] = deque(maxlen=LINES_KEPT)
         self._answers: SimpleQueue[bool] = SimpleQueue()
         self._gives_up, self._halts = Flag(), Flag()
-        self.by_hand: SimpleQueue[HandCommand] = SimpleQueue()  # what is to be done at a printer that is in hand
-        self.interrupt: Callable[[Command | str], None] = lambda word: None  # called with what ends it at once
+        self.by_hand: SimpleQueue[HandCommand] = SimpleQueue()  # commands for a printer under manual control
+        self.interrupt: Callable[[Command | str], None] = lambda word: None  # called with the command that ends it at once
 
     def hear(self, word: Command | HandCommand | str, value: float = 100.0) -> None:
-        """Take a command of the person: for a print, by hand, BEGIN or LEAVE."""
+        """Handle a command: for a print, for manual control, BEGIN or LEAVE."""
         if isinstance(word, HandCommand):
             self.by_hand.put(word)
             return
@@ -208,18 +206,16 @@ class AtPage:
             self.interrupt(word)
 
     def leave(self) -> None:
-        """The server is gone, and nobody can command any more: the print ends as if it had been cancelled, but one on a print
-        server goes on there."""
+        """Handle the loss of the server: cancel the print, because no one can control it; one on a print server continues."""
         self.stop.set()
         self._answers.put(False)
         self.interrupt(LEAVE)
 
     def passed(self, sentence: str) -> None:
-        """Add a passed check."""
         self._add(Notice(marked_line(sentence)))
 
     def hear_notice(self, notice: Notice) -> None:
-        """Add a notice of the program; an error that --force goes past is a check, too."""
+        """Add a notice of the program; an error that --force overrides is also a check."""
         if notice.forced:
             self._add(Notice(notice.text.rstrip(), forced=True))
         self._lines.extend(line for line in notice.text.split("\n") if line.strip())
@@ -230,7 +226,7 @@ class AtPage:
         self.tell(checks=self._checks)
 
     def ask(self, question: str, choices: tuple[str, ...] = ()) -> int | None:
-        """Wait for the person's word to begin. Raises JournalError where one must look at the printer."""
+        """Wait until the user confirms or declines. Raises JournalError for a question that requires a look at the printer."""
         if choices:
             raise JournalError(f"{question}; which one is asked at a terminal only: tiltprint resume {self._cut_off}")
         self.tell(state=PrintState.READY, question=question)
@@ -239,7 +235,7 @@ class AtPage:
 
     @contextmanager
     def show(self, scene: Scene) -> Iterator[Show]:
-        """The print as its state. A print of which nothing changes, as a paused one on a server, is heard of all the same."""
+        """Show the print as its state. Statuses are reported even without changes, as for a paused print on a server."""
         journal = "" if scene.journal is None else str(scene.journal.path)
         self.tell(log="" if scene.log.trouble else str(scene.log.file), journal=journal)
         if scene.uploads:
@@ -252,7 +248,7 @@ class AtPage:
             self.tell(state=PrintState.PRINTING, progress=None, told_s=time())
             return
         values: dict[str, Any] = {"progress": replace(status, message=plain_line(status.message)), "told_s": time()}
-        if status.state.is_printing:  # what a server tells besides is not the end of the job yet
+        if status.state.is_printing:  # before the end of the job other states of a server are not final
             values["state"] = status.state
         if not scene.uploads:
             scene.messages.add(status.message)
@@ -262,18 +258,18 @@ class AtPage:
         self.tell(**values)
 
     def left(self) -> bool:
-        """Whether a print on a server is left."""
+        """Whether a print on a server is left to it."""
         return self.stop.is_set()
 
     def lets_go(self) -> bool:
-        """Whether a printer in hand is let go of, its heaters off."""
+        """Whether manual control ends, with the heaters off."""
         return self.stop.is_set() or self._gives_up.is_set()
 
     def gives_up(self) -> bool:
-        """Whether there is to be no print on a server, as long as none has begun; an emergency stop is given to the printer."""
+        """Whether a print on a server that has not begun is abandoned; after an emergency stop it is not."""
         return (self._gives_up.is_set() or self.stop.is_set()) and not self._halts.is_set()
 
     def has_stopped(self) -> bool:
-        """Whether the print has been stopped at once, at its end: the order was heard and is not waiting any more."""
+        """Whether an emergency stop was requested and executed, to be called at the end."""
         waiting = iter(self.commands.take, None)
         return self._halts.is_set() and all(request.command != Command.EMERGENCY_STOP for request in waiting)

@@ -1,6 +1,6 @@
-"""Commands: all that a page may ask of the prints, by name: who may ask it, and what does it.
+"""Commands for prints, by name: who may give them, and the functions that execute them.
 
-A page sends `{"do": NAME, ...}`; the keyword-only parameters of the function of that name are what else it sends.
+A page sends `{"do": NAME, ...}`; the other fields are the keyword-only parameters of the function.
 """
 
 import asyncio
@@ -24,22 +24,22 @@ from machine.workbench.session.commands import Need, check_need
 from machine.workbench.session.session import Session
 from profiles.errors import JournalError, PlanError, PrinterError
 
-LONGEST_PORT = 300  # letters
+LONGEST_PORT = 300  # characters
 Work = Coroutine[Any, Any, None]
 
 
 class OfPrint(Arguments):
-    """print: the number of the print that is meant."""
+    """print: number of the print."""
 
     print: int
 
 
 @dataclass(frozen=True)
 class PageOfPrints:
-    """A page that asks: its name, its bench, the prints, and the event loop of the benches.
+    """A page that gives a command: its name, its bench, the prints, and the event loop of the benches.
 
-    The prints have an event loop of their own, so the session is read in that of the benches alone: what is read at two moments
-    from here may be of two benches.
+    The prints have an event loop of their own. The session must be read in that of the benches, and in one step: two reads from
+    here could see two different benches.
     """
 
     name: str
@@ -48,7 +48,7 @@ class PageOfPrints:
     benches: asyncio.AbstractEventLoop
 
     def commanded(self, number: int) -> RunningPrint:
-        """The print of a number, which this page commands. Raises PrinterError where another page does, or it is not there."""
+        """The print with this number. Raises PrinterError if it does not exist, or another page controls it."""
         running = self.prints.numbered(number)
         if running.holder != self.name:
             raise PrinterError("another page commands this print: take the command over first")
@@ -56,12 +56,10 @@ class PageOfPrints:
 
 
 def ports(page: PageOfPrints, *, baud: int = BAUD) -> None:
-    """Look for printers."""
     page.prints.look_for_ports(baud)
 
 
 def journals(page: PageOfPrints) -> None:
-    """Look for prints that were cut off."""
     page.prints.look_for_journals()
 
 
@@ -74,7 +72,7 @@ async def check(
     force: bool = False,
     send_only: bool = False,
 ) -> None:
-    """Check and prepare a print of the slices on the page's bench. send_only: a print server is only to keep the file."""
+    """Check and prepare a print of the bench's slices. send_only: a print server only stores the file."""
     destination = _destination(port, baud, sim_speed)
     if send_only:
         destination = parse_server_address(destination.name)
@@ -82,11 +80,10 @@ async def check(
 
 
 async def job_of(session: Session, destination: Destination, force: bool, starts: bool = True) -> PrintJob:
-    """Make a job of the slices on a bench. Runs in the sessions' event loop without a pause, so that all of it is of one moment.
-    What is known before a printer is asked is refused here.
+    """A job for the slices of a bench. Runs in the sessions' event loop without a pause, so that it is consistent.
 
-    force: go past errors of the dry run. Raises PlanError where there are no slices of what lies there now, PrinterError for a
-    machine that cannot print there, MoveError where the dry run found errors.
+    force: ignore errors of the dry run. Raises PlanError if the slices are missing or outdated, PrinterError for a machine that
+    cannot print there, MoveError if the dry run found errors.
     """
     if session.closed:
         raise PlanError("this bench is not open any more: print from another one")
@@ -96,7 +93,7 @@ async def job_of(session: Session, destination: Destination, force: bool, starts
     assert bench.model is not None
     name, known = bench.model.name, sliced.known
     check_destination(destination, known.profile.machine)
-    if not force:  # what that goes past the print itself says
+    if not force:  # the print itself reports errors that force overrides
         refuse_errors(sliced.errors, force=False)
     load = Slices(name, sliced.gcode, known.profile, known)
     return PrintJob(destination, Does.PRINT, name, load, known.profile, starts, force, key=sliced.key)
@@ -105,7 +102,7 @@ async def job_of(session: Session, destination: Destination, force: bool, starts
 def go_on(
     page: PageOfPrints, *, journal: str = "", machine: str = "", port: str = "", baud: int = BAUD, sim_speed: float = 0.0
 ) -> None:
-    """Ask the printer where it stands, to print the rest of a print that was cut off."""
+    """Query the printer's position, to print the rest of an interrupted print."""
     journal, machine = journal.strip(), machine.strip()
     if not journal:
         raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")
@@ -118,12 +115,12 @@ def go_on(
 
 
 def follow(page: PageOfPrints, *, port: str = "") -> None:
-    """Follow what a print server prints already."""
+    """Follow the running print of a print server."""
     page.prints.begin(page.name, PrintJob(parse_server_address(_destination(port).name), Does.FOLLOW))
 
 
 async def hand(page: PageOfPrints, *, port: str = "", baud: int = BAUD, sim_speed: float = 0.0) -> None:
-    """Take a printer in hand, as the machine and the material of the page's bench are."""
+    """Begin manual control of a printer, with the machine and the material of the bench."""
 
     async def job() -> PrintJob:
         return PrintJob(_destination(port, baud, sim_speed), Does.HAND, profile=page.session.bench.profile.of_all_parts)
@@ -132,17 +129,17 @@ async def hand(page: PageOfPrints, *, port: str = "", baud: int = BAUD, sim_spee
 
 
 def emergency(page: PageOfPrints, *, print: Any = None) -> None:
-    """Stop a print at once, or without a number all; every page may."""
+    """Stop a print at once, or all prints without a number; every page may."""
     page.prints.stop_at_once(print)
 
 
 def take(page: PageOfPrints, *, print: int) -> None:
-    """Take the command of a print over."""
+    """Take over control of a print."""
     page.prints.numbered(print).holder = page.name
 
 
 def forget(page: PageOfPrints, *, print: int) -> None:
-    """Take a print that is over off the list."""
+    """Remove a finished print from the list."""
     running = page.commanded(print)
     if not running.over:
         raise PrinterError(f"print {print} is not over: only one that is over leaves the list")
@@ -160,7 +157,7 @@ FUNCTIONS: dict[str, Callable[..., Work | None]] = {
     "take": take,
     "forget": forget,
 }
-# Those of a print, which only the page that commands it may ask for.
+# Commands for one print, which only the page that controls it may give.
 OF_PRINT: dict[str, Callable[..., None]] = {
     "begin": RunningPrint.begin,
     "cancel": RunningPrint.cancel,
@@ -177,8 +174,7 @@ COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()
 
 
 def obey(page: PageOfPrints, asked: Asked) -> Work | None:
-    """Do what a page asks for, `{"do": NAME, ...}`. Returns the work that is left where its bench must be asked first. Raises
-    UserError for what cannot be done, as that work does."""
+    """Execute a page's command `{"do": NAME, ...}`. Returns the remaining work if it needs the bench. Both raise UserError."""
     name, arguments = read_command(asked, COMMANDS)
     given, work = dict(arguments), None
     if name in OF_PRINT:
@@ -190,9 +186,8 @@ def obey(page: PageOfPrints, asked: Asked) -> Work | None:
 
 
 def _destination(port: str, baud: int = BAUD, sim_speed: float = 0.0) -> Destination:
-    """Where to print, as the options --port, --baud and --sim-speed say. Raises PrinterError.
-
-    A server's address is read here, for all pages are told of a print's port: a password in it must not come so far."""
+    """Parse the destination given by --port, --baud and --sim-speed. Raises PrinterError. This keeps a password in a server's
+    address from all pages, which receive a print's port."""
     port = port.strip()
     if not port or len(port) > LONGEST_PORT:
         raise PrinterError("no printer is chosen: choose a port, or sim for the simulated one")

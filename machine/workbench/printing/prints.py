@@ -1,7 +1,7 @@
-"""Prints: all that a workbench prints, one at a port, and which page commands which.
+"""Prints: all prints of a workbench, one per port, and the pages that control them.
 
-Only one page commands a print, the one that has started it; the others see it, and may take the command over by asking for it.
-The emergency stop alone is every page's: who sees that something goes wrong must not look for another window first.
+The page that starts a print controls it; other pages see it, and may take over control. Only the emergency stop is available to
+every page: in an emergency no one should have to find another window.
 """
 
 import asyncio
@@ -28,33 +28,33 @@ from machine.workbench.session.base import Observable
 from profiles.errors import OutputError, PrinterError
 from profiles.folders import state_folder
 
-FILE = "last-printer.json"  # of the state folder
-MOST_OVER = 5  # prints that are over stay to be looked at, the newest ones
+FILE = "last-printer.json"  # in the state folder
+MOST_OVER = 5  # finished prints that stay listed
 
 
 class Prints(Observable):
-    """All from the event loop; pages wait for `changed`."""
+    """Prints, used from one event loop; pages wait for `changed`."""
 
     def __init__(self) -> None:
         super().__init__()
         self.prints: list[RunningPrint] = []
-        self._last = 0  # number that was given
+        self._last = 0  # last number given
         self._last_printer = last_printer()
         self._pages: Counter[str] = Counter()
         self._ports: list[dict[str, Any]] | None = None
         self._journals: list[ResumableJournal] | None = None
         self._reads_journals = False
-        self._over: Flag | None = None  # ends the asking of ports that is under way
+        self._over: Flag | None = None  # cancels the running query of ports
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
     def running(self) -> list[RunningPrint]:
-        """Those of which something goes on."""
+        """Prints that have not ended."""
         return [job for job in self.prints if not job.over]
 
     @property
     def ports_known(self) -> set[str]:
-        """Ports that were found here, those of the prints that are listed, and the one that was printed at last."""
+        """Ports that were found here, those of the listed prints, and the one used last."""
         last = {self._last_printer.name} if self._last_printer else set()
         return {report["port"] for report in self._ports or ()} | {job.state.port for job in self.prints} | last
 
@@ -79,7 +79,7 @@ class Prints(Observable):
 
     @contextmanager
     def page(self, page: str) -> Iterator[None]:
-        """A page that is there; one that goes leaves its prints alone, and their command to whoever takes it."""
+        """Register a connected page. When it disconnects, its prints continue, and any page may take control of them."""
         self._pages[page] += 1
         self.notify()
         try:
@@ -89,12 +89,12 @@ class Prints(Observable):
             self.notify()
 
     def close(self) -> None:
-        """End the asking; the prints end by themselves, heaters off, for their pipes end with this process."""
+        """Cancel the query of ports. Prints end by themselves, heaters off, when their pipes close with this process."""
         if self._over is not None:
             self._over.set()
 
     async def end_all(self) -> list[str]:
-        """End every print as a cancel does, but leave those on print servers, and wait for that; the last words of each."""
+        """Cancel every print, or leave it to its print server, and wait for the ends; returns the last messages of each."""
         running = self.running
         for job in running:
             job.end()
@@ -103,7 +103,7 @@ class Prints(Observable):
         return [line for job in running for line in (*job.state.said[-2:], f"{job.state.port}: {job.state.sentence}")]
 
     def begin(self, page: str, job: PrintJob) -> None:
-        """Have something printed, commanded by a page. Raises PrinterError where the port, or the journal, is in use."""
+        """Start a print, controlled by a page. Raises PrinterError if the port or the journal is in use."""
         at = job.destination
         if job.starts and any(other.job.starts and _same(other.job.destination, at) for other in self.running):
             raise PrinterError(f"port {at.name} prints already: wait until that is done, or cancel it")
@@ -119,45 +119,45 @@ class Prints(Observable):
         self.notify()
 
     def _forget_old(self, at: Destination) -> None:
-        """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:
-        only what is listed can be stopped."""
+        """Remove finished prints at a port that prints again, and all but the newest elsewhere. Running prints stay listed,
+        because only listed ones can be stopped."""
         over = [job for job in self.prints if job.over and not _same(job.job.destination, at)][-MOST_OVER:]
         self.prints = [job for job in self.prints if not job.over or job in over]
 
     async def _print(self, begun: RunningPrint) -> None:
         try:
             await begun.run()
-        except Exception as error:  # noqa: BLE001 - the print is told to be over, whatever it was
+        except Exception as error:  # noqa: BLE001 - whatever happened, the print is marked as ended
             await begun.fail(error)
 
     def stop_at_once(self, number: object) -> None:
-        """The one that was named, all when none was or there never was such a one: in doubt everything stops. One that is over
-        already, in the list or not any more, stops no other: a button is pressed twice in a fright, and a press may come late."""
+        """Stop the print with this number, or all if the number is missing or was never used: when in doubt everything stops. The
+        number of a finished print stops no other, because a button may be pressed twice or late."""
         known = isinstance(number, int) and 0 < number <= self._last
         for job in self.prints if known else self.running:
             if job.number == number or not known:
                 job.stop_at_once()
 
     def numbered(self, number: object) -> RunningPrint:
-        """The print of a number. Raises PrinterError where it is not there."""
+        """The print with this number. Raises PrinterError if it is not listed."""
         for running in self.prints:
             if running.number == number:
                 return running
         raise PrinterError("this print is not there any more")
 
     def _journals_state(self) -> list[dict[str, Any]] | None:
-        """Those that can be resumed, None before anybody has asked."""
+        """Journals that can be resumed, None before they have been requested."""
         if self._journals is None:
             return None
         in_use = self._journals_in_use()
         return [asdict(journal) | {"path": str(journal.path)} for journal in self._journals if str(journal.path) not in in_use]
 
     def _journals_in_use(self) -> set[str]:
-        """The journals of prints that run, and of those whose rest is printed."""
+        """Journals of running prints, and of those that they resume."""
         return {path for job in self.running for path in (job.state.journal, job.state.resumes) if path}
 
     def look_for_journals(self) -> None:
-        """Read which prints can be gone on with."""
+        """Read which prints can be resumed."""
         if not self._reads_journals:
             self._reads_journals = True
             self._start(self._read_journals())
@@ -170,7 +170,7 @@ class Prints(Observable):
             self.notify()
 
     def look_for_ports(self, baud: int) -> None:
-        """Ask at every port who answers. Raises PrinterError for a rate that is not possible."""
+        """Query all ports. Raises PrinterError for an impossible baud rate."""
         check_baud(baud)
         if self._over is None:
             self._over = Flag()
@@ -193,15 +193,14 @@ class Prints(Observable):
 
 
 def _same(a: Destination, b: Destination) -> bool:
-    """Whether two destinations are one port, or one print server."""
+    """Whether two destinations are the same port or print server."""
     if isinstance(a, Server) and isinstance(b, Server):
         return a.url == b.url
     return stable_name(a.name) == stable_name(b.name)
 
 
 def last_printer() -> Destination | None:
-    """The destination that was printed at last, so that nobody chooses it again at the next start; None where none was kept, or
-    what is there says nothing."""
+    """The destination that was used last, as the default; None if it was not stored or is invalid."""
     try:
         port, baud, speed = (json.loads(_path().read_bytes())[key] for key in ("port", "baud", "sim_speed"))
         return parse_destination(str(port), int(baud), float(speed))
@@ -210,13 +209,13 @@ def last_printer() -> Destination | None:
 
 
 def keep_printer(at: Destination) -> None:
-    """Keep it for the next start. Where it cannot be written it is forgotten: a print does not fail for that."""
+    """Store the destination as the next default. Errors are ignored, because a print must not fail for that."""
     with suppress(OSError, OutputError):
         write_bytes(_path(), json.dumps(printer_json(at)).encode(), private=True)
 
 
 def printer_json(at: Destination) -> dict[str, Any]:
-    """The fields of a page in which it is chosen."""
+    """Values of the page's fields for a destination."""
     baud, speed = at.baud if isinstance(at, SerialPort) else BAUD, at.speed if isinstance(at, Simulated) else 0.0
     return {"port": at.name, "baud": baud, "sim_speed": speed}
 

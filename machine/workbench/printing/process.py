@@ -1,10 +1,9 @@
-"""Process: one print from its checks to its end, by the code of `print`, commanded through a pipe by the workbench's server.
+"""Process of one print from its checks to its end, with the code of `print`, controlled by the workbench's server through a pipe.
 
-A print has a process of its own, not a thread of the server's: feeding a printer shares no lock and no event loop with pages,
-however many there are and whatever they do; a server that hangs or crashes does not take the print with it; and the end of the
-pipe tells for certain that nobody can command any more, whereupon the print ends as if it had been cancelled: heaters off, tip
-lifted; one on a print server goes on there. It leads a session of its own, so that Ctrl-C at the terminal reaches the server
-alone, which ends it in that same way.
+A print has its own process, not a thread of the server: feeding a printer shares no lock and no event loop with pages; a server
+that hangs or crashes does not end the print with it; and the end of the pipe reliably shows that no one can control the print,
+which is then cancelled: heaters off, tip raised (one on a print server continues). It leads its own session, so that Ctrl-C
+at the terminal only reaches the server, which cancels it in the same way.
 """
 
 import sys
@@ -32,10 +31,10 @@ MOST_FINDINGS = 50  # in the list; the page of the print has all
 
 
 def main() -> None:
-    """Print what the server orders, once."""
+    """Execute one job from the server."""
     asked, answers = take_pipes()
     job: PrintJob | None = next(read_frames(asked), None)
-    if job is None:  # the server has died before it had said what to print
+    if job is None:  # the server died before it sent a job
         return
     reporter = StateReporter(answers, first_state(job))
     person = AtPage(reporter, job.cut_off)
@@ -47,14 +46,14 @@ def main() -> None:
 
 
 def carry_out(job: PrintJob, person: AtPage) -> tuple[End, bool]:
-    """Check, ask, print; how it ended, and whether force goes past why it was refused."""
+    """Check, ask and print; returns how it ended, and whether force overrides the refusal."""
     try:
         return _carried_out(job, person), False
     except UserError as error:
         return End(PrintState.FAILED if person.agreed else PrintState.REFUSED, f"{error}"), error.forcible
     except KeyboardInterrupt:
         sentence = "ended at once: whether the heaters are off is not known, look at the printer"
-    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file; the stream has left the printer safe
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file; the stream has made the printer safe
         sentence = bug_in_words(error, sys.argv)
     return End(PrintState.FAILED, sentence), False
 
@@ -76,7 +75,7 @@ def _carried_out(job: PrintJob, person: AtPage) -> End:
 
 
 def _print_rest(job: PrintJob, person: AtPage) -> End:
-    """Tell what was cut off, ask the printer, ask the person, print the rest."""
+    """Report what was interrupted, query the printer, ask the user, and print the rest."""
     cut_off = read_resumption(job)
     person.tell(name=cut_off.name, machine=cut_off.profile.machine.name)
     for sentence in cut_off.sentences():
@@ -89,18 +88,18 @@ def _print_rest(job: PrintJob, person: AtPage) -> End:
 
 
 def _follow(job: PrintJob, person: AtPage) -> End:
-    """Follow what a server prints already."""
+    """Follow the running print of a server."""
     assert isinstance(job.destination, Server)
     with open_server_printer(job, job.destination, person) as printer:
         printer.greet()
         now = running_print(printer.server)
-        person.agreed = True  # from now on it may be stopped
+        person.agreed = True  # it may now be stopped
         person.tell(name=file_name(now), webcam=_webcam(printer))
         return printer.follow(now)
 
 
 def _webcam(printer: ServerPrinter) -> str:
-    """Where its camera gives a picture; a print does not fail for want of it."""
+    """URL of the camera's picture, or "": a print must not fail without a camera."""
     try:
         return printer.server.webcam()
     except ServerError:
@@ -108,7 +107,7 @@ def _webcam(printer: ServerPrinter) -> str:
 
 
 def figures(loaded: LoadedProgram) -> dict[str, Any]:
-    """Figures of a program for a person: time, filament, price, findings."""
+    """Figures of a program for the user: time, filament, price, findings."""
     program, material = loaded.program, loaded.profile.material
     values, findings = summary(program.run), program.run.findings
     return {

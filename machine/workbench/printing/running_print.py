@@ -1,4 +1,4 @@
-"""Running print: the server's end of a print: its process, its newest state, and what is done when the process dies."""
+"""Running print: the server's view of a print: its process, its newest state, and its end if the process dies."""
 
 import asyncio
 import sys
@@ -22,41 +22,41 @@ from mdp.kernels.workers import Interpreter
 from profiles.errors import PrinterError, UserError
 
 MAIN = "from machine.workbench.printing.process import main; main()"
-EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
-LEAVE_S = 5.0  # so long a print that is not to go on has to let go of its port
+EMERGENCY_S = 5.0  # for the print's own process, which tries for 2.5 s to stop the printer, before the server does it
+LEAVE_S = 5.0  # for a declined print to release its port
 Percent = Annotated[int, Field(ge=0, le=10_000)]
-HandWord = Annotated[HandDoes, Field(strict=False)]  # a text in JSON
+HandWord = Annotated[HandDoes, Field(strict=False)]  # a string in JSON
 DIED = "the process that printed has ended before the print was done"
 
 
 class RunningPrint:
-    """run() once, all else from the event loop too. number: its name among the prints of a workbench; holder: the page that
-    commands it, "" for none."""
+    """A print, used from one event loop. run() is called once. number: identifies it among the prints of a workbench; holder: the
+    page that controls it, "" for none."""
 
     def __init__(self, number: int, job: PrintJob, holder: str, changed: Callable[[], None]) -> None:
         self.number, self.holder, self.state, self.job = number, holder, first_state(job), job
         self._changed = changed
         self._process: Interpreter | None = None
         self._late: asyncio.Task[None] | None = None
-        self._begun = job.does is Does.FOLLOW  # by somebody else
+        self._begun = job.does is Does.FOLLOW  # by another program
         self._emergency = self._given_up = self._cancelled = False
         self._ended = False  # by this program, on purpose
 
     @property
     def over(self) -> bool:
-        """Whether nothing of it goes on."""
+        """Whether it has ended."""
         return self.state.state.is_over
 
     @property
     def asking(self) -> bool:
-        """Whether nothing has moved yet, and nothing will: once it is told to begin, its process alone knows how far it is."""
+        """Whether nothing has moved yet, nor will: after the order to begin only the process knows its progress."""
         return not self._begun and self.state.state in (PrintState.CHECKING, PrintState.READY)
 
     async def run(self) -> None:
-        """Have it printed by a process of its own, to the end."""
+        """Print in a separate process until the end."""
         process = Interpreter(MAIN)
-        await asyncio.to_thread(process.say, self.job)  # a long one is read when the process has loaded what it needs
-        self._process = process  # and follows what it does from now on
+        await asyncio.to_thread(process.say, self.job)  # a long job is read once the process has loaded its modules
+        self._process = process  # later commands can now reach it
         if self._given_up or self._emergency:
             self._kill()
         ended = lost = False
@@ -70,13 +70,12 @@ class RunningPrint:
             await self._end_without_process()
 
     def say(self, value: object) -> None:
-        """Something to the process; what it does not hear any more is not missed."""
+        """Send a value to the process; it may be lost if the process has ended."""
         if self._process is not None:
             self._process.say(value)
 
     def begin(self) -> None:
-        """A person agrees to what was found; said twice, as by a double click, it is one word. Raises PrinterError as long as
-        that is not known."""
+        """Confirm the print; repeated calls, as after a double click, have no effect. Raises PrinterError unless it is ready."""
         if self._begun and not self.over:
             return
         if self.state.state is not PrintState.READY or not self.asking or self._given_up:
@@ -85,15 +84,15 @@ class RunningPrint:
         self.say((BEGIN,))
 
     async def fail(self, error: Exception) -> None:
-        """A fault of this program: nobody hears the print's process any more, so it ends, and the printer is made safe."""
+        """Handle an internal error: end the process, which no one reads, and make the printer safe."""
         self._kill()
         if not self.asking:
-            self.state = replace(self.state, state=PrintState.CANCELLING)  # an end that it has told is not believed
+            self.state = replace(self.state, state=PrintState.CANCELLING)  # an end that it has reported is not trusted
         await self._end_without_process()
         self._take(replace(self.state, sentence=f"{bug_in_words(error, sys.argv)}; {self.state.sentence}"))
 
     def cancel(self) -> None:
-        """End it, heaters off; before it has begun at once. What has opened a journal to go on with takes it away itself."""
+        """End the print, heaters off; at once before it has begun, unless its process must delete the journal of a resumption."""
         if self.over:
             self._cancelled = True
             self._order_late()
@@ -109,42 +108,40 @@ class RunningPrint:
             asyncio.get_running_loop().call_later(LEAVE_S, self._kill)
 
     def leave(self) -> None:
-        """Let a print server go on with it by itself. Raises PrinterError for a print that is on none."""
+        """Leave a print to its print server. Raises PrinterError for other prints."""
         if not self.state.server:
             raise PrinterError("only a print on a print server goes on by itself: this one ends with the workbench")
         self.say((LEAVE,))
 
     def pause(self) -> None:
-        """Pause it."""
         self.say((Command.PAUSE,))
 
     def resume(self) -> None:
-        """Go on after a pause."""
         self.say((Command.RESUME,))
 
     def feed(self, *, percent: Percent) -> None:
-        """Set the speed, in per cent of the programmed one."""
+        """Set the speed, percent of the programmed one."""
         self.say((Command.FEED, float(percent)))
 
     def flow(self, *, percent: Percent) -> None:
-        """Set the flow, in per cent of the programmed one."""
+        """Set the flow, percent of the programmed one."""
         self.say((Command.FLOW, float(percent)))
 
     def by_hand(self, *, does: HandWord, axis: str = "", by_mm: float = 0.0, keep_heat: bool = False) -> None:
-        """Have a printer in hand do something. Raises PrinterError for one that is not in hand."""
+        """Send a command of manual control. Raises PrinterError if the printer is not under manual control."""
         if self.state.state is not PrintState.IN_HAND:
             raise PrinterError("this cannot be done by hand now")
         self.say((HandCommand(does, axis[:1], by_mm, keep_heat),))
 
     def end(self) -> None:
-        """End it because the workbench ends: as a cancel does, but what a print server prints goes on there."""
+        """End it with the workbench: cancel it, or leave it to its print server."""
         if self.state.server and not self.asking:
             self.leave()
         else:
             self.cancel()
 
     def stop_at_once(self) -> None:
-        """The emergency stop, by the print's own process; where that does not do it, or still uploads, without that."""
+        """Execute the emergency stop through the print's own process, or without it if it fails or still uploads."""
         if self.over:
             self._emergency = _goes_on(self.state)
             self._order_late()
@@ -162,18 +159,18 @@ class RunningPrint:
             self._process.end()
 
     def _has_lost_an_order(self, ended: JobState) -> bool:
-        """Whether the following of a print on a server has ended before it took what it was told last."""
+        """Whether a server's print was left before its last command was executed."""
         stop_lost = self._emergency and not ended.stop_given
         return ended.server and self._begun and (stop_lost or (self._cancelled and _goes_on(ended)))
 
     def _order_late(self) -> None:
-        """Give a stop or a cancel that comes when the print has just been left."""
+        """Execute a stop or cancel that comes just after the print was left."""
         if _goes_on(self.state):
             self._take(replace(self.state, state=PrintState.CANCELLING))
             self._late = asyncio.get_running_loop().create_task(self._order_anew())
 
     async def _order_anew(self) -> None:
-        """Give the stop or the cancel on a connection of its own."""
+        """Execute the stop or cancel on a new connection."""
         at = self.job.destination
         assert isinstance(at, Server)
         if self._emergency:
@@ -191,8 +188,7 @@ class RunningPrint:
         self._end(End(PrintState.CANCELLED, sentence))
 
     async def _end_without_process(self) -> None:
-        """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked; a print
-        server goes on by itself."""
+        """Handle the death of the process: make the printer safe if it was used. A print on a print server continues."""
         at, moved = self.job.destination, not self.asking
         if not moved:
             self._take(replace(self.state, journal=""))
@@ -212,11 +208,11 @@ class RunningPrint:
         self._take(replace(self.state, state=end.state, sentence=end.sentence))
 
     def _take(self, state: JobState) -> None:
-        """The newest state. What is over stays as it has ended."""
+        """Set the newest state. The final state of a print does not change."""
         self.state = state if follows(self.state.state, state.state) else replace(state, state=self.state.state)
         self._changed()
 
 
 def _goes_on(ended: JobState) -> bool:
-    """Whether a print was left that its server goes on with."""
+    """Whether the print was left to its server, which continues it."""
     return ended.server and ended.state is PrintState.LEFT

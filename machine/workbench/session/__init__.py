@@ -1,4 +1,4 @@
-"""Session: benches with the work under way for them and the pages that look at them.
+"""Session: benches with their running tasks and the pages that show them.
 
-Public: `session.Workbench`, `session.Session`, `base.Derived`, and `commands`, the table of what a page may ask for.
+Public: `session.Workbench`, `session.Session`, `base.Derived`, and `commands`, the table of page commands.
 """

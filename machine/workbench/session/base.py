@@ -1,5 +1,4 @@
-"""Session base: what all work of a session stands on: the history, the processes, the pages that wait for changes, and values
-that follow from the bench."""
+"""Session base: the history, the processes, the notification of pages, and values derived from the bench."""
 
 import asyncio
 import sys
@@ -18,21 +17,21 @@ from profiles.errors import UserError
 from profiles.messages import terminal_words
 
 WAITING = "waiting until the work of other benches is done"
-LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
-LONGEST_ASK = 80  # letters of the name of a command
-MOST_ANSWERS = 20  # named commands whose outcome is kept and sent to the pages
-MOST_PROBLEMS = 20  # pages for which the last refusal is kept
+LONGEST_SENTENCE = 2000  # characters, because a page may send a name of any length
+LONGEST_ASK = 80  # characters of a command's name
+MOST_ANSWERS = 20  # named commands whose results are stored and sent to the pages
+MOST_PROBLEMS = 20  # pages whose last error is stored
 Value = TypeVar("Value")
-asking: ContextVar[str] = ContextVar("asking", default="")  # the page that is obeyed, or worked for; "": it has no name
+asking: ContextVar[str] = ContextVar("asking", default="")  # page whose command is executed; "": it has no name
 
 
 def hear_from(page: object) -> None:
-    """All that the running task does from now on, and begins, is for the page of this name, if it is one."""
+    """Set the client page of the current task and the tasks that it starts; other values than a short string mean none."""
     asking.set(page if isinstance(page, str) and len(page) <= LONGEST_ASK else "")
 
 
 class Observable:
-    """All from the event loop. listeners: called with every change, before whoever waits for it; closed: no more come."""
+    """Notifies pages of changes; used from one event loop. listeners: called first; closed: there will be no more changes."""
 
     def __init__(self) -> None:
         self.version, self.closed = 0, False
@@ -40,7 +39,7 @@ class Observable:
         self._changed = asyncio.Event()
 
     def notify(self) -> None:
-        """Let the pages know that something has changed."""
+        """Notify the pages of a change."""
         self.version += 1
         self._changed.set()
         self._changed = asyncio.Event()
@@ -48,24 +47,23 @@ class Observable:
             listen()
 
     async def changed(self, seen: int) -> None:
-        """Return when there is something newer than the version that was seen."""
+        """Wait until there is a newer version than `seen`."""
         while self.version == seen:
             await self._changed.wait()
 
 
 async def in_loop(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, Value]) -> Value:
-    """The result of a coroutine that runs in another event loop; to cancel the waiting cancels it there."""
+    """Run a coroutine in another event loop and return its result; cancelling the wait cancels the coroutine."""
     return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, loop))
 
 
 class SessionBase(Observable):
-    """All from the event loop; the pages wait for `changed`. Whatever changes the bench does so in its `turn`: one command is
-    executed at a time, and nothing else changes the bench meanwhile.
+    """Session state, used from one event loop; pages wait for `changed`. Commands change the bench while they hold `turn`, so
+    that one is executed at a time.
 
-    problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
-    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; stopped: what became
-    of work that was stopped last; quick, long, hand: its tasks in the pools; received: the files of its pages; followers: called
-    after every change of the bench.
+    problems: last error of each page, "" for all pages; answers: named command -> why it was refused, "" if done; busy: what the
+    pages wait for; stopped: result of the work that was stopped last; quick, long, hand: its tasks in the pools; received: files
+    of its pages; followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -76,33 +74,32 @@ class SessionBase(Observable):
         self.busy = self.stopped = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
-        self.turn = asyncio.Lock()  # first come, first served
+        self.turn = asyncio.Lock()  # fair: first come, first served
         self.received = Received()
         self._files = count(1)
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
     def bench(self) -> Bench:
-        """What lies on the workbench now."""
         return self.history.now.bench
 
     @property
     def problem(self) -> str:
-        """What could not be done last, whoever wanted it; "": all could."""
+        """The newest error of any page, or ""."""
         return next(reversed(self.problems.values()), "")
 
     def new_file(self) -> Path:
-        """A place for what a task makes, which goes with the session at the latest."""
+        """A path for a task's output, deleted with the session at the latest."""
         return self.received.path / f"made-{next(self._files)}"
 
     def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
-        """Have work done beside the pages; what it is refused becomes the sentence that they show. ask: name of its command."""
+        """Start work in the background; its error becomes the sentence that pages show. ask: name of its command."""
 
         async def attempt() -> None:
             refusal = ""
             try:
                 await work
-            except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+            except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench continues
                 refusal = self.refuse(error)
             finally:
                 self.answer(ask, refusal)
@@ -110,11 +107,11 @@ class SessionBase(Observable):
         task = asyncio.create_task(attempt())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        task.add_done_callback(lambda _: work.close())  # of one that was cancelled before it began
+        task.add_done_callback(lambda _: work.close())  # if it was cancelled before it began
         return task
 
     def command(self, act: Callable[[], Coroutine[Any, Any, None] | None], ask: object = None) -> None:
-        """Have a command done when those before it are; act: gives the work that it still is. ask: its name."""
+        """Execute a command after the previous ones; act: returns its remaining work. ask: its name."""
 
         async def in_turn() -> None:
             async with self.turn:
@@ -125,7 +122,7 @@ class SessionBase(Observable):
         self.start(in_turn(), ask)
 
     def refuse(self, error: Exception) -> str:
-        """Tell the page that wanted it what could not be done, a bug with the log that it got; the sentence."""
+        """Report an error to the page that caused it, a bug with its log; returns the sentence."""
         sentence = f"{error}" if isinstance(error, UserError) else bug_in_words(error, sys.argv)
         if len(shown := terminal_words(sentence)) > LONGEST_SENTENCE:
             sentence = f"{shown[:LONGEST_SENTENCE]} ..."
@@ -134,41 +131,41 @@ class SessionBase(Observable):
         return sentence
 
     def forget_problem(self) -> None:
-        """Tell the page whose command is obeyed no more what could not be done, nor what all are told."""
+        """Clear the error of the current page, and that for all pages."""
         for page in (asking.get(), ""):
             self.problems.pop(page, None)
 
     def answer(self, ask: object, refusal: str = "") -> None:
-        """Tell the pages what became of a command, the one that gave it by the name that it gave it, if it did."""
+        """Store the result of a named command for its page."""
         if isinstance(ask, str) and len(ask) <= LONGEST_ASK:
             self.answers = dict([*self.answers.items(), (ask, refusal)][-MOST_ANSWERS:])
         self.notify()
 
     def do(self, word: str, bench: Bench, lost: str = "") -> None:
-        """Take a further step, which can be undone. lost: what it has taken away, beside what its step says itself."""
+        """Add a step, which can be undone. lost: what it has removed, in addition to the step's own sentence."""
         self.advance(self.history.do(word, bench), lost)
 
     def advance(self, history: History, lost: str = "") -> None:
-        """Go on with another history; a step forth tells what it has taken away."""
+        """Replace the history; a step forward reports what it has removed."""
         forth = history.before[-1:] == (self.history.now,)
-        self.problems.clear()  # they told of what lay there before
+        self.problems.clear()  # they were about the previous bench
         self.stopped = ""
         for sentence in (lost, history.now.lost if forth else ""):
             self.add_problem(sentence)
         self.become(history)
 
     def add_problem(self, sentence: str) -> None:
-        """Tell a sentence beside what is told already."""
+        """Add a sentence to the current page's errors."""
         if sentence:
             self._tell_problem("; ".join(filter(None, (self.problems.get(asking.get(), ""), sentence))))
 
     def _tell_problem(self, sentence: str) -> None:
         page = asking.get()
-        self.problems.pop(page, None)  # the newest is the last
+        self.problems.pop(page, None)  # moves the newest to the end
         self.problems = dict([*self.problems.items(), (page, sentence)][-MOST_PROBLEMS:])
 
     def become(self, history: History) -> None:
-        """Go on with another history."""
+        """Replace the history and notify followers and pages."""
         self.history = history
         for follow in self.followers:
             follow()
@@ -176,7 +173,7 @@ class SessionBase(Observable):
 
     @contextmanager
     def waiting(self, words: str) -> Iterator[None]:
-        """While it is open, the pages show what they wait for."""
+        """Show the pages what they wait for until the block ends."""
         self.busy = words
         self.notify()
         try:
@@ -187,14 +184,14 @@ class SessionBase(Observable):
 
 
 class Derived(Generic[Value]):
-    """A value that follows from the bench, worked out by a task beside the pages.
+    """A value derived from the bench, computed by a background task.
 
-    key: what of a bench decides it, None: there is nothing to work out. task: works it out for a bench, and may tell() how far it
-    is. by_itself: as soon as the key changes, else when it is begun. interrupts: a change of the key cancels the task at once,
-    else it may end and is begun anew then; in both cases its answer is dropped. accept: changes the bench by the answer.
+    key: what of a bench determines it, None: there is nothing to compute. task: computes it for a bench, and may `tell()` its
+    progress. by_itself: begin as soon as the key changes, otherwise on demand. interrupts: a change of the key cancels the task
+    at once; otherwise it finishes and begins again. In both cases its result is dropped. accept: changes the bench by the result.
 
-    progress: what the task has told last, None: none is under way; bench: of the task under way; done: the last answer, of
-    one that is begun whatever the bench is now.
+    progress: last progress of the task, None: it is not running; bench: that of the running task; done: the last result, which an
+    on-demand value keeps when the bench changes.
     """
 
     def __init__(
@@ -210,11 +207,11 @@ class Derived(Generic[Value]):
         self.progress: Any = None
         self.bench = session.bench
         self.done: Value | None = None
-        self.number = 0  # of the task under way, or the last one
+        self.number = 0  # of the running task, or the last one
         self._session, self._key_of, self._work, self._accept = session, key, task, accept
         self._by_itself, self._interrupts = by_itself, interrupts
-        self._begun: object = None  # key of the task under way, or the last one
-        self._of: object = None  # key of the last answer
+        self._begun: object = None  # key of the running task, or the last one
+        self._of: object = None  # key of the last result
         self._error: Exception | None = None
         self._task: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
@@ -222,16 +219,16 @@ class Derived(Generic[Value]):
 
     @property
     def result(self) -> Value | None:
-        """The answer for the bench as it is now."""
+        """The result for the current bench, or None."""
         return self.done if self._of is not None and self._of == self._key_of(self._session.bench) else None
 
     @property
     def stale(self) -> bool:
-        """Whether the task under way works for a bench that is another one now."""
+        """Whether the running task computes the value for an outdated bench."""
         return self._begun != self._key_of(self._session.bench)
 
     def begin(self, progress: Any = None) -> None:
-        """Begin to work it out, if no task is under way."""
+        """Begin the task unless it is running."""
         if self._task is None:
             self.number += 1
             self.progress, self._error = progress, None
@@ -240,26 +237,26 @@ class Derived(Generic[Value]):
             self._task = self._session.start(self._run())
 
     def tell(self, progress: Any) -> None:
-        """Have the pages know how far the task under way is."""
+        """Set the progress of the running task, and notify the pages."""
         self.progress = progress
         self._session.notify()
 
     def teller(self) -> Callable[[Any], None]:
-        """tell() for the task under way, which is not heard any more when that is stopped."""
+        """Return a `tell()` for the running task, which has no effect once that is stopped."""
         number = self.number
         return lambda progress: self.tell(progress) if self._task is not None and self.number == number else None
 
     def stop(self) -> None:
-        """Cancel the task under way."""
+        """Cancel the running task."""
         if self._task is not None:
             self._task.cancel()
             self._task = self.progress = self._begun = None
 
     def interrupted(self) -> None:
-        """Called after a change of the bench has cancelled the task."""
+        """Hook, called after a change of the bench has cancelled the task."""
 
     def follow(self) -> None:
-        """Heed a change of the bench."""
+        """Handle a change of the bench."""
         key = self._key_of(self._session.bench)
         if self._task is not None and key != self._begun:
             self._changed.set()
@@ -272,7 +269,7 @@ class Derived(Generic[Value]):
                 self.begin()
 
     def _forget(self, key: object) -> None:
-        """Hold nothing of a bench that is another one now: models are large."""
+        """Drop outdated benches and results, because models are large."""
         self.bench = self._session.bench
         if key != self._begun:
             self._begun = None
@@ -281,19 +278,19 @@ class Derived(Generic[Value]):
             self.done = None if self._by_itself else self.done
 
     async def rests(self, wait_s: float) -> bool:
-        """Wait, but not beyond a change of the bench; whether the task is still for the bench as it is."""
+        """Wait, but not beyond a change of the bench; returns whether the task's bench is still current."""
         with suppress(TimeoutError):
             async with asyncio.timeout(wait_s):
                 await self._changed.wait()
         return not self.stale
 
     async def wait(self) -> None:
-        """Return when no task is under way any more."""
-        while self._task is not None and not self._task.done():  # a task that was cancelled stays where its session is closed
+        """Wait until the task is not running."""
+        while self._task is not None and not self._task.done():  # a cancelled task remains when its session is closed
             await asyncio.wait((self._task,))
 
     async def get(self) -> Value:
-        """The answer for the bench as it is now, worked out once for all that ask. Raises what the task raises."""
+        """The result for the current bench, computed once for all callers. Raises the task's error."""
         while (result := self.result) is None:
             if self._session.closed:
                 raise UserError(CLOSED)

@@ -1,7 +1,7 @@
-"""Commands: all that a page may ask of its bench: which there are, what each needs to lie there, and what does it.
+"""Commands of a page for its bench: their names, what they require, and the functions that execute them.
 
-A page sends `{"do": NAME, ...}`. The name leads to a function in CHANGES, EDITS, MARKINGS or ACTS; its keyword-only parameters
-are what else the page sends.
+A page sends `{"do": NAME, ...}`. The name selects a function in CHANGES, EDITS, MARKINGS or ACTS; the other fields are its
+keyword-only parameters.
 """
 
 from collections.abc import Callable, Coroutine
@@ -19,11 +19,11 @@ from profiles.messages import key_name
 from profiles.profile import SECTIONS
 
 ProfileKind = Literal["machine", "material", "process"]
-Work = Coroutine[Any, Any, None] | None  # what a command still has to do
+Work = Coroutine[Any, Any, None] | None  # remaining work of a command
 
 
 class Need(StrEnum):
-    """What must lie on a bench; parts: cuts, or at least marks; slices: of all that lies there now."""
+    """Requirement of a command on its bench; parts: cuts or marks; slices: current ones."""
 
     NOTHING = "nothing"
     MODEL = "model"
@@ -32,7 +32,7 @@ class Need(StrEnum):
 
 
 def lacking(session: Session, need: Need) -> str:
-    """Why a bench has not what is needed, as a sentence; "" where it has."""
+    """Sentence on why a bench does not meet a requirement; "" if it does."""
     if need != Need.NOTHING and session.bench.model is None:
         return "there is no model on the workbench yet: choose a file first"
     if need == Need.PARTS and not session.bench.planned:
@@ -41,23 +41,21 @@ def lacking(session: Session, need: Need) -> str:
 
 
 def check_need(session: Session, need: Need) -> None:
-    """Raises PlanError where a bench has not what is needed."""
+    """Raise PlanError if a bench does not meet a requirement."""
     if sentence := lacking(session, need):
         raise PlanError(sentence)
 
 
 def undo(session: Session) -> None:
-    """One step back."""
     session.advance(session.history.undo())
 
 
 def redo(session: Session) -> None:
-    """One step forward again."""
     session.advance(session.history.redo())
 
 
 def dismiss(session: Session) -> None:
-    """Take back what the page was last told that could not be done, as every command does."""
+    """Clear the page's last error, which every command does."""
 
 
 def search(session: Session, *, orient: bool = True, ranker: str = CLASSIC) -> None:
@@ -66,7 +64,6 @@ def search(session: Session, *, orient: bool = True, ranker: str = CLASSIC) -> N
 
 
 def slice_bench(session: Session) -> None:
-    """Slice what lies on the bench."""
     session.slicing.slice()
 
 
@@ -76,7 +73,7 @@ def compare(session: Session) -> None:
 
 
 def try_plane(session: Session, *, part: int, normal: Direction, offset_mm: Mm) -> None:
-    """Try a plane in a person's hand."""
+    """Try a plane while the user drags it."""
     session.trials.hold(move(session.bench, part=part, normal=normal, offset_mm=offset_mm).cuts)
 
 
@@ -86,7 +83,7 @@ def take_neck(session: Session, *, part: int) -> Work:
 
 
 def set_value(session: Session, *, key: str, value: str | None = None) -> Work:
-    """Another value for a key of the profile, as --set has it; null: as the profile has it."""
+    """Set a key of the profile, as --set does; null: reset it."""
     if "=" in key or key.partition(".")[0] not in SECTIONS:
         raise ProfileError(f"{key!r} is not a key of a profile")
     before = session.bench.profile
@@ -94,17 +91,17 @@ def set_value(session: Session, *, key: str, value: str | None = None) -> Work:
 
 
 def reset(session: Session, *, kind: ProfileKind | None = None) -> Work:
-    """Take back what is set for a machine, a material or a process; null: for all."""
+    """Reset the changes of a machine, a material or a process; null: all changes."""
     changes = "all changes" if kind is None else f"changes of the {kind}"
     return session.take_given(f"take {changes} back", lambda given: without_settings(given, kind))
 
 
 def take_profile(session: Session, *, kind: ProfileKind, name: str) -> Work:
-    """Another machine, material or process."""
+    """Choose another machine, material or process."""
     return session.take_given(f"take {name}", lambda given: with_name(given, kind, name))
 
 
-# The commands of a session by their names; `stop` alone does not wait for its turn.
+# The commands of a session; `stop` alone does not wait for its turn.
 ACTS: dict[str, Callable[..., Any]] = {
     "undo": undo,
     "redo": redo,
@@ -125,20 +122,20 @@ ACTS: dict[str, Callable[..., Any]] = {
 }
 FUNCTIONS: dict[str, Callable[..., Any]] = {name: change for name, (change, _) in CHANGES.items()} | EDITS | MARKINGS | ACTS
 COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()}
-LONG = ("search", "slice", "compare")  # what `stop` ends, also while it waits for its turn
+LONG = ("search", "slice", "compare")  # `stop` ends these, even if they still wait for their turn
 NEEDS = {"compare": Need.SLICES} | dict.fromkeys(
     ("demo", "unit", "dismiss", "undo", "redo", "set", "reset", "profile"), Need.NOTHING
-)  # what lies on the bench for all others is a model
+)  # all others require a model
 
 
 def obey(session: Session, asked: Asked) -> None:
-    """Have done what a page asks for, `{"do": NAME, ...}`, after all that was asked for before. Raises PlanError for what is no
-    command; why it cannot be done the page is told later, by the name `ask` of its command."""
+    """Queue a page's command `{"do": NAME, ...}`. Raises PlanError for an unknown command; later errors are reported to the page
+    under the name `ask` of its command."""
     session.forget_problem()
     session.stopped = ""
     name, arguments = read_command(asked, COMMANDS)
     act: Callable[[], Work] = partial(perform, session, name, arguments)
-    if name == "stop":  # what is to be stopped ends at once, whatever its bench is busy with
+    if name == "stop":  # running work ends at once, even while the bench is busy
         act = session.stop()
     elif name in LONG:
         act = session.unless_stopped(name, act)
@@ -146,7 +143,7 @@ def obey(session: Session, asked: Asked) -> None:
 
 
 def perform(session: Session, name: str, arguments: Arguments) -> Work:
-    """Do a command; returns the work that is left of it. Raises UserError for what cannot be done, as that work does."""
+    """Execute a command; returns the remaining work. Both raise UserError."""
     check_need(session, NEEDS.get(name, Need.MODEL))
     given = dict(arguments)
     if name in CHANGES:

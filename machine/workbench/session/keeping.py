@@ -1,4 +1,4 @@
-"""Keeping: autosave: what lies on a bench is written to the state folder a moment after every change."""
+"""Autosave: writes a bench to the state folder shortly after every change."""
 
 import asyncio
 import os
@@ -15,12 +15,12 @@ from machine.workbench.work.folders import new_folder, write_work
 from profiles.errors import PlanError, UserError, reason
 from profiles.files import lock_folder
 
-AFTER_S = 1.0  # so that a hand that drags writes once
+AFTER_S = 1.0  # so that dragging causes one write
 OPEN_ELSEWHERE = "this work is not kept any more, or another page has opened it"
 
 
 class Keeping:
-    """Saves one session, from its event loop. Only one write goes on at a time, in a thread, and nothing cancels it."""
+    """Saves one session, from its event loop. Writes run one at a time in a thread, and are never cancelled."""
 
     def __init__(self, session: SessionBase) -> None:
         self._session = session
@@ -29,20 +29,20 @@ class Keeping:
         self._kept: weakref.ref[Bench] | None = None
         self._saving: asyncio.Task[None] | None = None
         self._writing, self._ended = asyncio.Lock(), asyncio.Event()
-        self._path: Path | None = None  # of the model that is kept
+        self._path: Path | None = None  # of the saved model
         self._opening = False
         self._trouble = ""
-        self._reported: tuple[str, Path | None] = "", None  # trouble, and the model that it was reported for
+        self._reported: tuple[str, Path | None] = "", None  # error, and the model for which it was reported
         session.followers.append(self._follow)
 
     @property
     def behind(self) -> bool:
-        """Whether a change has not been written, or tried to be, yet."""
+        """Whether there is a change that no write has attempted to save."""
         kept = None if self._kept is None else self._kept()
         return self._session.bench is not kept and self._session.bench.model is not None
 
     def _follow(self) -> None:
-        """Save a moment after a change."""
+        """Schedule a write after a change."""
         if self._saving is None and self.behind and not self._opening and not self._session.closed:
             self._saving = asyncio.create_task(self._save())
 
@@ -56,8 +56,8 @@ class Keeping:
 
     @asynccontextmanager
     async def opening(self, folder: Path) -> AsyncIterator[None]:
-        """While kept work is put on the bench, nothing is written; then it is kept on in the folder that it comes from. Raises
-        PlanError when another bench writes there."""
+        """Suspend writes while saved work is opened, then continue saving in its folder. Raises PlanError if another bench writes
+        there."""
         lock = lock_folder(folder)
         if lock is None:
             raise PlanError(OPEN_ELSEWHERE)
@@ -75,21 +75,21 @@ class Keeping:
             self._follow()
 
     async def finish(self) -> str:
-        """Wait for the write under way, and write what is newer; why the last change is not kept, "" where it is.
+        """Finish the running write, and save newer changes; returns why the last change is not saved, or "".
 
-        The session has ended, so that nothing changes any more. Work that was still being opened stays as it was kept.
+        The session has ended, so nothing changes. If work was just being opened, its saved state stays.
         """
         was_opening = self._opening
         self._ended.set()
         if self._saving is not None:
             await self._saving
-        if not was_opening and self._session.bench.model is not None and (self.behind or self._trouble):  # tried once more
+        if not was_opening and self._session.bench.model is not None and (self.behind or self._trouble):  # retry once
             await self._write_newest()
         self._release()
         return self._trouble
 
     def _release(self) -> None:
-        """What is kept so far stays as it is, for whoever opens it."""
+        """Release the folder, so that its work can be opened elsewhere."""
         if self._lock is not None:
             os.close(self._lock)
         self._folder, self._lock = None, None
@@ -100,14 +100,14 @@ class Keeping:
             self._trouble = await asyncio.to_thread(self._write, bench)
             self._kept = weakref.ref(bench)
         reported, self._reported = self._reported, (self._trouble, self._path)
-        if self._trouble and reported != self._reported:  # once a model, not with every change
+        if self._trouble and reported != self._reported:  # once per model, not at every change
             self._session.add_problem(f"this work cannot be kept for after a crash: {self._trouble}; Save > Project keeps it")
             self._session.notify()
 
     def _write(self, bench: Bench) -> str:
-        """Why it could not be written, "" where it is."""
+        """Write a bench; returns why that failed, or ""."""
         try:
-            if bench.model is not None and bench.model.path != self._path:  # of another model: the last one's stays
+            if bench.model is not None and bench.model.path != self._path:  # another model: the previous one's save stays
                 self._release()
                 self._path = bench.model.path
             if self._folder is None:
@@ -118,6 +118,6 @@ class Keeping:
             return reason(error)
         except UserError as error:
             return f"{error}"
-        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench continues
             return bug_in_words(error, sys.argv)
         return ""

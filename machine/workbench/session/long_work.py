@@ -1,4 +1,4 @@
-"""Long work: the search for parts, the prices of a front, slices, and what these cost beside the same model in one piece."""
+"""Long tasks: the search for parts, the prices of a front, the slices, and the comparison with the model in one piece."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -20,9 +20,9 @@ ENDED = "slicing has ended, for what lies on the workbench is another now: slice
 
 
 class Finding(Derived[Found]):
-    """A search ends whose model is gone or lies otherwise, or whose settings, marks or locked planes are others now.
+    """Search for parts, cancelled when the model, its orientation, settings, marks or locked planes change.
 
-    notes: of the last one; laid: how it found the model turned, and how it has turned it."""
+    notes: of the last search; laid: the rotations before and after it."""
 
     def __init__(self, session: SessionBase) -> None:
         self.notes: tuple[str, ...] = ()
@@ -38,18 +38,18 @@ class Finding(Derived[Found]):
         )
 
     def search(self, orient: bool = True, ranker: str = CLASSIC) -> None:
-        """Search for the parts of the model on the bench, if no search is under way."""
+        """Search for the parts of the model on the bench, unless a search is running."""
         if self.progress is None:
             self._how = orient, ranker
             self.begin(Searched(WAITING if self._session.long.pool.full else "beginning"))
 
     def interrupted(self) -> None:
-        """Have another process ready for the next one."""
+        """Start a process for the next search."""
         self._session.start(self._session.long.warm())
 
     def take_best(self, bench: Bench, searched: Searched | None) -> str:
-        """Take the best that a search of a bench had met when it was stopped; its prices are told when they are known. What
-        became of it, as a sentence. searched: None, it had not begun."""
+        """Apply the best result of a stopped search, whose prices may follow later; returns a sentence. searched: None: it had
+        not begun."""
         best, now = None if searched is None else searched.best, self._session.bench
         if best is None or not best.planes or self._key_of(now) != self._key_of(bench):
             return "The search was stopped before it had cut anything: all is as it was."
@@ -65,14 +65,14 @@ class Finding(Derived[Found]):
 
 
 def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
-    """Times and plastic of the front worked out a row at a time, where a setting has changed that no search reads; slices and
-    searches go between two rows."""
+    """Times and filament of the front, computed row by row after the change of a setting that no search reads; slices and
+    searches may run between two rows."""
 
     async def price(bench: Bench) -> dict[int, FrontRow]:
         prices: dict[int, FrontRow] = {}
         for row in rows_to_price(bench):
             if not prices_now.stale:
-                with suppress(UserError):  # then it has none
+                with suppress(UserError):  # the row then has no price
                     prices[row] = await session.long.run(price_row, bench, row)
         return prices
 
@@ -88,7 +88,7 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Finished slices: what they are of, their number, and what is seen of each part."""
+    """Finished slices: their bench, their number, and the visible walls of each part."""
 
     bench: Bench
     number: int
@@ -97,46 +97,46 @@ class Slices:
 
 
 class Slicing(Derived[Slices]):
-    """progress: SlicesSoFar, with all parts that are ready, of the slices of this number; done: the last slices."""
+    """The slices. progress: SlicesSoFar with all finished parts, for the slices with this number; done: the last slices."""
 
     def __init__(self, session: SessionBase) -> None:
         super().__init__(session, lambda bench: bench.printed, self._slice, by_itself=False, interrupts=True)
 
     def latest(self) -> Slices | None:
-        """The last slices of the model on the bench, though it may have been turned, cut or set otherwise since."""
+        """The last slices of the model on the bench, even if it has been turned, cut or set differently since."""
         return self.done if self.done is not None and self.done.bench.model is self._session.bench.model else None
 
     @property
     def out_of_date(self) -> bool:
-        """Whether the last slices are of something else than what lies on the bench now."""
+        """Whether the last slices differ from the current bench."""
         return self.done is not None and self.done.bench.printed != self._session.bench.printed
 
     def lacking(self) -> str:
-        """Why there are no slices of what lies on the bench now; "" where there are."""
+        """Sentence on why there are no slices of the current bench; "" if there are."""
         if self.latest() is None:
             return "what is on the workbench is not sliced yet: slice it first"
         return "what is on the workbench has changed since it was sliced: slice it again" if self.out_of_date else ""
 
     def needed(self) -> Slices:
-        """The slices of what lies on the bench now. Raises PlanError where there are none."""
+        """The slices of the current bench. Raises PlanError if there are none."""
         if sentence := self.lacking():
             raise PlanError(sentence)
         assert self.done is not None
         return self.done
 
     def walls_of(self, number: int, part: int) -> bytes | None:
-        """What is seen of a part of the slices of a number; None where it is not there, or not there yet."""
+        """Visible walls of a part in the slices with a number; None if they do not exist, or not yet."""
         if self.progress is not None and self.number == number:
             drawn: bytes | None = self.progress.walls.get(part)
             return drawn
         return self.done.walls.get(part) if self.done is not None and self.done.number == number else None
 
     def slice(self) -> None:
-        """Slice the model on the bench, if nothing is being sliced."""
+        """Slice the model on the bench, unless slicing is running."""
         self.begin(SlicesSoFar(WAITING if self._session.long.pool.full else "cutting the parts"))
 
     def interrupted(self) -> None:
-        """Tell the pages."""
+        """Notify the pages."""
         self._session.add_problem(ENDED)
 
     async def _slice(self, bench: Bench) -> Slices:
@@ -156,7 +156,7 @@ class Slicing(Derived[Slices]):
 
 
 class Comparing(Derived[tuple[Alternative, ...]]):
-    """The slices of the bench beside their model in one piece; progress: how far that is, in words."""
+    """Comparison of the slices with their model in one piece; progress: in words."""
 
     def __init__(self, session: SessionBase, slicing: Slicing) -> None:
         self._slicing = slicing
@@ -169,12 +169,12 @@ class Comparing(Derived[tuple[Alternative, ...]]):
         )
 
     def rows(self) -> tuple[Alternative, ...]:
-        """The last slices, then their model in one piece; none where these slices have not been compared."""
+        """The last slices, then their model in one piece; () if these slices have not been compared."""
         slices, others = self._slicing.latest(), self.result
         return () if slices is None or others is None else (slices.sliced.cost, *others)
 
     def compare(self) -> None:
-        """Compare what is sliced, if that is not done yet; a comparison of earlier slices ends."""
+        """Compare the slices, unless that has been done; ends a comparison of earlier slices."""
         if self.stale:
             self.stop()
         if not self.rows():

@@ -1,5 +1,4 @@
-"""Planes: how the model on a bench stands and rests, and planes on it: prepared as soon as a model lies there, tried while they
-are in a person's hand, taken when they can be cut."""
+"""Planes on a bench: preparation as soon as there is a model, trials while the user drags them, and their application."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,20 +22,20 @@ from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
 from profiles.frozen import Effect
 
-REST_S = 0.1  # how long a hand must rest before what it holds is tried more closely
-CHANGING_S = 0.2  # of a bench, until it is made ready as it is
-_numbers = count(1)  # of the benches of all sessions, whose processes may be the same
+REST_S = 0.1  # pause in dragging after which the planes are tried more closely
+CHANGING_S = 0.2  # pause in changes of a bench after which it is prepared
+_numbers = count(1)  # of the benches of all sessions, which may share processes
 
 
 class Readiness(Derived[None]):
-    """What planes on the bench need, prepared in a process of its own, which knows by the bench's number what it has worked out
-    already; very large models wait for the first plane."""
+    """Preparation of a bench for planes in a worker process, which caches its results by the bench's number; very large models
+    wait for the first plane."""
 
     def __init__(self, session: SessionBase) -> None:
         self._number = 0
-        self._solid: tuple[object, ...] = (None, None, None)  # what is cut on the bench of that number
+        self._solid: tuple[object, ...] = (None, None, None)  # determines the cuts on the bench with that number
         self._profile = session.bench.profile
-        self._model = ""  # key of that of the bench that was made ready last
+        self._model = ""  # key of the model prepared last
         super().__init__(
             session,
             lambda bench: None if bench.model is None or bench.model.faces > MANY_FACES else self._number_of(bench),
@@ -44,17 +43,17 @@ class Readiness(Derived[None]):
         )
 
     def load(self) -> None:
-        """Load what all planes need, while the first model is read."""
+        """Load the kernels for planes while the first model is read."""
         if not self._number:
             self._session.start(self._session.hand.run(load_kernels))
 
     async def ask(self, task: Callable[..., Value], bench: Bench, *given: Any) -> Value:
-        """What a task says of a bench by its number."""
+        """Run a task for a bench, identified by its number."""
         return await self._session.hand.run(task, self._number_of(bench), bench, *given)
 
     def _number_of(self, bench: Bench) -> int:
-        """The number of a bench, that of the last one where what was made ready for that serves this one, too: planes read of a
-        profile what a search does."""
+        """The number of a bench; the last one's if its preparation is valid for this bench, because planes read the same part of
+        a profile as a search."""
         solid, profile = (bench.model and bench.model.key, bench.rotation, bench.zones), bench.profile
         is_another = any(new is not old for new, old in zip(solid, self._solid, strict=True))
         if is_another or effect_of_change(self._profile, profile) >= Effect.REACH:
@@ -63,7 +62,7 @@ class Readiness(Derived[None]):
         return self._number
 
     async def _prepare(self, bench: Bench) -> None:
-        """Make a bench ready, unless it changes at once again."""
+        """Prepare a bench, unless it changes again at once."""
         assert bench.model is not None
         if bench.model.key == self._model and not await self.rests(CHANGING_S):
             return
@@ -73,7 +72,7 @@ class Readiness(Derived[None]):
 
 
 def standing_of(session: SessionBase) -> Derived[Standing]:
-    """How the model on the bench stands."""
+    """The placement of the model on the bench."""
 
     async def find(bench: Bench) -> Standing:
         standing = await session.hand.run(stand, bench)
@@ -85,7 +84,7 @@ def standing_of(session: SessionBase) -> Derived[Standing]:
 
 
 def _stands_by(bench: Bench) -> tuple[object, ...] | None:
-    """What decides how it stands and what is told of that; None: there is no model."""
+    """Everything that determines the placement and its report; None without a model."""
     if bench.model is None:
         return None
     process = bench.profile.of_part(1).process
@@ -95,14 +94,14 @@ def _stands_by(bench: Bench) -> tuple[object, ...] | None:
 
 
 def pedestal_key(bench: Bench, standing: Standing | None) -> str:
-    """What tells the pedestal from others: the page asks for its triangles by it; "": there is none."""
+    """Key of the pedestal, by which the page requests its triangles; "" without a pedestal."""
     if standing is None or not standing.pedestal or bench.model is None:
         return ""
     return sha256(repr((bench.model.key, bench.rotation, bench.profile.search.pedestal_mm)).encode()).hexdigest()[:16]
 
 
 def resting_of(session: SessionBase, readiness: Readiness) -> Derived[tuple[Resting, ...]]:
-    """The ways in which the model on the bench rests, ranked when its planes are made ready: a person waits for those more."""
+    """The stable orientations of the model on the bench, ranked after its planes are prepared, which are needed sooner."""
 
     async def rank(bench: Bench) -> tuple[Resting, ...]:
         await readiness.wait()
@@ -113,8 +112,8 @@ def resting_of(session: SessionBase, readiness: Readiness) -> Derived[tuple[Rest
 
 @dataclass(frozen=True)
 class Refused:
-    """Planes that could not be cut: the page that wanted them, what is in the way where, and the command that puts the one that
-    was moved at the nearest place; None: it was none that is put somewhere, or there is none."""
+    """Planes that could not be cut: the page that wanted them, the obstacle, and the command that places the moved plane at the
+    nearest valid position, None: there is none."""
 
     page: str
     obstacle: Obstacle | None
@@ -122,29 +121,29 @@ class Refused:
 
 
 class PlaneTrials:
-    """trial: of the planes that were tried last, and the bench that they were tried on. refused: those that were refused last."""
+    """trial: bench, planes and figures of the last trial. refused: the planes that were refused last."""
 
     def __init__(self, session: SessionBase, readiness: Readiness) -> None:
         self.trial: tuple[Bench, Cuts, Trial] | None = None
         self.refused: Refused | None = None
         self._session, self._readiness = session, readiness
-        self._held: Cuts | None = None  # by a person's hand
+        self._held: Cuts | None = None  # planes that the user drags
         self._figures = Derived(session, self._to_try, self._try)
         session.followers.append(self.settle)
 
     def hold(self, cuts: Cuts) -> None:
-        """Have planes tried, the newest ones as soon as the ones before are done."""
+        """Try planes; the newest ones follow as soon as the current trial is done."""
         self._held = cuts
         self._figures.follow()
 
     def settle(self) -> None:
-        """Have the planes on the bench tried anew where others were tried last: no hand holds those any more."""
+        """Return to the planes on the bench, because dragging has ended."""
         self._held = None
         self._figures.follow()
 
     async def take(self, edit: Edit, nearer: Asked | None = None) -> None:
-        """Take planes that can be cut. nearer: the command that puts the plane at the nearest place. Raises PlanError for those
-        that cannot be cut."""
+        """Apply planes if they can be cut. nearer: command that places the plane at the nearest position. Raises PlanError
+        otherwise."""
         bench, cuts, self.refused = self._session.bench, edit.cuts, None
         trial = await self.attempt(bench, cuts)
         if trial.rejected and edit.near:
@@ -161,7 +160,7 @@ class PlaneTrials:
         self._session.do(edit.word, with_cuts(bench, cuts))
 
     async def take_neck(self, part: int) -> None:
-        """Take the neck near the plane of a part. Raises PlanError where there is none, or it cannot be cut."""
+        """Move the plane of a part to the neck near it. Raises PlanError if there is none, or it cannot be cut."""
         bench = self._session.bench
         check_unlocked(bench, part)
         assert bench.model is not None
@@ -176,7 +175,7 @@ class PlaneTrials:
         await self.take(snap(bench, part, PlannedPart(normal, offset_mm)), nearer)
 
     async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
-        """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
+        """The figures of planes; most_cuts: see mdp.search.trial."""
         trial: Trial = await self._readiness.ask(try_cuts, bench, cuts, most_cuts)
         return trial
 
@@ -184,7 +183,7 @@ class PlaneTrials:
         return bench.cuts if self._held is None else self._held
 
     def _to_try(self, bench: Bench) -> tuple[object, ...] | None:
-        """The planes and what decides their figures; None where these are known."""
+        """The planes and what determines their figures; None if these are known."""
         cuts, tried = self._wanted(bench), self.trial
         if cuts is None or bench.model is None:
             return None
@@ -192,7 +191,7 @@ class PlaneTrials:
         return None if known else (cuts, bench.sought)
 
     async def _try(self, bench: Bench) -> None:
-        """Figures at once; where parts are not looked at yet, one after the other as soon as the hand rests."""
+        """Compute the figures at once; check the remaining parts one by one when dragging pauses."""
         cuts = self._wanted(bench)
         if cuts is None:
             return
@@ -207,8 +206,8 @@ class PlaneTrials:
             self.trial = tried = bench, cuts, trial
 
     async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
-        """Take other zones; planes that they forbid go, and the reason is told. word: for the step in the history. Raises
-        PlanError for what makes no sense, and where a plane that would go is locked."""
+        """Apply other zones; removes planes that they forbid, and reports why. word: name of the history step. Raises PlanError
+        for invalid zones, and if a forbidden plane is locked."""
         before, removed = self._session.bench, list[str]()
         bench = with_zones(before, await self._session.quick.run(mark, before, marking))
         while bench.cuts:

@@ -1,4 +1,4 @@
-"""Session: one bench, and the work under way for it; the workbench: the sessions of one run of the program."""
+"""Session: one bench with its running tasks; Workbench: the sessions of one run of the program."""
 
 import asyncio
 import shutil
@@ -48,13 +48,12 @@ from profiles.frozen import Effect
 from profiles.profile import Profile
 
 MOST_SESSIONS = 20
-READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a model is read
+READ_BY = ("process.scale", "process.rotate_deg")  # settings that determine how a model is read
 
 
 @dataclass(frozen=True)
 class OfUnknownUnit:
-    """A model that waits for the word what its coordinates are in: the page that wanted it, its file and name, and the units that
-    may be, each with what it is scaled by then."""
+    """A model whose unit is unknown: the page that opened it, its file and name, and the possible units with their scales."""
 
     page: str
     path: Path
@@ -63,9 +62,9 @@ class OfUnknownUnit:
 
 
 class Session(SessionBase):
-    """A bench with all work on it. benches: for the pages, of all that are open, this one too, its number, its model's name, how
-    many parts that is cut into (0: not yet), and the work under way in a word; unscaled: the model that waits for its unit;
-    settings_note: key of a model, and the note on those taken from its file."""
+    """A bench with its tasks. benches: number, model's name, number of parts (0: not cut) and current work of all open benches,
+    for the pages; unscaled: the model whose unit is unknown; settings_note: key of a model, and the note on settings taken from
+    its file."""
 
     def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
         super().__init__(Bench(profile, given=given), pools)
@@ -79,17 +78,17 @@ class Session(SessionBase):
         self.benches: list[dict[str, Any]] = []
         self.unscaled: OfUnknownUnit | None = None
         self.settings_note = ("", "")
-        self._to_begin: dict[object, str] = {}  # the names of commands that wait for their turn to begin long work
+        self._to_begin: dict[object, str] = {}  # names of queued commands that begin long work
 
     def described(self) -> dict[str, Any]:
-        """The bench as the pages of all are told of it."""
+        """The bench's entry in the list of benches."""
         model = self.bench.model
         work = self.busy or ("finding parts" if self.finding.progress else "slicing" if self.slicing.progress else "")
         return {"name": "" if model is None else model.name, "parts": self.bench.parts, "work": work}
 
     async def close(self) -> str:
-        """End all work, tell the pages, and keep the last change. Then the files that pages have sent go; where the change could
-        not be kept they stay, and a sentence says why and where, else ""."""
+        """End all work, notify the pages, and save the last change, then delete the files of its pages. If saving fails they
+        stay, and the returned sentence says why and where; else ""."""
         self.closed = True
         for task in self._tasks:
             task.cancel()
@@ -104,26 +103,24 @@ class Session(SessionBase):
         return f"the work on a bench could not be kept: {trouble}; the files of its pages stay in {self.received.path} for a day"
 
     def warm(self) -> None:
-        """Load the program's heavy parts while nobody waits."""
+        """Load heavy modules in the worker processes ahead of use."""
         for tasks in (self.quick, self.hand, self.long):
             self.start(tasks.warm())
 
     async def open_model(self, path: Path, name: str, anew: bool = True, plate: int | None = None) -> None:
-        """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it;
-        plate: of a slicer file.
-
-        Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
+        """Put the model of a file on the bench. `anew`: drop the scale and rotation set for a previous model; plate: of a slicer
+        file. Raises UserError with the command line's message; if the size suggests a wrong unit, it requests the unit.
         """
         self.readiness.load()
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
-            self.resting.stop()  # it would be waited for
+            self.resting.stop()  # the new model would wait for it
         with self.waiting(f"reading {name}"):
             bench = self._bench_for(name) if anew else self.bench
             model = await self._read(path, name, bench.profile, plate, asks=True)
         self.do(f"open {name}", with_model(bench, model))
 
     def _bench_for(self, name: str) -> Bench:
-        """The bench for a model of a name, without what is set for the reading of another one."""
+        """The bench for a model with this name, without settings for the reading of another one."""
         bench = self.bench
         settings = tuple(setting for setting in bench.given.settings if key_of(setting) not in READ_BY)
         if bench.model is None or bench.model.name == name or settings == bench.given.settings:
@@ -132,7 +129,7 @@ class Session(SessionBase):
         return with_profile(bench, given, profile_as_given(given, bench.profile))
 
     async def open_in_unit(self, *, unit: str) -> None:
-        """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
+        """Open the model whose unit was unknown, scaled by the chosen unit. Raises UserError."""
         waits = self.unscaled
         if waits is None or unit not in waits.units:
             expected = f"one of {', '.join(waits.units)} is expected" if waits else "no model waits for its unit"
@@ -146,7 +143,7 @@ class Session(SessionBase):
         self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
 
     async def open_plate(self, *, plate: int) -> None:
-        """Put another plate of the slicer file on the bench there. Raises UserError."""
+        """Open another plate of the slicer file. Raises UserError."""
         model = self.bench.model
         if model is None or plate not in model.plates:
             numbers = [] if model is None else [*map(str, model.plates)]
@@ -155,7 +152,7 @@ class Session(SessionBase):
         await self.open_model(model.path, model.name, anew=False, plate=plate)
 
     async def take_settings_inside(self) -> None:
-        """Print by the settings that the slicer file on the bench keeps; what was set before stays where it says nothing.
+        """Use the settings inside the slicer file on the bench; earlier changes stay where it has no value.
 
         Raises UserError.
         """
@@ -166,7 +163,7 @@ class Session(SessionBase):
         self.settings_note = model.key, note
 
     async def open_demo(self, *, name: str) -> None:
-        """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""
+        """Open a model that ships with the program. Raises UserError for an unknown one."""
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
         await self.open_model(locate(name), name)
@@ -176,7 +173,7 @@ class Session(SessionBase):
     async def open_project(
         self, path: Path, name: str, taken_over: Callable[[Project], Project] = lambda project: project
     ) -> None:
-        """Put a project file on the bench. taken_over: makes of the project what the bench takes. Raises UserError."""
+        """Open a project file. taken_over: adapts the project to the bench. Raises UserError."""
         folder = new_folder()
         try:
             project = await asyncio.to_thread(unpack, path, folder)
@@ -186,15 +183,15 @@ class Session(SessionBase):
             raise
 
     async def open_folder(self, folder: Path, project: Project, word: str) -> None:
-        """Put a project that lies in a folder on the bench, and keep it there from now on.
+        """Open the project in a folder, and continue saving it there.
 
-        Raises UserError; the folder stays as it is then.
+        Raises UserError; the folder is then unchanged.
         """
         async with self.keeping.opening(folder):
             self.do(word, await self._bench_of(project))
 
     async def _bench_of(self, project: Project) -> Bench:
-        """A bench with a project on it. Raises UserError."""
+        """A bench for a project. Raises UserError."""
         self.readiness.load()
         profile = profile_as_given(project.given, self.bench.profile.of_all_parts)
         check_block(profile, "")
@@ -216,11 +213,11 @@ class Session(SessionBase):
         return replace(bench, locked=locked, stops=project.stops, copies=project.copies)
 
     async def open_plan(self, path: Path) -> None:
-        """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""
+        """Cut the model on the bench by a plan file. Raises UserError if it cannot be read, or is for another model."""
         await self.take_plan(_read_plan(path))
 
     async def take_plan(self, plan: PlanFile) -> None:
-        """Cut the model on the bench by a plan that has been read already."""
+        """Cut the model on the bench by a plan. Raises UserError."""
         bench = self.bench
         if bench.model is None:
             wanted = plan.model or "its model"
@@ -231,12 +228,12 @@ class Session(SessionBase):
         self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
     async def make(self, word: str, task: Callable[..., Value], *given: Any) -> Value:
-        """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
+        """Run a task on the parts of the bench. Raises UserError if they cannot be cut."""
         with self.waiting(word):
             return await self.quick.run(task, self.bench, *given)
 
     async def _draw_pieces(self, bench: Bench) -> Path:
-        """The parts as bodies of their own, as `work.pieces` packs them. Raises UserError where they cannot be cut."""
+        """The parts as separate bodies, packed by `work.pieces`. Raises UserError if they cannot be cut."""
         out, before = self.new_file(), self.pieces.done
         await self.quick.run(draw_pieces, bench, out)
         if before is not None and not self.pieces.stale:
@@ -244,7 +241,7 @@ class Session(SessionBase):
         return out
 
     async def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> None:
-        """Take other names and settings. key: the one that is set. Raises UserError."""
+        """Change profile names and settings. key: the one that is set. Raises UserError."""
         before = self.bench
         given = change(before.given)
         check_block(profile_as_given(given, before.profile), key)
@@ -253,7 +250,7 @@ class Session(SessionBase):
             self.do(word, bench, refused)
 
     def unless_stopped(self, name: str, begin: Callable[[], object]) -> Callable[[], None]:
-        """A command that begins long work; one that still waits for its turn when work is stopped does nothing then."""
+        """Wrap a command that begins long work; the result does nothing if work is stopped while it waits for its turn."""
         ticket = object()
         self._to_begin[ticket] = name
 
@@ -264,8 +261,8 @@ class Session(SessionBase):
         return act
 
     def stop(self) -> Callable[[], None]:
-        """End all work at once, also what has not begun yet. Gives what is to be done in a turn: take the best of the search,
-        tell what became of all."""
+        """End all work at once, including queued commands. Returns a function, to be called in a turn, that applies the best
+        result of the search and reports what happened."""
         waiting, search, bench = {*self._to_begin.values()}, self.finding.progress, self.finding.bench
         self._to_begin.clear()
         words = []
@@ -286,8 +283,8 @@ class Session(SessionBase):
         return tell
 
     async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
-        """A bench with another profile; planes that it forbids go, with the reason, so do rows of the front that cannot be cut at
-        another place on the plate, and a model that it scales or turns otherwise is read again."""
+        """A bench with another profile. Removes planes that it forbids, with the reason, and rows of the front that cannot be cut
+        elsewhere on the plate; reads the model again if its scale or rotation changes."""
         bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
@@ -309,8 +306,8 @@ class Session(SessionBase):
         return bench, ""
 
     async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
-        """The model of a file, whose mesh stays as long as anybody has it. asks: where its size is none that a printer makes, the
-        page that wants it is asked for its unit."""
+        """The model of a file, whose mesh file exists as long as the model. asks: ask the page for the unit if the size suggests
+        a wrong one."""
         model = await self.quick.run(read_model, path, name, profile.of_all_parts, self.new_file(), plate)
         if isinstance(model, Unscaled):
             if asks:
@@ -321,13 +318,13 @@ class Session(SessionBase):
 
 
 def _remove_files(*files: Path | None) -> None:
-    """Remove the files of a model that is not used any more."""
+    """Delete the files of an unused model."""
     for file in filter(None, files):
         file.unlink(missing_ok=True)
 
 
 def _read_plan(path: Path) -> PlanFile:
-    """The plan in a file. Raises PlanError, which names the file alone."""
+    """The plan in a file. Raises PlanError, which contains the file's name without folders."""
     try:
         return read_plan(path)
     except PlanError as error:
@@ -335,8 +332,7 @@ def _read_plan(path: Path) -> PlanFile:
 
 
 class Workbench:
-    """sessions: by number, from 1 on; a number is not given again. Each is told what the others are, as soon as that changes.
-    pools: of the processes that they share."""
+    """sessions: by number, from 1, never reused; each has the list of all. pools: the processes that they share."""
 
     def __init__(self, make: Callable[[WorkerPools], Session]) -> None:
         self.sessions: dict[int, Session] = {}
@@ -347,7 +343,7 @@ class Workbench:
         self._last = 0
 
     def open(self, like: Session | None = None) -> int:
-        """The number of a new session with an empty bench, its machine and settings those of another. Raises PlanError where
+        """Open a session with an empty bench and the machine and settings of another, and return its number. Raises PlanError if
         there are too many."""
         if len(self.sessions) >= MOST_SESSIONS:
             raise PlanError(f"{MOST_SESSIONS} benches are open, which is the most: close one first")
@@ -362,16 +358,16 @@ class Workbench:
         return self._last
 
     async def close(self, number: int) -> str:
-        """End a session and its work; a sentence where its last change could not be kept, else "". To cancel the waiting does not
-        cancel the keeping."""
+        """End a session and its work; returns a sentence if its last change could not be saved, else "". Cancelling the wait does
+        not cancel the save."""
         self._begin_to_close(number)
         return await asyncio.shield(self._closing[number]) if number in self._closing else ""
 
     async def close_all(self) -> list[str]:
-        """End all of them, and all processes; a sentence for each whose last change could not be kept."""
+        """End all sessions and processes; returns a sentence for each whose last change could not be saved."""
         for number in list(self.sessions):
             self._begin_to_close(number)
-        await asyncio.sleep(0)  # all of them have ended their work
+        await asyncio.sleep(0)  # let all of them end their work
         self.pools.end()
         return [trouble for trouble in await asyncio.gather(*self._closing.values()) if trouble]
 

@@ -1,1 +1,1 @@
-"""Web: the server, its addresses and lines, and the page. Public: `serve.serve_workbench`."""
+"""Web: the server, its routes and websockets, and the page. Public: `serve.serve_workbench`."""

@@ -1,4 +1,4 @@
-"""Lines: the websockets of a page: to its session, state out and commands in; on this computer one to the network's door."""
+"""Websockets of a page: to its session, state out and commands in; on this computer another one for pairing devices."""
 
 import asyncio
 import json
@@ -22,31 +22,31 @@ from profiles.messages import check_text
 MOST_COMMAND = 100_000  # characters
 _states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
 CLOSED = "this bench is not open any more"
-CLOSED_CODE = 4404  # of a websocket that is closed for that
-GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
+CLOSED_CODE = 4404  # of a websocket of a closed bench
+GONE_CODE = 1006  # of one that ended without a close frame, RFC 6455
 MOST_OF_DEVICES = 1_000  # characters
 DEVICE_FUNCTIONS: dict[str, Callable[..., None]] = {"unpair": Door.unpair, "reopen": Door.reopen}
 DEVICE_COMMANDS = {name: arguments_of(function) for name, function in DEVICE_FUNCTIONS.items()}
 
 
 async def talk(session: Session, socket: WebSocket) -> None:
-    """State out, commands in, until either side goes. A page that reads nothing holds up nobody but itself."""
+    """Send states and receive commands until either side ends. A page that does not read only blocks itself."""
     await socket.accept()
     try:
         await until_either_ends(tell(session, lambda: snapshot(session), socket), _hear(session, socket))
     finally:
         if not session.closed:
-            session.trials.settle()  # of a plane that the page had in its hand
+            session.trials.settle()  # of a plane that the page was dragging
 
 
 async def refuse_closed(socket: WebSocket) -> None:
-    """A line to a bench that is not there."""
+    """Close the websocket of a bench that does not exist."""
     await socket.accept()
     await socket.close(CLOSED_CODE, CLOSED)
 
 
 async def until_either_ends(tell: Coroutine[Any, Any, None], hear: Coroutine[Any, Any, None]) -> None:
-    """The two directions of a line beside each other, of which neither outlives the other; that a page has gone is no fault."""
+    """Run both directions of a websocket until either ends; a page that has disconnected is not an error."""
     try:
         async with asyncio.TaskGroup() as group:
             hearing = group.create_task(hear)
@@ -56,15 +56,15 @@ async def until_either_ends(tell: Coroutine[Any, Any, None], hear: Coroutine[Any
 
 
 async def send(socket: WebSocket, text: str) -> None:
-    """Say something to a page. Raises WebSocketDisconnect when it has gone."""
+    """Send text to a page. Raises WebSocketDisconnect if it has gone."""
     try:
         await socket.send_text(text)
-    except RuntimeError as error:  # uvicorn's word for a line that it has closed itself and not told yet
+    except RuntimeError as error:  # uvicorn raises it for a connection that it has closed but not reported yet
         raise WebSocketDisconnect(GONE_CODE) from error
 
 
 async def receive(socket: WebSocket) -> str:
-    """The next text of a page, "" for bytes, which are no command. Raises WebSocketDisconnect when it has gone."""
+    """The next text of a page, "" for bytes, which are not a command. Raises WebSocketDisconnect if it has gone."""
     message = await socket.receive()
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(message["code"])
@@ -72,8 +72,7 @@ async def receive(socket: WebSocket) -> str:
 
 
 async def tell(source: Observable, state: Callable[[], dict[str, Any]], socket: WebSocket) -> None:
-    """The newest state whenever there is one, in the page's words and encoded once for all pages; what came in between while a
-    slow page was reading is left out."""
+    """Send the newest state at every change, rendered for the page and encoded once for all pages; a slow page skips states."""
     while not source.closed:
         seen, text = _states.get(source, (-1, ""))
         if seen != source.version:
@@ -92,12 +91,12 @@ async def _hear(session: Session, socket: WebSocket) -> None:
             if DEVICE in socket.scope:
                 check_bench_command(asked)
             obey(session, asked)
-        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench continues
             session.answer(asked.get("ask"), session.refuse(error))
 
 
 def parsed(text: str, most: int) -> dict[str, Any]:
-    """A command from a page, at most `most` characters long. Raises PlanError for anything else."""
+    """Parse a page's command of at most `most` characters. Raises PlanError."""
     try:
         asked = json.loads(text) if len(text) <= most else None
     except (ValueError, RecursionError):
@@ -113,7 +112,7 @@ def parsed(text: str, most: int) -> dict[str, Any]:
 
 
 def devices_line(door: Door) -> Callable[[WebSocket], Awaitable[None]]:
-    """What answers the websocket of a page of this computer; no address of the network leads to it."""
+    """Handler of the websocket for pairing devices, for pages of this computer only."""
 
     async def talk(socket: WebSocket) -> None:
         await socket.accept()

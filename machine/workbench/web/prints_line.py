@@ -1,4 +1,4 @@
-"""Prints line: a page's line to the prints: one of its own, so that a print's news, five a second, carry nothing else."""
+"""A page's websocket to the prints, separate because they change five times a second."""
 
 import asyncio
 import json
@@ -28,11 +28,11 @@ MOST_COMMAND = 10_000  # characters
 def prints_line(
     prints: Prints, workbench: Workbench, benches: asyncio.AbstractEventLoop
 ) -> Callable[[WebSocket], Awaitable[None]]:
-    """What answers the websocket of a page of a session: state out, commands in. `?page=` names the page, so that a line that
-    comes back is known.
+    """Handler of a page's websocket: state out, commands in. `?page=` names the page, so that it is recognised when it
+    reconnects.
 
-    Each line has a task of its own that sends the newest state: one that reads nothing holds up itself alone. The session lives
-    in another event loop and is read there alone, but for its being there.
+    Each websocket has a task that sends the newest state, so a page that does not read only blocks itself. The session lives in
+    another event loop and is read only there, except for its existence.
     """
 
     async def talk(socket: WebSocket) -> None:
@@ -53,7 +53,7 @@ def prints_line(
 
 
 def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
-    """What answers a request for the log of a print, as far as it is written."""
+    """Handler of requests for the log of a print, as far as it is written."""
 
     async def answer(request: Request) -> Response:
         for job in prints.prints:
@@ -66,13 +66,13 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 
 
 def _told(prints: Prints) -> dict[str, Any]:
-    """What every page is told."""
+    """State of the prints for every page."""
     state = prints.snapshot()
     return state | {"prints": [job | {"webcam": bool(job["webcam"])} for job in state["prints"]]}
 
 
 def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
-    """What answers a request for a picture of the camera at a print: the page may load nothing from elsewhere itself."""
+    """Handler of requests for a camera picture of a print, because the page may load nothing from other servers."""
 
     async def answer(request: Request) -> Response:
         for job in prints.prints:
@@ -88,8 +88,7 @@ def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 
 
 async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
-    """An order that waits for the bench, which may be busy, holds up nothing that the page says after it: an emergency stop is
-    given at once."""
+    """Receive commands. One that waits for a busy bench does not block later ones, so an emergency stop is executed at once."""
     async with asyncio.TaskGroup() as tasks:
         ordering: asyncio.Task[None] | None = None
         while True:
@@ -114,10 +113,10 @@ async def _order(socket: WebSocket, with_bench: Work) -> None:
 
 @asynccontextmanager
 async def _refusals(socket: WebSocket) -> AsyncIterator[None]:
-    """Tell the page why what it has asked for cannot be done."""
+    """Report errors of the block to the page."""
     try:
         yield
     except UserError as error:
         await send(socket, json.dumps({"problem": page_words(f"{error}"), "forcible": error.forcible}))
-    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints continue
         await send(socket, json.dumps({"problem": page_words(bug_in_words(error, ()))}))

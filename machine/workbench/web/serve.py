@@ -1,4 +1,4 @@
-"""Serve: the workbench run from its address to Ctrl-C: nothing of it goes on afterwards."""
+"""Runs the workbench from its address to Ctrl-C, after which nothing of it remains running."""
 
 import asyncio
 import gc
@@ -26,22 +26,22 @@ from machine.workbench.web.uploads import Uploads
 from machine.workbench.work.folders import files_in, tidy_left
 from machine.workbench.work.worker_pool import WorkerPools
 
-GRACE_S = 1  # for answers under way when it ends, and for its processes
-KEEP_S = 20.0  # for the work on all benches to be kept, which takes less than a second unless a model is huge or a disk slow
-SWITCH_S = 0.0005  # between threads: usual are 5 ms, and a stop is waited for several times
-MOST_SENT = 1 << 20  # bytes of one message of a page; files come by another way
+GRACE_S = 1  # for pending answers and for its processes at the end
+KEEP_S = 20.0  # for saving all benches, which takes less than a second except for huge models or slow disks
+SWITCH_S = 0.0005  # between threads; the default is 5 ms, and a stop waits several times
+MOST_SENT = 1 << 20  # bytes of a page's message; files are uploaded otherwise
 
 
 class Server(uvicorn.Server):
-    """uvicorn's, with the interrupts left to the program."""
+    """Uvicorn's server, without its signal handlers."""
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Nothing: Ctrl-C calls `stop`."""
+        """Install no handlers: Ctrl-C calls `stop`."""
         yield
 
     def stop(self) -> None:
-        """End soon; asked again, at once."""
+        """Stop soon; at once if called again."""
         self.force_exit = self.should_exit
         self.should_exit = True
 
@@ -54,9 +54,9 @@ def serve_workbench(
     upload_mib: int = UPLOAD_MIB,
     lan: Lan | None = None,
 ) -> None:
-    """Serve until Ctrl-C. make: a session; begin: given the first one when it is there, both in the event loop of the sessions;
-    announce: given its address when it answers, and those in the network; upload_mib: the largest file that is taken from a page;
-    lan: the network that it is open to, None: to none."""
+    """Serve until Ctrl-C. make: creates a session; begin: receives the first one; both run in the sessions' event loop; announce:
+    receives the address when the server answers, and those in the network; upload_mib: size limit of uploads; lan: network to
+    open the workbench to, or None."""
     with ExitStack() as stack:
         own, of_lan = listen_at_all(port, lan.addresses if lan else ())
         for each in (own, *of_lan):
@@ -72,12 +72,11 @@ def serve_workbench(
 
 @contextmanager
 def event_loop(name: str) -> Iterator[asyncio.AbstractEventLoop]:
-    """An event loop in a thread of its own, in which `in_loop` runs what it is given. What hangs there at the end is not waited
-    for."""
+    """Run an event loop in its own thread, for `in_loop`. What hangs there at the end is not waited for."""
     loop, ended = asyncio.new_event_loop(), asyncio.Event()
 
     def run() -> None:
-        with asyncio.Runner(loop_factory=lambda: loop) as runner:  # cancels what is left
+        with asyncio.Runner(loop_factory=lambda: loop) as runner:  # cancels remaining tasks
             runner.run(ended.wait())
 
     thread = Thread(target=run, name=name, daemon=True)
@@ -119,7 +118,7 @@ async def _serve(
             server.stop()
 
     def end() -> None:
-        """First the prints end, heaters off; asked again, the workbench goes at once, and they end by themselves."""
+        """End the prints first, heaters off; if called again, stop the workbench at once, and the prints end by themselves."""
         if ending or not prints.running:
             stop()
         else:
@@ -141,14 +140,14 @@ async def _serve(
             await answering
     finally:
         prints.close()
-        with suppress(TimeoutError):  # what hangs there ends with the program, and no file is deleted that is still read
+        with suppress(TimeoutError):  # whatever hangs there ends with the program, and no file that is still read is deleted
             async with asyncio.timeout(KEEP_S):
                 for trouble in await in_loop(benches, workbench.close_all()):
                     say(trouble)
 
 
 def _server(app: ASGIApp, lan: Lan | None = None) -> Server:
-    """lan: the network that it answers in, None: it answers this computer alone."""
+    """lan: the network to serve, None: this computer alone."""
     certificate = lan.certificate if lan else None
     settings = uvicorn.Config(
         app,
@@ -156,7 +155,7 @@ def _server(app: ASGIApp, lan: Lan | None = None) -> Server:
         lifespan="off",
         ws="websockets-sansio",
         ws_max_size=MOST_SENT,
-        ws_per_message_deflate=False,  # what goes no further than this computer or its network is not worth it
+        ws_per_message_deflate=False,  # not worth it within this computer or its network
         timeout_graceful_shutdown=GRACE_S,
         server_header=False,
         proxy_headers=False,
@@ -167,8 +166,8 @@ def _server(app: ASGIApp, lan: Lan | None = None) -> Server:
 
 
 def keep_stops_quick() -> None:
-    """No thread holds up that of the prints for long: a full collection of all that is loaded does so for a tenth of a second, so
-    that is left out of it, and the interpreter changes from one thread to another more often than usual."""
+    """Keep the prints' thread responsive: exclude loaded objects from garbage collection, which can take a tenth of a second, and
+    switch threads more often than by default."""
     gc.freeze()
     sys.setswitchinterval(SWITCH_S)
 

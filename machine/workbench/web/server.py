@@ -1,4 +1,4 @@
-"""Server: the page, and all addresses of the workbench: models, files and lines of its sessions, and the benches themselves."""
+"""Server: the page, and the routes for models, files and websockets of its sessions, and for the benches."""
 
 import asyncio
 import re
@@ -49,7 +49,7 @@ BELOW = "/{token}/{session:int}/"
 
 
 async def profile(session: Session, request: Request) -> Response:
-    """The machine, the material or the process with what is changed of it, as a profile file."""
+    """A profile file of the machine, the material or the process with its changes."""
     given, kind = session.bench.given, request.path_params["kind"]
     if kind not in KINDS:
         return Response("there is no such profile\n", 404)
@@ -60,13 +60,13 @@ async def profile(session: Session, request: Request) -> Response:
 
 
 async def plan(session: Session, request: Request) -> Response:
-    """The plan's file."""
+    """The plan file."""
     text = await session.make("cutting the parts", make_plan)
     return Response(text, headers=_saved_as(f"{file_stem(session.bench)}-plan.toml"), media_type="application/toml")
 
 
 def _made_file(word: str, task: Callable[..., None], kind: str, ending: str) -> Act:
-    """A file that a task makes of the parts; word: what the pages wait for; ending: of its name after the model's."""
+    """Handler that returns a file made from the parts by a task; word: what the pages wait for; ending: of the file's name."""
 
     async def answer(session: Session, request: Request) -> Response:
         out = session.new_file()
@@ -77,25 +77,25 @@ def _made_file(word: str, task: Callable[..., None], kind: str, ending: str) -> 
 
 
 async def print_page(session: Session, request: Request) -> Response:
-    """The page of the last slices as `view` writes it, with its own content security policy in it."""
+    """The page of the last slices as `view` writes it, with its own content security policy."""
     slices = _slices(session, request)
     return _gone() if slices is None else FileResponse(slices.sliced.page, media_type="text/html")
 
 
 async def print_text(session: Session, request: Request) -> Response:
-    """The G-code of the last slices to look at, whatever the dry run found."""
+    """The G-code of the last slices for display, whatever the dry run found."""
     slices = _slices(session, request)
     return _gone() if slices is None else FileResponse(slices.sliced.gcode, media_type="text/plain")
 
 
 async def print_walls(session: Session, request: Request) -> Response:
-    """What is seen of a part that is sliced, as `work.walls` gives it."""
+    """The visible walls of a sliced part, from `work.walls`."""
     drawn = session.slicing.walls_of(request.path_params["number"], request.path_params["part"])
     return _gone() if drawn is None else Response(drawn, media_type=BYTES)
 
 
 async def shared_page(session: Session, request: Request) -> Response:
-    """The same as a file to save, with the comparison with one piece where that has been worked out."""
+    """The page of the last slices as a file, with the comparison with one piece if that has been computed."""
     page, alternatives, name = session.slicing.needed().sliced.page, session.comparing.rows(), f"{file_stem(session.bench)}.html"
     if not alternatives:
         return FileResponse(page, headers=_saved_as(name), media_type="text/html")
@@ -105,7 +105,7 @@ async def shared_page(session: Session, request: Request) -> Response:
 
 
 async def gcode(session: Session, request: Request) -> Response:
-    """The G-code; with errors only for who has said that he wants it all the same."""
+    """The G-code; with errors only if the user has confirmed."""
     sliced = session.slicing.needed().sliced
     if (errors := sliced.errors) and request.query_params.get("force") != "yes":
         count = f"{len(errors)} error{'s' * (len(errors) > 1)}"
@@ -117,7 +117,7 @@ async def gcode(session: Session, request: Request) -> Response:
 
 
 def _slices(session: Session, request: Request) -> Slices | None:
-    """The last slices, where they are those that are asked for."""
+    """The last slices, if they have the requested key."""
     slices = session.slicing.latest()
     return slices if slices is not None and slices.sliced.key == request.path_params["key"] else None
 
@@ -127,25 +127,25 @@ def _gone() -> Response:
 
 
 def _once(file: Path, kind: str, name: str) -> Response:
-    """A file that goes when it has been sent."""
+    """A response with a file that is deleted after sending."""
     remove = BackgroundTask(file.unlink, missing_ok=True)
     return FileResponse(file, headers=_saved_as(name), media_type=kind, background=remove)
 
 
 def _number(text: str) -> int:
-    """The number in an address, 0 for what is none of ours."""
+    """The number in an address, 0 if it is invalid."""
     return int(text) if text.isascii() and text.isdigit() and len(text) < 6 else 0
 
 
 def _saved_as(name: str) -> dict[str, str]:
-    """The header that gives a browser a file's name, in any script (RFC 6266)."""
+    """Header that gives a download its name, in any script (RFC 6266)."""
     plain = name.encode("ascii", "replace").decode().replace("?", "_")
     return {"content-disposition": f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name)}"}
 
 
 def workbench_page(lines: Iterable[str], network: str = "") -> tuple[bytes, str]:
-    """The page and its content security policy. lines: origins of websockets of the server, to which alone the page may talk;
-    network: "open" for this computer's own page where others are let in, "paired" for that of a device that is."""
+    """The page and its content security policy. lines: websocket origins of the server; network: "open" for this computer's page
+    if the network is open, "paired" for the page of a device."""
     style, script = "".join((folder / "style.css").read_text("utf-8") for folder in (TEMPLATE, OWN)), bundle(OWN / "main.js")
     put = {"/*STYLE*/": style, "/*SCRIPT*/": script, "/*NETWORK*/": network}
     body = MARKER.sub(lambda match: put[match[0]], (OWN / "page.html").read_text("utf-8"))
@@ -153,7 +153,7 @@ def workbench_page(lines: Iterable[str], network: str = "") -> tuple[bytes, str]
 
 
 def policy(style: str, script: str, lines: Iterable[str]) -> str:
-    """What the page may do: its own script and style, pictures that it has made itself, and talk to its server."""
+    """Content security policy: own script and style, images that the page creates, and connections to its server."""
     server = " ".join(("'self'", *lines))
     own = f"script-src {hash_source(script)}; style-src {hash_source(style)}; connect-src {server}"
     rest = "frame-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -161,8 +161,8 @@ def policy(style: str, script: str, lines: Iterable[str]) -> str:
 
 
 def bench_routes(workbench: Workbench) -> list[Route]:
-    """What is not of one bench: `benches` (POST: one more, with the settings of that `like`), `benches/N` (DELETE),
-    and the address without a number, which leads to the first."""
+    """Routes for all benches: `benches` (POST: open one with the settings of `like`), `benches/N` (DELETE), and the address
+    without a number, which redirects to the first."""
 
     async def first(request: Request) -> Response:
         number = min(workbench.sessions, default=0) or workbench.open()
@@ -191,7 +191,7 @@ def bench_routes(workbench: Workbench) -> list[Route]:
 
 @dataclass(frozen=True)
 class Served:
-    """What all pages are served: the benches, the event loop in which they live, the prints, the files that pages send."""
+    """Shared objects of all pages: the benches, their event loop, the prints, the uploads."""
 
     workbench: Workbench
     benches: asyncio.AbstractEventLoop
@@ -200,22 +200,22 @@ class Served:
 
 
 def application(served: Served, token: str, port: int, door: Door | None = None) -> ASGIApp:
-    """The server of this computer, below `/TOKEN/`; the number of a session follows. door: of the network, where it is open."""
+    """The application for this computer, below `/TOKEN/SESSION/`. door: pairing, if the network is open."""
     page = workbench_page((f"ws://{name}:{port}" for name in NAMES), "open" if door else "")
     of_door = [WebSocketRoute(BELOW + "devices", devices_line(door))] if door else []
     return guarded(_router(served, page, of_door), token, port)
 
 
 def lan_application(served: Served, door: Door, lan: Lan, port: int) -> ASGIApp:
-    """The server of paired devices, the same below `/paired/`."""
+    """The application for paired devices, with the same routes below `/paired/`."""
     scheme = lan.scheme.replace("http", "ws")
     page = workbench_page((f"{scheme}://{host}" for host in lan.hosts(port)), "paired")
     return Gate(_router(served, page), door, lan, port)
 
 
 def _router(served: Served, page: tuple[bytes, str], further: Sequence[BaseRoute] = ()) -> ASGIApp:
-    """What is of the prints, and further, is answered in the server's own event loop, all else in that of the benches, so that an
-    emergency stop waits for nothing that a bench has the processor do."""
+    """Routes of the prints, and further ones, run in the server's own event loop, all others in that of the benches, so that an
+    emergency stop never waits for a busy bench."""
     workbench, prints = served.workbench, served.prints
     of_prints = [
         Route(BELOW + "prints/{print:int}/log", print_log(prints)),
@@ -227,7 +227,7 @@ def _router(served: Served, page: tuple[bytes, str], further: Sequence[BaseRoute
 
 
 def answered_in(loop: asyncio.AbstractEventLoop, app: ASGIApp) -> ASGIApp:
-    """An application that runs in another event loop than its server."""
+    """Run an application in another event loop than its server's."""
 
     async def answer(scope: Scope, receive: Receive, send: Send) -> None:
         server = asyncio.get_running_loop()
@@ -292,9 +292,9 @@ def _answering(workbench: Workbench, act: Act, need: Need) -> Callable[[Request]
         try:
             check_need(session, need)
             return await act(session, request)
-        except ClientDisconnect:  # the page has gone while it sent a file
+        except ClientDisconnect:  # the page disconnected during an upload
             return Response(status_code=400)
-        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench continues
             return JSONResponse({"problem": page_words(session.refuse(error))}, status_code=422)
 
     return answer
@@ -308,14 +308,14 @@ def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
             return
         try:
             await talk(session, socket)
-        except ExceptionGroup as bugs:  # each becomes a sentence for the other lines, and a log
+        except ExceptionGroup as bugs:  # each becomes a sentence for the other websockets, and a log
             session.refuse(bugs.exceptions[0])
 
     return connect
 
 
 def _of_key(current: Callable[[Session], str], act: Act) -> Act:
-    """What a page asks for by a key as long as that is the current one; else there is another by now, which it asks for next."""
+    """Handler that answers requests for the current key; a page with an outdated key will request the new one."""
 
     async def answer(session: Session, request: Request) -> Response:
         key = current(session)

@@ -1,4 +1,4 @@
-"""Snapshot: the state of a session as its pages get it, as JSON: the bench, the slices and whether they can be printed."""
+"""Snapshot: the state of a session for its pages, as JSON: the bench, the slices and whether they can be printed."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -26,19 +26,17 @@ from profiles.messages import terminal_words
 from profiles.profile import Profile
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
-MOST_FACES = 2_000_000  # that a page draws
-# What a button says, and the command of the workbench that it gives.
+MOST_FACES = 2_000_000  # limit for drawing
+# Text of a button, and its command.
 SLICE_AGAIN = {"text": "Slice again", "command": {"do": "slice"}}
 SUPPORT_ON = {"text": "Switch support on", "command": {"do": "set", "key": "process.support", "value": "auto"}}
 NO_PURGE = {"text": "Print no purge line", "command": {"do": "set", "key": "machine.purge_mm", "value": "0"}}
 
 
 def verdict_of(findings: Sequence[Finding], profile: Profile, hanging_mm2: float, *, out_of_date: bool) -> dict[str, Any]:
-    """Whether slices with these findings, made with this profile, can be printed. hanging_mm2: of faces that need support;
-    out_of_date: the bench was changed since.
-
-    `kind`: ready, problem or stale; `finding`: place in the list of the one that the text is about, -1: none; `remedy`: the
-    button that does something about it."""
+    """Whether slices with these findings and profile can be printed. hanging_mm2: area that needs support; out_of_date: the bench
+    has changed since. `kind`: ready, problem or stale; `finding`: index of the finding that the text is about, -1: none;
+    `remedy`: button that fixes it."""
     verdict: dict[str, Any] = {"kind": "ready", "finding": -1, "remedy": None}
     if out_of_date:
         text = "Out of date: the workbench was changed since it was sliced"
@@ -74,7 +72,7 @@ def slices_state(session: Session) -> dict[str, Any]:
 
 
 def _figures(alternative: Alternative, material: Material) -> list[tuple[str, str]]:
-    """Names and texts of what an alternative costs; dashes where it cannot be printed. Without a price none is told."""
+    """Names and texts of an alternative's costs; dashes if it cannot be printed. The price is left out if unknown."""
     mm, support_mm3 = alternative.filament_mm or 0.0, alternative.support_mm3 or 0.0
     figures = {
         "time": about(alternative.time_s or 0.0),
@@ -134,7 +132,7 @@ def _sliced(session: Session) -> dict[str, Any] | None:
 
 
 def snapshot(session: Session) -> dict[str, Any]:
-    """Everything but the triangles; small enough to be told whole whenever anything changes."""
+    """Everything but the triangles; small enough to be sent as a whole at every change."""
     bench, history, search = session.bench, session.history, session.finding.progress
     standing = session.standing.result
     best = None if search is None else search.best
@@ -192,7 +190,7 @@ def snapshot(session: Session) -> dict[str, Any]:
 
 
 def _copies_told(session: Session) -> str:
-    """How many copies stand on the plate, or why they cannot."""
+    """Sentence about how many copies are on the plate, or why they do not fit."""
     standing, count = session.standing.result, session.bench.copies
     if standing is None or count == 1:
         return ""
@@ -200,7 +198,7 @@ def _copies_told(session: Session) -> str:
 
 
 def marks_key(bench: Bench) -> str:
-    """What tells the faces that zones name from others: the page asks for them by it; "": they name none."""
+    """Key of the faces that zones mark, by which the page requests them; "" if there are none."""
     kinds = [[zone for zone in getattr(bench.zones, kind) if not isinstance(zone, Zone)] for kind in ZONE_KINDS]
     if bench.model is None or not any(kinds):
         return ""
@@ -208,7 +206,7 @@ def marks_key(bench: Bench) -> str:
 
 
 def _zones(bench: Bench) -> list[dict[str, Any]]:
-    """The zones as the page shows them: a mesh by the box around it."""
+    """The zones as the page shows them; a mesh by its bounding box."""
     return [
         {"kind": kind, "number": number, **asdict(zone.box if isinstance(zone, MeshVolume) else zone)}
         for kind in ZONE_KINDS
@@ -217,7 +215,7 @@ def _zones(bench: Bench) -> list[dict[str, Any]]:
 
 
 def _modifier(modifier: Modifier) -> dict[str, Any]:
-    """The box of a modifier, that around one that is a mesh, and its settings in words."""
+    """The box of a modifier (the bounding box of a mesh), and its settings in words."""
     volume, settings = modifier.volume, ", ".join(f"{key} = {value}" for key, value in modifier.process.items())
     if isinstance(volume, Zone):
         return {"min_mm": volume.min_mm, "max_mm": volume.max_mm, "axes": volume.axes, "settings": settings}
@@ -243,7 +241,7 @@ def _model(model: Model, session: Session) -> dict[str, Any]:
 
 
 def _trial(session: Session) -> dict[str, Any] | None:
-    """The figures of the planes that were tried last, or why they cannot be cut."""
+    """The figures of the last trial, or why its planes cannot be cut."""
     if session.trials.trial is None or session.trials.trial[0].sought != session.bench.sought:
         return None
     _, cuts, trial = session.trials.trial
@@ -253,19 +251,19 @@ def _trial(session: Session) -> dict[str, Any] | None:
 
 
 def _refused(session: Session) -> dict[str, Any] | None:
-    """The planes that were refused last, as long as the page that wanted them is told why."""
+    """The planes that were refused last, while their page shows the reason."""
     refused = session.trials.refused
     return asdict(refused) if refused is not None and refused.page in session.problems else None
 
 
 def _laid(session: Session) -> dict[str, Any] | None:
-    """How the last search has found the model turned and how it has turned it, as long as its parts lie there."""
+    """Rotations before and after the last search, while its parts are current."""
     laid, bench = session.finding.laid, session.bench
     return {"before": laid[0], "after": laid[1]} if laid is not None and bench.rows and bench.rotation == laid[1] else None
 
 
 def _units(session: Session) -> dict[str, Any] | None:
-    """The units of which one is that of a model, as long as the page that wanted it is asked."""
+    """The possible units of a model, while its page is asked."""
     waits = session.unscaled
     return {"page": waits.page, "words": list(waits.units)} if waits is not None and waits.page in session.problems else None
 

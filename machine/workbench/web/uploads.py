@@ -1,5 +1,5 @@
-"""Uploads: a model, a plan or a profile that a page sends, kept as long as it lies on its bench (profiles as long as the program
-runs, for benches may share them), and those that a workbench which was killed has left, to be opened again."""
+"""Uploads: models, plans and profiles from pages, kept while they are on a bench (profiles until the program ends, because
+benches may share them), and files left behind by killed workbenches."""
 
 import asyncio
 import os
@@ -29,15 +29,14 @@ MIB = 2**20
 
 
 class Uploads:
-    """most_mib: the largest file that is taken; left: files of a workbench that was killed, each known to the pages by its
-    place."""
+    """most_mib: size limit; left: files of a killed workbench, identified by their indices."""
 
     def __init__(self, most_mib: int, left: Sequence[Path] = ()) -> None:
         self._most_mib, self._left = most_mib, left
         self._profiles = Received()
 
     def as_shown(self, given: Given) -> Given:
-        """Names and settings for a person, who knows of a file that was sent by its own name alone."""
+        """Names and settings for display: uploaded files by their own names."""
         for kind in KINDS:
             file = Path(getattr(given, kind))
             if file.parent.parent == self._profiles.path:
@@ -45,7 +44,7 @@ class Uploads:
         return given
 
     async def take(self, session: Session, request: Request) -> Response:
-        """A file that the person has chosen or dropped; what is refused is not kept."""
+        """Open a file that the user has chosen or dropped; a refused file is deleted."""
         name = Path(request.query_params.get("name", "")).name
         try:
             check_text(name)
@@ -63,7 +62,7 @@ class Uploads:
         return await self._open(session, name, receive, DEVICE in request.scope)
 
     async def list_left(self, session: Session, request: Request) -> Response:
-        """What has been left and is still there."""
+        """The files left behind that still exist."""
         rows = []
         for number, path in enumerate(self._left):
             with suppress(OSError):
@@ -72,7 +71,7 @@ class Uploads:
         return JSONResponse(rows)
 
     async def open_left(self, session: Session, request: Request) -> Response:
-        """The same opened on a bench, which gets a copy: what was left stays until its day is over."""
+        """Open a copy of a file left behind, which itself stays for its day."""
         number = request.path_params["number"]
         if number >= len(self._left):
             raise PlanError("no such file has been left by a workbench that was killed")
@@ -87,7 +86,7 @@ class Uploads:
         return await self._open(session, path.name, copy_to)
 
     async def list_kept(self, session: Session, request: Request) -> Response:
-        """The work that was kept of other benches, the newest first; that of a newer version says so when it is opened."""
+        """The autosaved work of other benches, newest first; work of a newer version is refused when it is opened."""
         rows = []
         for folder in folders_kept():
             try:
@@ -99,7 +98,7 @@ class Uploads:
         return JSONResponse(rows)
 
     async def open_kept(self, session: Session, request: Request) -> Response:
-        """The same put on a bench."""
+        """Open autosaved work on a bench."""
         name = request.path_params["name"]
         folder = next((folder for folder in folders_kept() if folder.name == name), None)
         if folder is None:
@@ -114,15 +113,14 @@ class Uploads:
         return JSONResponse({})
 
     def _with_copies(self, project: Project) -> Project:
-        """The project with copies of its profiles that are files, which benches may share. Raises OSError."""
+        """The project with copies of its profile files, which benches may share. Raises OSError."""
         given = project.given
         for kind, name in project.own_names.items():
             given = named(given, kind, str(shutil.copy(getattr(given, kind), self._profiles.new_file(name))))
         return replace(project, given=given)
 
     async def _take_profile(self, path: Path, session: Session) -> bool:
-        """Whether a file that a page has sent is a profile, which is then taken in place of the bench's machine, material or
-        process. Raises ProfileError for one that is not valid."""
+        """Apply an uploaded file if it is a profile; returns whether it is. Raises ProfileError if it is invalid."""
         try:
             kind = kind_in(path)
         except ProfileError:
@@ -157,7 +155,7 @@ class Uploads:
                     await session.open_plan(path)
         finally:
             waits = session.unscaled is not None and session.unscaled.path == path
-            if not taken and not waits:  # refused, or a text, of which nothing more is read
+            if not taken and not waits:  # refused, or text that has been read completely
                 remove_file(path)
         return JSONResponse({})
 

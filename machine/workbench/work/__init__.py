@@ -1,1 +1,1 @@
-"""Work: what takes time for a bench, in processes of its own. Public: the tasks, `worker_pool.TaskQueue`."""
+"""Work: long tasks of a bench, in worker processes. Public: the tasks, `worker_pool.TaskQueue`."""

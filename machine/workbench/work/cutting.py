@@ -1,7 +1,7 @@
-"""Cutting: finding parts, cutting by planes, trying planes, and making the files and pictures of the parts, as tasks.
+"""Cutting: tasks that find parts, cut by planes, try planes, and write files and pictures of the parts.
 
-Planes are tried by a process that keeps what it has worked out for the last bench. A bench has a number for that, which no other
-one of this run of the program has; it goes along with every task, for the process may have worked for another bench meanwhile.
+The process that tries planes caches the preparation of its last bench under the bench's number, which is unique in a run of the
+program and passed to every task, because the process may have served another bench meanwhile.
 """
 
 import zipfile
@@ -46,15 +46,15 @@ from profiles.errors import MoveError, PlanError
 from profiles.profile import Profile, load
 
 PLAN_NAME = "plan.toml"
-AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # the page's own words
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
-UNTILTED = 1.0 - 1e-9  # cosine between two normals that are the same but for rounding
-_ready: tuple[int, Trials] | None = None  # of the bench that this process has heard of last
+AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # in the words of the page
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # makes the bytes reproducible
+UNTILTED = 1.0 - 1e-9  # least cosine between normals that differ by rounding only
+_ready: tuple[int, Trials] | None = None  # cache of the bench that this process served last
 
 
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """How far a search is: a sentence, and the best so far as a row of the front; None: nothing is cut yet."""
+    """Progress of a search: a sentence, and the best row of the front so far; None: nothing is cut yet."""
 
     text: str
     best: FrontRow | None = None
@@ -62,7 +62,7 @@ class Searched:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The front of a search and what it says; turn: (3, 3) how the model on the bench is turned further for it."""
+    """The front of a search and its notes; turn: (3, 3) further rotation of the model on the bench."""
 
     front: tuple[FrontRow, ...]
     notes: tuple[str, ...]
@@ -70,10 +70,10 @@ class Found:
 
 
 def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLASSIC) -> Found:
-    """What a search as `decompose` makes it has found. Raises UserError.
+    """Search for parts as `decompose` does. Raises UserError.
 
-    orient: lay the model down in the cheapest orientation, chosen with the parts, unless a person has turned the model or locked
-    or marked something on it; ranker: a name for `ranker_named`.
+    orient: choose the cheapest orientation together with the parts, unless the user has turned the model, locked planes or marked
+    zones; ranker: a name for `ranker_named`.
     """
     ranker_named(ranker)
     assert bench.model is not None
@@ -96,7 +96,7 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
                 return
             left = f"{100 * best_share:.1f} % of the overhangs left"
             if candidate is mesh:
-                best = measure()  # planes of a model that lies otherwise are none of the one in the picture
+                best = measure()  # planes of another orientation do not fit the model in the picture
             tell(Searched(f"{otherwise}trying cut {stage}, {left}", best))
 
         by_hand = with_shapes(bench, locked, candidate)
@@ -116,13 +116,12 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
-    """The front of a plan for the model on the bench, measured; PlanError where it cannot be cut."""
+    """The measured front of a plan for the model on the bench. Raises PlanError if it cannot be cut."""
     return cut_bench(bench, plan, prices=True).front
 
 
 def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
-    """A row of the front on the bench with its time and plastic; without where it cannot be cut any more, or is not
-    sound."""
+    """A row of the front with its time and filament; without them if it cannot be cut, or is not sound."""
     row = bench.rows[number]
     with suppress(PlanError):
         parts = planned_parts(row)
@@ -133,12 +132,12 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
 
 
 def make_plan(tell: Tell, bench: Bench) -> str:
-    """The plan of the parts as the bench has them, as text."""
+    """The plan of the bench's parts, as text."""
     return _plan_and_meshes(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)[0]
 
 
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
-    """The project file of what lies on the bench."""
+    """Write the project file of the bench."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     check_stop_parts(bench.stops, len(decomposition.parts))
     compilers.wait_for(compilers.PICTURES)
@@ -148,7 +147,7 @@ def make_project(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
-    """The folder of `decompose -o` with the parts as the bench has them, as a zip."""
+    """Write the folder of `decompose -o` as a zip file."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     parts = [(part_file(part.index), stl(part.mesh)) for part in decomposition.parts]
     model, _, plan, scene = FOLDER_FILES
@@ -158,13 +157,13 @@ def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def _plan_and_meshes(decomposition: Decomposition, bench: Bench) -> tuple[str, dict[str, Path]]:
-    """The plan as text, and the files of the meshes that it expects beside it, by their names there."""
+    """The plan as text, and the mesh files that it expects beside it, by name."""
     plan, meshes = with_meshes_beside(plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts))
     return plan_text(plan), meshes
 
 
 def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:
-    """Files by their names as a zip, the same bytes whenever it is made."""
+    """Write files as a zip file with reproducible bytes."""
     with zipfile.ZipFile(out, "w") as archive:
         for name, text in files:
             entry = zipfile.ZipInfo(name, ZIP_DATE)
@@ -173,7 +172,7 @@ def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:
 
 
 def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
-    """The model on the bench cut by a plan; prices: the rows of its front measured, too."""
+    """Cut the model on the bench by a plan; prices: also measure the rows of its front."""
     assert bench.model is not None
     mesh, name = turned_mesh(bench, plan), bench.model.name
     compilers.wait_for(compilers.JUDGE)
@@ -184,7 +183,7 @@ def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decompositi
 
 
 def with_shapes(bench: Bench, plan: PlanFile, mesh: Mesh) -> PlanFile:
-    """The plan with what the model's file marks that is no box, on the model as it lies now."""
+    """The plan with the marks of the model's file that are not boxes, moved to the model's current orientation."""
     assert bench.model is not None
     shapes = bench.model.shapes()
     return (
@@ -193,19 +192,19 @@ def with_shapes(bench: Bench, plan: PlanFile, mesh: Mesh) -> PlanFile:
 
 
 def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
-    """The mesh as it is cut, turned as the plan says or else as the bench does."""
+    """The mesh in the plan's orientation, or else in the bench's."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
     return set_on_plate(bench.model.mesh(), turned)
 
 
 def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:
-    """The parts as the bench has them, for the page to draw apart."""
+    """Write the parts of the bench, for the page to draw separately."""
     out.write_bytes(pieces_block(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.profile))
 
 
 def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
-    """Surfaces and figures of all parts in print order, and as `fit` what the machine does not reach of them, in the sentence of
+    """Surfaces and figures of all parts in print order, and as `fit` why the machine cannot reach them, in the words of
     `export`."""
     colours = page_colours(len(decomposition.parts))
     records = solids(decomposition, profile, joints_of(decomposition.parts, profile))
@@ -214,7 +213,7 @@ def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
 
 
 def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
-    """What the machine does not reach of parts in their poses; "" where it reaches all."""
+    """Why the machine cannot reach parts in their poses; "" if it can."""
     try:
         check_parts(parts, profile)
     except MoveError as error:
@@ -223,7 +222,7 @@ def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
 
 
 def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
-    """A zip of what `--png`, `--sheet` and `--front` draw of the parts as the bench has them."""
+    """Write the pictures of `--png`, `--sheet` and `--front` for the bench's parts as a zip file."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME), prices=True)
     compilers.wait_for(compilers.PICTURES)
     images = {
@@ -235,13 +234,12 @@ def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def make_ready(tell: Tell, number: int, bench: Bench) -> None:
-    """Work out once what planes on a bench of this number need."""
+    """Prepare the bench with this number for planes."""
     _trials(number, bench)
 
 
 def load_kernels(tell: Tell) -> None:
-    """Have what planes need loaded, or compiled, before there is a model: a box shows what that is. From now on the process is
-    another bench's."""
+    """Load or compile the kernels for planes before there is a model, by means of a box. Drops the cached bench."""
     global _ready
     _ready = None
     compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
@@ -250,18 +248,18 @@ def load_kernels(tell: Tell) -> None:
 
 
 def try_cuts(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], most_cuts: float) -> Trial:
-    """Planes tried; most_cuts: see mdp.search.trial."""
+    """Try planes; most_cuts: see mdp.search.trial."""
     return _trials(number, bench).attempt(_planes(cuts), most_cuts)
 
 
 def near_neck(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> Plane | None:
-    """The neck near the plane of a part, as `Trials.neck` finds it."""
+    """The neck near the plane of a part, from `Trials.neck`."""
     return _trials(number, bench).neck(_planes(cuts), part, reach_mm)
 
 
 def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]]) -> Cuts | None:
-    """Planes in the order in which that of one part, whose number goes with them, is least shifted until all can be cut, as
-    `Trials.nearest` finds it; None: that is not so in any."""
+    """Among several print orders the planes that can be cut with the least shift of one part's plane, from `Trials.nearest`; None
+    if there are none. orders: planes, each with the number of that part."""
     trials, best = _trials(number, bench), None
     for cuts, part in orders:
         wanted, plane = cuts[part - 2].plane, trials.nearest(_planes(cuts), part)
@@ -277,7 +275,7 @@ def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]
 def _trials(number: int, bench: Bench) -> Trials:
     global _ready
     if _ready is None or _ready[0] != number:
-        _ready = None  # two at once would be too much for the memory
+        _ready = None  # two at once would need too much memory
         compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
         mesh = turned_mesh(bench)
         zones = with_shapes(bench, plan_of_bench(bench, PLAN_NAME), mesh).zones

@@ -1,7 +1,7 @@
-"""Folders: files that pages have sent, in temporary folders, and autosaved benches, each a project in the state folder, so that a
-crash or a restart loses nothing; the next program finds both.
+"""Folders: uploaded files in temporary folders, and autosaved benches as projects in the state folder, so that nothing is lost in
+a crash or restart; the next run finds both.
 
-The record of an autosave is written last and as a whole, so a folder without it is none. A folder is locked as long as a program
+The record of an autosave is written last and atomically; a folder without a record is ignored. A folder is locked while a program
 writes to it.
 """
 
@@ -25,17 +25,17 @@ from profiles.files import LOCK, keep_newest, lock_folder, modified_s, remove_lo
 from profiles.folders import state_folder
 
 PREFIX = "tiltprint-edit-"
-FOUND = "found"  # file in a folder that was left, as old as the knowledge of that
-BEGUN_S = 60.0  # an empty folder as new as this may be of a program that starts now and has not locked it yet
-KEPT_S = 24 * 3600.0  # what lay on the benches of a program that was killed: nobody else may have it
+FOUND = "found"  # file in a folder left behind, created when that was first found
+BEGUN_S = 60.0  # a newer empty folder may belong to a program that starts now and has not locked it yet
+KEPT_S = 24 * 3600.0  # retention of the files of a killed program, which no one else has
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
 FOLDER = "benches"
-MOST_KEPT = 10  # the newest ones
+MOST_KEPT = 10  # retained autosaves
 
 
 class Received:
-    """A folder that is locked as long as its program lives, and in it one for each file."""
+    """A folder that is locked as long as its program lives, with a subfolder for each file."""
 
     def __init__(self) -> None:
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
@@ -44,21 +44,21 @@ class Received:
         self._at_exit = finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
     def new_file(self, name: str) -> Path:
-        """A place for a file that a page calls so."""
+        """A path for a file with this name on the page."""
         folder = self.path / str(next(self._numbers))
         folder.mkdir()
-        plain = UNSAFE.sub("_", name.encode("ascii", "replace").decode())  # a disk counts bytes, so letters have one each
+        plain = UNSAFE.sub("_", name.encode("ascii", "replace").decode())  # disks limit bytes, so each character has one
         return folder / (plain[-LONGEST_NAME:].strip(". ") or "model")
 
     def remove(self) -> None:
-        """Remove the folder with all files."""
+        """Delete the folder with all files."""
         if self._lock is not None:
             remove_locked(self.path, self._lock)
             self._lock = None
         self._at_exit()
 
     def leave(self) -> None:
-        """Leave the files to the next start of the program, which finds them as if this one had been killed."""
+        """Leave the files to the next run of the program, as if this one had been killed."""
         self._at_exit.detach()
         if self._lock is not None:
             os.close(self._lock)
@@ -66,16 +66,16 @@ class Received:
 
 
 def remove_file(path: Path) -> None:
-    """Remove a file of a Received with the folder that it has for itself."""
+    """Delete a file of a Received with its subfolder."""
     shutil.rmtree(path.parent, ignore_errors=True)
 
 
 def tidy_left() -> tuple[Path, ...]:
-    """The folders of programs that were killed; those without a file, or known for a day, are removed instead."""
+    """Folders of killed programs; deletes those that are empty, or were found a day ago."""
     left = []
     for folder in sorted(Path(tempfile.gettempdir()).glob(f"{PREFIX}*")):
         with suppress(OSError):
-            # without locks nothing is known of other programs, so nothing of theirs is removed
+            # without locks the state of other programs is unknown, so nothing is deleted
             lock = None if _is_begun(folder) else lock_folder(folder, surely=True)
             if lock is None:
                 continue
@@ -88,7 +88,7 @@ def tidy_left() -> tuple[Path, ...]:
 
 
 def files_in(*folders: Path) -> list[Path]:
-    """The files of the folders of some Received, the newest ones first."""
+    """The files in the folders of several Received, newest first."""
     files = [path for folder in folders for path in folder.glob("*/*") if path.is_file()]
     return sorted(files, key=lambda path: (path.stat().st_mtime, path), reverse=True)
 
@@ -107,26 +107,26 @@ def _is_done_with(folder: Path) -> bool:
 
 
 def kept_folder() -> Path:
-    """Where all work is kept. Raises OutputError."""
+    """The folder of all autosaves. Raises OutputError."""
     folder = state_folder() / FOLDER
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder
 
 
 def new_folder() -> Path:
-    """A folder for the work of one more bench. Raises OSError and OutputError."""
+    """Create a folder for the autosave of a bench. Raises OSError and OutputError."""
     folder = kept_folder() / f"{time.strftime('%Y%m%d-%H%M%S')}-{token_hex(4)}"
     folder.mkdir(mode=0o700)
     return folder
 
 
 def write_work(folder: Path, bench: Bench) -> None:
-    """Keep what lies on a bench with a model. Raises OSError, then what was kept before is there still."""
+    """Save a bench with a model. Raises OSError; the previous save then still exists."""
     write_folder(folder, work_of(bench), plan_of_bench(bench, PLAN) if bench.planned else None)
 
 
 def work_of(bench: Bench) -> Project:
-    """What lies on a bench with a model; its files are where they are."""
+    """The project of a bench with a model; it refers to its files."""
     model = bench.model
     assert model is not None
     return Project(
@@ -145,7 +145,7 @@ def work_of(bench: Bench) -> Project:
 
 
 def folders_kept() -> list[Path]:
-    """The folders with work that no bench writes to, the newest first; where more are kept than may be, the oldest go."""
+    """Autosave folders that no bench writes to, newest first; deletes the oldest beyond the limit."""
     return keep_newest(_folders(), MOST_KEPT, lambda folder: modified_s(folder / RECORD))
 
 

@@ -1,4 +1,4 @@
-"""Models: reading one, how it stands and rests, and the faces that are marked on it, as tasks of the workbench."""
+"""Models: tasks that read a model, compute its placement and stable orientations, and mark its faces."""
 
 import json
 from collections.abc import Callable
@@ -34,12 +34,12 @@ from profiles.frozen import Vector
 from profiles.profile import Profile
 from profiles.settings.support import MIDDLE
 
-FACET_DIGITS = 4  # of the mm of a facet's corners
+FACET_DIGITS = 4  # digits after the point of mm
 
 
 @dataclass(frozen=True, eq=False)
 class Resting:
-    """An orientation in which a model rests: rows of its rotation, how to say it, and what it leaves hanging."""
+    """A stable orientation: rows of its rotation, its description, overhanging area and height."""
 
     rotation: tuple[tuple[float, ...], ...]
     words: str
@@ -49,7 +49,7 @@ class Resting:
 
 @dataclass(frozen=True)
 class Unscaled:
-    """A model of a size that no printer makes: see mdp.read.SizeError."""
+    """A model whose size suggests a wrong unit: see mdp.read.SizeError."""
 
     sentence: str
     question: str
@@ -59,7 +59,7 @@ class Unscaled:
 def read_model(
     tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path, plate: int | None = None
 ) -> Model | Unscaled:
-    """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
+    """Read a model; messages are those of the command line, with the file's name on the page."""
     try:
         read = read_model_file(path, profile.process.scale, profile.process.rotate_deg, plate)
     except SizeError as error:
@@ -71,7 +71,7 @@ def read_model(
 
 
 def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, ...]:
-    """The orientations in which a model rests, the most promising first."""
+    """The stable orientations of a model, the most promising first."""
     compilers.wait_for(compilers.JUDGE)
     return tuple(
         Resting(
@@ -85,7 +85,7 @@ def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, .
 
 
 def rest_facets(tell: Tell, model: Model) -> bytes:
-    """The facets of a model's hull that it rests on, as JSON in its own frame: `normal`, `corners` (nine numbers a triangle)."""
+    """Facets of a model's hull that it can rest on, as JSON in its own frame: `normal`, `corners` (nine numbers a triangle)."""
     facets = [
         {"normal": normal.tolist(), "corners": np.round(corners, FACET_DIGITS).ravel().tolist()}
         for normal, corners in resting_facets(model.mesh())
@@ -94,17 +94,17 @@ def rest_facets(tell: Tell, model: Model) -> bytes:
 
 
 def mark(tell: Tell, bench: Bench, marking: Callable[[Bench], Zones]) -> Zones:
-    """The zones of a bench after a person has changed them."""
+    """The zones of a bench after a change by the user."""
     return marking(bench)
 
 
 def mark_faces(tell: Tell, bench: Bench) -> bytes:
-    """(m,) of each face of the model in which kinds of zones that are no boxes it is: a bit each, in their order."""
+    """(m,) bit mask per face of the kinds of zones, other than boxes, that contain it."""
     return bytes(np.packbits(named_faces(bench), axis=0, bitorder="little")[0])
 
 
 def named_faces(bench: Bench) -> Mask:
-    """(kinds, m) which faces of the model the zones that are no boxes mean."""
+    """(kinds, m) faces of the model in zones other than boxes."""
     mesh = workpiece_mesh(bench)
     rows = np.zeros((len(ZONE_KINDS), len(mesh.faces)), dtype=np.bool_)
     for row, kind in zip(rows, ZONE_KINDS, strict=True):
@@ -116,11 +116,11 @@ def named_faces(bench: Bench) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """size_mm: along the platform's axes, without the pedestal; overhang_mm2: area that overhangs too far and does not stand on
-    the platform; problem: what the machine does not reach in one piece, in the sentence of `export`, "" where it reaches all;
-    pedestal: as `mesh_blocks` puts it for the page, b"": there is none; refusal: why there is none although one is wanted;
-    copies_mm: x, y of the middles of its copies from its place, the nearest first, where they have no room of one alone;
-    copies_problem: why they have none, "": they have."""
+    """Placement of a model. size_mm: along the plate's axes, without the pedestal; overhang_mm2: area that overhangs too far, off
+    the plate; problem: why the machine cannot reach it in one piece, in the words of `export`, "" if it can; pedestal: in the
+    format of `mesh_blocks`, b"": there is none; refusal: why a wanted pedestal is impossible; copies_mm: x, y of the copies'
+    centres relative to its place, the nearest first, (0, 0) alone if they do not fit; copies_problem: why they do not fit, "":
+    they do."""
 
     size_mm: Vector
     overhang_mm2: float
@@ -132,7 +132,7 @@ class Standing:
 
 
 def stand(tell: Tell, bench: Bench) -> Standing:
-    """How the model on the bench stands."""
+    """The placement of the model on the bench."""
     mesh, profile, pedestal, refusal = turned_mesh(bench), bench.profile, b"", ""
     size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
     height_mm = profile.search.pedestal_mm
@@ -149,7 +149,7 @@ def stand(tell: Tell, bench: Bench) -> Standing:
 
 
 def _copies(mesh: Mesh, bench: Bench) -> tuple[tuple[Place, ...], str]:
-    """Where the copies stand, and why they cannot."""
+    """The positions of the copies, and why they do not fit."""
     if bench.copies == 1 or bench.model is None:
         return (MIDDLE,), ""
     machine, (x, y) = bench.profile.machine, bench.profile.process.place_mm

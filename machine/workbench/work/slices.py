@@ -1,4 +1,4 @@
-"""Slices: what lies on the bench sliced, written and dry-run, what is seen of it, and the same model in one piece, as tasks."""
+"""Slices: tasks that slice, write and dry-run the bench, and compare it with the same model in one piece."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,18 +26,18 @@ from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import SlicingProgress
 
 SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN, Kind.BRIDGE, Kind.GAP, Kind.SUPPORT)
-BEHIND = (*SEEN, Kind.INNER_WALL)  # on shallow slopes inner walls are free, too; drawn where all are few enough
-MOST_PIECES = 60_000  # per part: with more, only every second layer is drawn, or every third, that many times as high
+BEHIND = (*SEEN, Kind.INNER_WALL)  # visible on shallow slopes; drawn if there are few enough
+MOST_PIECES = 60_000  # per part; beyond it only every nth layer is drawn, n times as high
 
 
 def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
-    """The straight pieces of its outer paths: 3 float32, the direction of printing, then 7 a piece: where it begins and ends, mm
-    in the workpiece frame, in the middle of its height, and its height; all little-endian."""
+    """The straight pieces of a part's outer paths, float32, little-endian: the printing direction (3), then 7 per piece: start
+    and end at mid-height, mm in the workpiece frame, and its height."""
     kinds = BEHIND if _count(sliced, BEHIND) < most else SEEN
     step = 1 + _count(sliced, kinds) // most
     own = [
         layer for layer in sliced.layers if layer.z_mm > 0.5 * layer.height_mm
-    ]  # not the raft: the model stands on the plate there
+    ]  # without the raft, because the model is drawn on the plate
     rows = [_pieces(layer, kinds, step) for layer in own[step - 1 :: step]]
     flat = np.concatenate([np.zeros((0, 7)), *rows])
     back = part.rotation
@@ -55,15 +55,15 @@ def _pieces(layer: Layer, kinds: tuple[Kind, ...], step: int) -> Floats:
     high = layer.height_mm * step
     points = layer.points_mm - (0.0, 0.0, high / 2.0)
     begins = np.repeat(layer.is_of(*kinds), np.diff(layer.starts))
-    begins[layer.starts[1:] - 1] = False  # nothing leads from a stroke's last point to the next stroke
+    begins[layer.starts[1:] - 1] = False  # a stroke's last point is not connected to the next stroke
     at = np.flatnonzero(begins)
     return np.column_stack([points[at], points[at + 1], np.full(len(at), high)])
 
 
 @dataclass(frozen=True, eq=False)
 class SlicesSoFar:
-    """How far slicing is: a sentence, the share of each part that is sliced, 0 to 1, and what is seen of the parts that have
-    become ready since the last word, by their numbers."""
+    """Progress of slicing: a sentence, the sliced share of each part, 0 to 1, and the visible walls of parts that have been
+    finished since the last report, by number."""
 
     text: str
     shares: tuple[float, ...] = ()
@@ -72,8 +72,8 @@ class SlicesSoFar:
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A sliced bench: the files with the page of the print and its G-code, what tells these slices from others, what they take,
-    what their dry run for a profile complains of, and what they cost."""
+    """A sliced bench: files of the print's page and of the G-code, a key that identifies the slices, time, filament, findings of
+    the dry run for a profile, and costs."""
 
     page: Path
     gcode: Path
@@ -85,18 +85,17 @@ class Sliced:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the dry run complains of."""
         return self.known.findings
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """Those that are errors, with which the command line writes no file and prints nothing without --force."""
+        """Findings of severity error, because of which the command line refuses to write or print without --force."""
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
 def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
-    """The parts on the bench sliced, planned, written to these files and dry-run, as `export --plan` does with its pauses and
-    copies; uncut, the model in one piece."""
+    """Slice the bench, write page and G-code to these files and dry-run them, as `export --plan` does with pauses and copies; an
+    uncut model in one piece."""
     decomposition, profile = _plated(bench)
     standing = standing_at(decomposition, profile.process.place_mm)
     shares: tuple[float, ...] = ()
@@ -139,17 +138,17 @@ def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
 
 
 def compare_bench(tell: Tell, bench: Bench) -> tuple[Alternative, ...]:
-    """What the model on the bench costs in one piece, as it stands and laid down, as `export --compare` tells it."""
+    """Costs of the model on the bench in one piece, as it stands and in its best orientation, as in `export --compare`."""
     decomposition, profile = _plated(bench)
     return in_one_part(decomposition, profile, lambda text, share=None: tell(text))
 
 
 def share_page(tell: Tell, page: Path, alternatives: tuple[Alternative, ...], out: Path) -> None:
-    """The page of slices with what else its model costs."""
+    """Write the page of slices with the costs of alternatives."""
     out.write_bytes(with_comparison(page.read_bytes(), alternatives))
 
 
 def _plated(bench: Bench) -> tuple[Decomposition, Profile]:
-    """The parts on the bench, in copies as `export --copies` has them, and what they are printed with."""
+    """The parts on the bench with its copies, as for `export --copies`, and the profile to print them with."""
     cut = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     return on_one_plate([cut] * bench.copies, as_turned(bench.profile, bench.turned))

@@ -1,8 +1,8 @@
-"""Worker pool: processes that do the long work of all benches, a bounded number of them, each for one task at a time.
+"""Worker pool: a bounded number of processes for the long tasks of all benches, one task at a time each.
 
-A task is a function of this room that is given tell() first, to say how far it is; values go there and back pickled. A process
-stays warm for a while after its task, with what it has worked out for the bench. A task cannot be interrupted, so one that is
-cancelled is stopped at once by ending its process.
+A task is a function of this room whose first argument `tell()` reports progress; values are pickled. A process stays warm for a
+while after its task, with its cache for the bench. A task cannot be interrupted, so a cancelled one is stopped by ending its
+process.
 """
 
 import asyncio
@@ -19,14 +19,14 @@ from mdp.kernels.workers import CallError, KilledError, Tell, Worker, tell
 from profiles.errors import UserError
 
 CLOSED = "this bench is closed: nothing is worked out for it any more"
-REST_AFTER_S = 300.0  # without a task, after which a process goes: each holds some 200 MB
+REST_AFTER_S = 300.0  # idle time after which a process ends: each holds some 200 MB
 Value = TypeVar("Value")
-TASKS = "cutting", "models", "slices"  # the files of this room that have them
+TASKS = "cutting", "models", "slices"  # modules of this room with tasks
 
 
 async def heard(values: Iterator[Value]) -> AsyncGenerator[Value, None]:
-    """What a process says, in an event loop, and the error that ends it. A thread waits for it, which holds up the end of neither
-    loop nor program; who leaves before makes sure that the process ends."""
+    """Yield the values of a blocking iterator in an event loop, and raise its error. A daemon thread waits for it, which blocks
+    neither the loop's nor the program's end; a caller that leaves early must end the process."""
     loop, coming = asyncio.get_running_loop(), asyncio.Queue[tuple[Value] | Exception | None]()
 
     def hear() -> None:
@@ -34,7 +34,7 @@ async def heard(values: Iterator[Value]) -> AsyncGenerator[Value, None]:
             try:
                 for value in values:
                     loop.call_soon_threadsafe(coming.put_nowait, (value,))
-            except Exception as error:  # noqa: BLE001 - it is raised in the loop
+            except Exception as error:  # noqa: BLE001 - raised again in the loop
                 loop.call_soon_threadsafe(coming.put_nowait, error)
             else:
                 loop.call_soon_threadsafe(coming.put_nowait, None)
@@ -47,28 +47,28 @@ async def heard(values: Iterator[Value]) -> AsyncGenerator[Value, None]:
 
 
 class WorkerPool:
-    """At most `most` processes. Every method is called from the event loop."""
+    """At most `most` processes; used from one event loop."""
 
     def __init__(self, most: int) -> None:
         self.most = most
         self._places = asyncio.Semaphore(most)
         self._busy: list[Worker] = []
-        self._idle: list[Worker] = []  # the one that has rested longest first
-        self._had_by: WeakKeyDictionary[Worker, TaskQueue] = WeakKeyDictionary()  # the tasks that each was taken for last
+        self._idle: list[Worker] = []  # longest idle first
+        self._had_by: WeakKeyDictionary[Worker, TaskQueue] = WeakKeyDictionary()  # the last user of each
 
     @property
     def full(self) -> bool:
-        """Whether a further task has to wait for another one's end."""
+        """Whether a further task must wait."""
         return self._places.locked()
 
     @property
     def may_start(self) -> bool:
-        """Whether there may be one more process."""
+        """Whether another process may be started."""
         return len(self._busy) + sum(worker.ready for worker in self._idle) < self.most
 
     @asynccontextmanager
     async def worker(self, tasks: "TaskQueue") -> AsyncIterator[Worker]:
-        """A process for one of these tasks, in the order in which they are asked for. Whoever leaves with an error ends it."""
+        """A process for one of these tasks, in the order of requests. An error in the block ends it."""
         async with self._places:
             if tasks.closed:
                 raise UserError(CLOSED)
@@ -85,13 +85,13 @@ class WorkerPool:
                 self._busy.remove(worker)
 
     def end(self, tasks: "TaskQueue | None" = None) -> None:
-        """End the processes that work for these tasks, or may hold what was worked out for them; None: all."""
+        """End the processes that work for these tasks, or may cache their data; None: all."""
         for worker in (*self._busy, *self._idle):
             if tasks is None or self._had_by[worker] is tasks:
                 worker.end()
 
     def _take(self, tasks: "TaskQueue") -> Worker:
-        """The process that these tasks had last, else a new one, else the one that has rested longest."""
+        """The process that these tasks used last, else a new one, else the one that has been idle longest."""
         for worker in [worker for worker in self._idle if not worker.ready]:
             self._idle.remove(worker)
             worker.end()
@@ -106,20 +106,19 @@ class WorkerPool:
 
 
 class WorkerPools:
-    """Those of one run of the program. quick: for what a person waits for; long: for searches and slices; hand: for planes in
-    hand and a model that is turned; its processes keep what they have worked out for planes on the bench."""
+    """The pools of one run of the program. quick: interactive tasks; long: searches and slices; hand: dragged planes and turned
+    models, whose processes cache the preparation of the bench."""
 
     def __init__(self) -> None:
         self.quick, self.long, self.hand = WorkerPool(3), WorkerPool(2), WorkerPool(3)
 
     def end(self) -> None:
-        """End all processes."""
         for pool in (self.quick, self.long, self.hand):
             pool.end()
 
 
 class TaskQueue:
-    """The tasks of one session in a pool, one after the other."""
+    """The tasks of one session in a pool, executed one after the other."""
 
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
@@ -127,14 +126,14 @@ class TaskQueue:
         self.closed = False
 
     async def warm(self) -> None:
-        """Start a process before it is needed, if there may be one more."""
+        """Start a process ahead of use, if another one may be started."""
         async with self._lock:
             if self.pool.may_start:
-                with suppress(CallError):  # whoever asks the next one gets the error
+                with suppress(CallError):  # the next caller gets the error
                     await self._ask(load)
 
     async def run(self, task: Callable[..., Value], *given: Any, tell: Tell = lambda value: None) -> Value:
-        """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
+        """Run a task and return its result. Raises UserError with its message; a cancelled task is stopped at once."""
         try:
             async with self._lock:
                 value, trouble = await self._ask(do, task, *given, tell=tell)
@@ -146,7 +145,7 @@ class TaskQueue:
         return result
 
     def close(self) -> None:
-        """End the processes that work for it or hold anything of it; whatever still waits for one is refused."""
+        """End the processes that work for it or cache its data; waiting tasks are refused."""
         self.closed = True
         self.pool.end(self)
 
@@ -159,16 +158,16 @@ class TaskQueue:
 
 
 def load() -> None:
-    """In a worker: load all that tasks need, before the first one is asked for."""
+    """In a worker: import all modules with tasks."""
     for name in TASKS:
         import_module(f"machine.workbench.work.{name}")
 
 
 def do(task: Callable[..., Value], *given: Any) -> tuple[Value | None, str]:
-    """In a worker: what a task gives, and the sentence of why there is nothing, "" where there is; a bug gets a log file."""
+    """In a worker: run a task; returns its result and a sentence on why there is none, or ""; a bug gets a log file."""
     try:
         return task(tell, *given), ""
     except UserError as error:
         return None, f"{error}"
-    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence, and the workbench goes on
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence, and the workbench continues
         return None, bug_in_words(error, sys.argv)

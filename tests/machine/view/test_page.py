@@ -148,7 +148,7 @@ def test_view_does_not_write_over_a_page_that_is_not_its_own(folder: Path, capsy
     [
         ("empty.gcode", "", "is empty"),
         ("rubbish.gcode", "\x00\x01%%&", "is not text"),
-        ("still.gcode", "M105\n; nothing\n", "holds no move"),
+        ("still.gcode", "M105\n; nothing\n", "contains no move"),
         ("model.stl", "solid nothing", "model.stl"),
     ],
 )

@@ -50,7 +50,7 @@ def test_times_and_material_of_all_kinds_are_the_whole_print() -> None:
 def test_waiting_is_a_kind_of_its_own() -> None:
     rows = {row[0]: row for row in of_text("G28\nG1 X60 F3600\nG4 S5\nG1 X0\nG1 X9 E1")["Time and material"]["rows"]}
     assert rows["waiting"][1] == "5s"
-    assert set(rows) == {"not told", "travel", "waiting"}
+    assert set(rows) == {"unknown", "travel", "waiting"}
 
 
 def test_each_part_has_its_shape_its_layers_and_its_time() -> None:
@@ -133,7 +133,7 @@ def test_every_row_is_as_long_as_its_head_and_all_is_text() -> None:
 def test_of_a_file_that_does_not_tell_its_machine_nothing_is_pretended() -> None:
     profile, program = example()
     report = print_report(program, profile, *sums_of(program.run), known=False, ours=False)
-    assert dict(report["facts"])["machine"].startswith("not told")
-    assert dict(report["facts"])["material"] == "not told: weights as of PLA"
+    assert dict(report["facts"])["machine"].startswith("unknown")
+    assert dict(report["facts"])["material"] == "unknown: masses for PLA"
     assert report["tables"][1]["notes"][-1] == "times as on generic A/C table"
     assert "All settings" not in [table["title"] for table in report["tables"]]

@@ -1,1 +1,1 @@
-"""Commands that measure the machine: where its axes are, what its joints hold."""
+"""Commands that measure the machine: the positions of its axes, the strength of joints."""

@@ -1,4 +1,4 @@
-"""The calibrate command: writes the program and the sheet, works out the numbers, saves them in the user's own profile."""
+"""The calibrate command: writes program and sheet, evaluates the touches, and saves the result in the user's own profile."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,7 +21,7 @@ MARK_HEIGHT_MM = 20.0
 
 
 def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> int:
-    """Write the G-code and, beside it, the sheet to fill in."""
+    """Write the G-code, and beside it the sheet to fill in."""
     sheet = out.with_suffix(".toml")
     for file in (out, sheet):
         check_writable(file)
@@ -41,25 +41,25 @@ def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> i
 
 
 def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
-    """Find signs, zeros and centres from a filled sheet, tell them and save them."""
+    """Evaluate a filled sheet: show and save signs, zeros and centres."""
     machine, name = tilting_machine(request), request.given.machine
     sheet = read_sheet(measured, request.mark_height_mm)
     if sheet.machine not in (None, name):
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
     calibration, off = judged(request, machine, sheet)
     if off:
-        raise ProfileError(f"{off}: look at touch {calibration.worst} first")
+        raise ProfileError(f"{off}: check touch {calibration.worst} first")
     save_calibration(request, machine, calibration, sheet.mark_angle_deg is not None)
     return 0
 
 
 def mark_height_mm(request: CalibrationRequest) -> float:
-    """As asked for, or the usual one."""
+    """The requested mark height, or the default."""
     return MARK_HEIGHT_MM if request.mark_height_mm is None else request.mark_height_mm
 
 
 def tilting_machine(request: CalibrationRequest) -> Machine:
-    """The machine of a request; raises ProfileError for one without rotary axes."""
+    """The machine of a request. Raises ProfileError if it has no rotary axes."""
     machine = load_one(request.given.machine, request.given.settings).get("machine")
     if not isinstance(machine, Machine):
         raise ProfileError(f"{request.given.machine} is not a machine profile")
@@ -69,7 +69,7 @@ def tilting_machine(request: CalibrationRequest) -> Machine:
 
 
 def judged(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple[Calibration, str]:
-    """What follows from the touches, which is shown, and why it is not taken; "" when it is."""
+    """Calibrate from the touches and show the result; returns it with the reason to reject it, "" if it is accepted."""
     calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg, request.directions)
     show(comparison(machine, calibration, sheet.mark_angle_deg is not None))
     if calibration.rms_mm <= MOST_OFF_MM or request.force:
@@ -79,25 +79,25 @@ def judged(request: CalibrationRequest, machine: Machine, sheet: Sheet) -> tuple
 
 
 def save_calibration(request: CalibrationRequest, machine: Machine, calibration: Calibration, zero_of_turn: bool = False) -> None:
-    """The found numbers in the user's own profile, and the file before beside it."""
+    """Save the result in the user's own profile; a backup of the previous file stays beside it."""
     save_tables(request, fitted_tables(machine, calibration, zero_of_turn))
 
 
 def refuse_if_saved(request: CalibrationRequest) -> None:
-    """Raise OutputError at once where the result could not be saved at the end."""
+    """Raise OutputError early if the result could not be saved at the end."""
     name = Path(request.given.machine).stem
     refuse_to_overwrite(own_profile("machine", request.save or name, request.given.machine, {})[0], request.replace)
 
 
 def save_tables(request: CalibrationRequest, tables: Mapping[str, Any]) -> None:
-    """What was found in the user's own profile, and the file before beside it."""
+    """Save these tables in the user's own profile; a backup of the previous file stays beside it."""
     file, text = own_profile("machine", request.save or Path(request.given.machine).stem, request.given.machine, tables)
     write_own(file, text, request.replace)
     show(f"saved: {file}; use it as --machine {file.stem}\n")
 
 
 def through(name: str, old: RotaryAxis, new: RotaryAxis, sigma_mm: float) -> str:
-    """Where an axis was found to be, and how sure that is, beside where the profile has it."""
+    """Line that compares an axis with the profile's, with its standard deviation."""
     point, was = (
         " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", axis.point_mm, strict=True)) for axis in (new, old)
     )
@@ -105,7 +105,7 @@ def through(name: str, old: RotaryAxis, new: RotaryAxis, sigma_mm: float) -> str
 
 
 def comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -> str:
-    """The found numbers beside the profile's, and how far the touches are off."""
+    """Lines that compare the result with the profile, and the residuals of the touches."""
     lines = []
     for axis in ("tilt", "turn"):
         old, new = getattr(before, axis), getattr(calibration.machine, axis)

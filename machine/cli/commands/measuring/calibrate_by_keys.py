@@ -1,4 +1,4 @@
-"""Calibrate by keys: the machine at a port goes to each touch, a person takes the tip onto the mark by keys."""
+"""Calibration by keys: the machine at a port goes to each touch, and the user moves the tip onto the mark by keys."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -28,7 +28,7 @@ PLACE = "fix a pointed mark, {height:g} mm high and {radius:g} mm from the middl
 
 
 def touch_by_keys(request: CalibrationRequest, port: str, profile: Profile) -> int:
-    """Go from touch to touch, tell what follows, save it. Raises UserError, the tip raised and nothing saved."""
+    """Go from touch to touch, show the result and save it. Raises UserError after raising the tip; then nothing is saved."""
     machine = tilting_machine(request)
     at = parse_printer(port, request.probing.baud)
     refuse_if_saved(request)
@@ -54,7 +54,7 @@ def touch_by_keys(request: CalibrationRequest, port: str, profile: Profile) -> i
 
 
 def _accepted(request: CalibrationRequest, machine: Machine, touching: "KeyedTouches", height_mm: float) -> Calibration | None:
-    """What follows from the touches; None where one of them is asked for again."""
+    """The accepted calibration, or None if a touch must be repeated."""
     touches = touching.run()
     sys.stderr.write("\n")
     try:
@@ -69,7 +69,7 @@ def _accepted(request: CalibrationRequest, machine: Machine, touching: "KeyedTou
 
 
 class KeyedTouches:
-    """The touches of a plan, taken one after the other. tell: shows a line in the place of the one before."""
+    """Takes the touches of a plan one by one. tell: shows a line in place of the previous one."""
 
     def __init__(
         self, machine: Machine, plan: TouchPlan, mover: PrinterMover, keys: Iterator[str], tell: Callable[[str], None]
@@ -79,7 +79,7 @@ class KeyedTouches:
         self._pending = list(range(len(plan.poses)))
 
     def run(self) -> Sequence[Touch]:
-        """All that were taken, in order, once those that are asked for are through."""
+        """Take the pending touches; returns all touches in order."""
         while self._pending:
             index = self._pending[0]
             key = self._at(index)
@@ -90,13 +90,13 @@ class KeyedTouches:
         return [self._taken[index] for index in sorted(self._taken)]
 
     def again(self, touch: int, why: str) -> None:
-        """Ask for one touch, counted from 1 among those that were taken, once more."""
+        """Mark one touch to be repeated, counted from 1 among those taken."""
         taken = sorted(self._taken)
         self._pending = [taken[min(touch, len(taken)) - 1] if taken else 0]
         say(f"{why}: once more")
 
     def _at(self, index: int) -> str:
-        """Go to a touch, and take it by keys; which key has ended it."""
+        """Go to a touch and take it by keys; returns the key that ended it."""
         plan, machine, mover = self._plan, self._machine, self._mover
         pose, above_mm = plan.poses[index], hover_z_mm(machine, plan.expected_mm[index][2], plan.safe_z_mm)
         jog = begin_jog(machine, plan, index, above_mm)
@@ -129,9 +129,7 @@ class KeyedTouches:
 
 @contextmanager
 def keys_of_a_person(session: CommandSession) -> Iterator[Iterator[str]]:
-    """Keys as they are pressed; while none is, the printer is listened to. When several are pressed during a move, the last
-    one counts: a key that is held must not run on.
-    """
+    """Iterate over pressed keys, and listen to the printer in between. Of keys pressed during a move the last one counts."""
     typed = SimpleQueue[str]()
 
     def pressed_keys() -> Iterator[str]:
@@ -148,6 +146,6 @@ def keys_of_a_person(session: CommandSession) -> Iterator[Iterator[str]]:
 
 
 def tell(line: str) -> None:
-    """A line of standard error in the place of the one before."""
+    """Write a line to stderr in place of the previous one."""
     sys.stderr.write(f"\r\x1b[K{line}")
     sys.stderr.flush()

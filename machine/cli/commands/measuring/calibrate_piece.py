@@ -1,4 +1,4 @@
-"""Calibrate by a printed piece: what a person reads off the pads of `demo:calibration`, turned into axes of their profile."""
+"""Calibration by a printed piece: readings of the pads of `demo:calibration` correct the axes of the user's profile."""
 
 import sys
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ Then measure how high the pad's top stands over the roof beside it, mm. {EXPECTE
 
 
 def write_page(request: CalibrationRequest, printed: Sequence[Path], html: Path) -> int:
-    """A page on which the readings of a piece are typed, and that tells the corrections at once."""
+    """Write the page on which the readings of a piece are entered and which shows the corrections at once."""
     check_writable(html)
     refuse_to_overwrite(html, request.replace)
     if len(printed) != 1:
@@ -50,23 +50,25 @@ def write_page(request: CalibrationRequest, printed: Sequence[Path], html: Path)
 
 
 def correct_axes(request: CalibrationRequest, printed: Sequence[Path], readings: Sequence[str]) -> int:
-    """Find the axes from the readings of one or several pieces, tell what changes, save it."""
+    """Find the axes from the readings of one or several pieces, show the changes and save them."""
     machine = tilting_machine(request)
     if len(printed) != len(readings):
-        raise ProfileError(f"--printed is given {len(printed)} times, --readings {len(readings)} times: as often is expected")
+        raise ProfileError(
+            f"--printed is given {len(printed)} times, --readings {len(readings)} times: the numbers must be equal"
+        )
     pieces = [_read(path, machine) for path in printed]
-    told = np.array([parse_readings(text) for text in readings])
-    return _settle(request, machine, correct(machine, pieces, told), len(pieces))
+    read_mm = np.array([parse_readings(text) for text in readings])
+    return _settle(request, machine, correct(machine, pieces, read_mm), len(pieces))
 
 
 def ask_for_readings(request: CalibrationRequest, printed: Path) -> int:
-    """Ask a person in a terminal for the readings of a piece, pad by pad, then as `correct_axes`."""
+    """Ask for the readings of a piece pad by pad, then correct the axes and save them."""
     machine = tilting_machine(request)
     refuse_if_saved(request)
     piece = _read(printed, machine)
     sys.stdout.write(INTRO)
-    told = ask([_question(pad.number) for pad in piece.pads], "all pads were told")
-    return _settle(request, machine, correct(machine, [piece], np.array([told])), 1)
+    read_mm = ask([_question(pad.number) for pad in piece.pads], "all pads were read")
+    return _settle(request, machine, correct(machine, [piece], np.array([read_mm])), 1)
 
 
 def _question(pad: int) -> Question[list[float]]:
@@ -75,7 +77,7 @@ def _question(pad: int) -> Question[list[float]]:
 
 
 def _read(path: Path, machine: Machine) -> Piece:
-    """The piece that a program of ours prints. Raises ProfileError where that was made for another machine."""
+    """Read the piece that one of our programs prints. Raises ProfileError if it was made for another machine."""
     lines = GcodeFile(path).lines()
     profile, taken = read_embedded_profile(lines, load(), frozenset())
     if "machine" not in taken:
@@ -88,13 +90,13 @@ def _read(path: Path, machine: Machine) -> Piece:
 
 
 def _settle(request: CalibrationRequest, machine: Machine, correction: Correction, pieces: int) -> int:
-    """Tell a correction, and save it where it is more than the readings can be off."""
+    """Show a correction, and save it if it exceeds the uncertainty of the readings."""
     show(comparison(machine, correction))
     if correction.doubtful is not None and not request.force:
         piece, pad, way = correction.doubtful
-        raise ProfileError(f"piece {piece}, pad {pad}: {way} does not fit the others: look at it again, or take it with --force")
+        raise ProfileError(f"piece {piece}, pad {pad}: {way} does not fit the others: check it, or accept it with --force")
     if not correction.significant:
-        show("no number changes by more than the readings can be off: the profile stays as it is\n")
+        show("no value changes by more than the uncertainty of the readings: the profile stays as it is\n")
         return 0
     source = f"tiltprint calibrate, {pieces} printed piece{'s' * (pieces > 1)}"
     save_tables(request, found_tables(machine, correction.machine, FOUND, source))
@@ -102,7 +104,7 @@ def _settle(request: CalibrationRequest, machine: Machine, correction: Correctio
 
 
 def comparison(before: Machine, correction: Correction) -> str:
-    """The found numbers beside the profile's, how sure they are, and what no numbers explain."""
+    """Lines that compare the result with the profile, with standard deviations and the largest residual."""
     after, sigma = correction.machine, correction.sigma.tolist()
     lines = [
         through("turn", before.turn, after.turn, max(sigma[:2])),

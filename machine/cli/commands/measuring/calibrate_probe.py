@@ -1,4 +1,4 @@
-"""Calibrate by probe: the machine at a port measures a ball on its own plate, and its axes follow from that."""
+"""Calibration by probe: the machine at a port measures a ball on its plate, from which the axes follow."""
 
 import sys
 
@@ -20,7 +20,7 @@ from profiles.frozen import Vector
 from profiles.machine import Machine
 from profiles.profile import Profile
 
-BALL_HEIGHT_MM = 45.0  # of its centre over the plate
+BALL_HEIGHT_MM = 45.0  # of the ball's centre above the plate
 NOISE_MM = 0.005  # of the simulated probe
 PLACE = (
     "fix a ball {diameter:g} mm in diameter, its centre {height:g} mm over the plate and {radius:g} mm from the middle towards +X"
@@ -28,9 +28,9 @@ PLACE = (
 
 
 def probe_axes(request: CalibrationRequest, port: str, offset_mm: Vector, profile: Profile) -> int:
-    """Measure, tell what follows, save it as calibrate saves. offset_mm: from the nozzle's tip to what touches.
+    """Measure the ball, show the result and save it. offset_mm: from the nozzle's tip to the probe's contact point.
 
-    Raises UserError, the tip raised and nothing saved.
+    Raises UserError after raising the tip; then nothing is saved.
     """
     machine, probing = tilting_machine(request), request.probing
     at = parse_printer(port, probing.baud)
@@ -62,7 +62,7 @@ def probe_axes(request: CalibrationRequest, port: str, offset_mm: Vector, profil
 
 
 def residual_table(calibration: Calibration, machine: Machine, measuring: Measuring) -> str:
-    """A line a pose: how far the ball's centre is from where the found machine has it, mm."""
+    """Table with a line per pose: deviation of the ball's centre from the fitted machine, mm."""
     rows = [f"{'pose':>18}  {'x':>7}  {'y':>7}  {'z':>7}  mm off"]
     for touch, (x, y, z) in zip(measuring.touches, calibration.errors_mm, strict=True):
         pose = f"{machine.tilt.letter}{touch.pose.tilt_deg:.2f} {machine.turn.letter}{touch.pose.turn_deg:.2f}"
@@ -79,7 +79,7 @@ def _ball(request: CalibrationRequest, machine: Machine) -> Ball:
 
 
 def _probe(offset_mm: Vector, machine: Machine) -> Probe:
-    """The nozzle's own end is as flat as the profile's silhouette says; a probe beside it is taken to be pointed."""
+    """The nozzle, with the flat end that the profile's silhouette gives, or a probe beside it, which counts as pointed."""
     radius, height = machine.head.silhouette_mm[0]
     own = Probe(offset_mm)
     return Probe(offset_mm, radius if own.is_nozzle and height == 0.0 else 0.0)
@@ -95,13 +95,13 @@ def _rules(machine: Machine) -> ProbingRules:
 
 
 def _table(machine: Machine, ball: Ball, probe: Probe) -> ProbedTable:
-    """What a simulated printer has on its plate."""
+    """Contents of a simulated printer's plate."""
     there = TrueBall(ball.radius_mm, ball.centre_mm)
     return ProbedTable(machine, there, offset_mm=probe.offset_mm, flat_mm=probe.flat_mm, noise_mm=NOISE_MM)
 
 
 def _begin(session: ProbingSession, prober: PrinterProber, machine: Machine, ball: Ball) -> None:
-    """Cold and homed, with a person's word that the ball stands there."""
+    """Prepare the cold, homed machine, and wait until the user confirms that the ball is in place."""
     begin_cold(session, prober, machine)
     if not _rules(machine).limited:
         say(f"{dialect_of(machine).firmware} probes down to the axis' end where nothing is met: keep a hand at the switch")

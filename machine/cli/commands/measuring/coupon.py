@@ -1,4 +1,4 @@
-"""The coupon command: writes the bars' program and the sheet, works out what their break loads say, saves it in profiles."""
+"""The coupon command: prints test bars, evaluates the loads at which they broke, and saves the result."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -42,14 +42,14 @@ INTRO = """{bars} bars of a {shape} coupon, printed on {machine}: at what load d
 Newtons, or as a scale shows it: 9.2kg. The plate printed more than once: one load for each time, in one line.
 Enter keeps what stands in [ ], s skips a bar, b goes back, Ctrl-C ends and leaves all as it was.
 """
-UNSUPPORTED = ("process.support=none",)  # the bars carry themselves; support would stand on what is measured
+UNSUPPORTED = ("process.support=none",)  # the bars need none, and it would stand on the joints to be measured
 
 
 def write_program(request: CouponRequest, out: Path) -> int:
-    """Write the G-code and, beside it, the sheet to fill in; a page that shows the bars where asked."""
+    """Write the G-code, the sheet to fill in beside it, and the requested pictures."""
     sheet_file = out.with_suffix(".toml")
     if sheet_file == out:
-        raise OutputError(f"-o {out}: the sheet is written there, beside the program: another ending is expected, as .gcode")
+        raise OutputError(f"-o {out}: the sheet is written there, beside the program: another ending is expected, such as .gcode")
     for file in (out, sheet_file):
         check_writable(file)
         refuse_to_overwrite(file, request.replace)
@@ -74,7 +74,7 @@ def write_program(request: CouponRequest, out: Path) -> int:
 
 
 def evaluate_sheet(request: CouponRequest, measured: Path) -> int:
-    """Find strengths and the settings that won from a filled sheet; save them, or only write them as a report."""
+    """Evaluate a filled sheet: save strengths and best settings, or only write a report."""
     sheet = read_sheet(measured)
     for kind, made_for, name in zip(KINDS, (sheet.machine, sheet.material, sheet.process), request.given.names, strict=True):
         if made_for != name:
@@ -94,7 +94,7 @@ def evaluate_sheet(request: CouponRequest, measured: Path) -> int:
 
 
 def ask_for_loads(request: CouponRequest) -> int:
-    """Ask a person for the loads one by one, tell what follows from them, save it."""
+    """Ask for the loads one by one, show the result and save it."""
     profile = load(*request.given.names, settings=request.given.settings)
     sheet = empty_sheet(_shape(request), request.given.names, factors(profile, request.vary))
     for kind in ("material", "process"):
@@ -107,7 +107,7 @@ def ask_for_loads(request: CouponRequest) -> int:
 
 
 def _ask_loads(sheet: Sheet) -> Sheet:
-    """The sheet with loads that do, as a person types them."""
+    """The sheet with valid loads that the user enters."""
     bars = len(sheet.loads_n)
     sys.stdout.write(INTRO.format(bars=bars, shape=sheet.shape.name, machine=plain_line(sheet.machine)))
 
@@ -118,15 +118,15 @@ def _ask_loads(sheet: Sheet) -> Sheet:
     def judge(loads: list[tuple[float, ...]]) -> str:
         try:
             evaluate(replace(sheet, loads_n=tuple(loads)))
-        except ProfileError as error:  # the person is asked again
+        except ProfileError as error:  # ask again
             return str(error)
         return ""
 
-    return replace(sheet, loads_n=tuple(ask([question(bar) for bar in range(1, bars + 1)], "all loads were told", judge)))
+    return replace(sheet, loads_n=tuple(ask([question(bar) for bar in range(1, bars + 1)], "all loads were given", judge)))
 
 
 def _loads(reply: str, shape: Shape) -> tuple[float, ...]:
-    """The loads of a line in N. Raises ProfileError for what is none."""
+    """Parse the loads of a line, N. Raises ProfileError."""
     try:
         words = reply.replace(" kg", "kg").replace(" n", "n").split()
         loads = [float(word[:-2]) * N_PER_KG if word.endswith("kg") else float(word.removesuffix("n")) for word in words]
@@ -140,7 +140,7 @@ def _loads(reply: str, shape: Shape) -> tuple[float, ...]:
 
 
 def _save(request: CouponRequest, outcome: Outcome) -> None:
-    """Strengths and what won in the user's own profiles, the files before beside them."""
+    """Save strengths and best settings in the user's own profiles; backups of the previous files stay beside them."""
     day = date.today()
     before = load(*request.given.names, settings=request.given.settings).material
     found = {"material": material_tables(outcome, before, day), "process": process_tables(outcome, day)}

@@ -1,6 +1,6 @@
-"""Questionnaire: a person in a terminal is asked one thing after the other, and each answer is judged at once.
+"""Questions at a terminal, asked one after the other; each answer is checked at once.
 
-Enter keeps the answer that stands in brackets, s skips a question that may be left open, b goes back to the one before.
+Enter keeps the answer in brackets, s skips an optional question, b goes back to the previous one.
 """
 
 import sys
@@ -15,9 +15,9 @@ Answer = TypeVar("Answer")
 
 @dataclass(frozen=True)
 class Question(Generic[Answer]):
-    """text: what is asked. parse: the answer that a reply in small letters means; raises ProfileError for one that cannot be.
+    """text: the question. parse: converts a lower-case reply to an answer; raises ProfileError if it is invalid.
 
-    shown: an answer as it stands in brackets. skipped: the answer of who skips the question; None: it must be answered.
+    shown: converts an answer to the text in brackets. skipped: answer if the question is skipped; None: it is required.
     """
 
     text: str
@@ -27,9 +27,9 @@ class Question(Generic[Answer]):
 
 
 def ask(questions: Sequence[Question[Answer]], missing: str, judge: Callable[[list[Answer]], str] = lambda _: "") -> list[Answer]:
-    """The answers in the order of the questions. judge: why they do not do together, then all are asked again; "": they do.
+    """Answers in the order of the questions. judge: why they contradict each other, so that all are asked again; "" if not.
 
-    Raises ProfileError at the end of input, which comes before `missing`.
+    Raises ProfileError at the end of input, which says that `missing` has not happened yet.
     """
     answers: list[Answer | None] = [None] * len(questions)
     while True:
@@ -44,7 +44,7 @@ def ask(questions: Sequence[Question[Answer]], missing: str, judge: Callable[[li
 
 
 def _ask(questions: Sequence[Question[Answer]], index: int, answers: list[Answer | None], missing: str) -> int:
-    """Ask until a question has its answer; the question to be asked next."""
+    """Ask a question until its answer is valid; returns the index of the next question."""
     question, before = questions[index], answers[index]
     usual = f" [{question.shown(before)}]" if before not in (None, question.skipped) else ""
     while True:
@@ -65,7 +65,7 @@ def _ask(questions: Sequence[Question[Answer]], index: int, answers: list[Answer
 
 
 def read_reply(prompt: str, missing: str) -> str:
-    """What a person types, in small letters. Raises ProfileError at the end of input; missing: what has not come yet."""
+    """Read a reply in lower case. Raises ProfileError at the end of input. missing: what has not happened yet."""
     try:
         return input(prompt).strip().lower()
     except EOFError:

@@ -1,1 +1,1 @@
-"""The profiles commands: list, show, save and check them; import those of other slicers; detect a machine by its firmware."""
+"""The profiles commands: list, show, save, check, import from other slicers, and detect a machine by its firmware."""

@@ -1,4 +1,4 @@
-"""The profiles detect command: a machine profile by what a firmware tells of itself, with what it does not tell."""
+"""The profiles detect command: makes a machine profile from the settings of a firmware, and lists those it does not report."""
 
 import json
 import sys
@@ -23,11 +23,11 @@ from profiles.places import own_folder
 from profiles.profile import DEFAULTS, load_one
 from profiles.toml_text import value_text
 
-MOST_BYTES = 4 << 20  # of a configuration, the longest of which has some 200 KiB
+MOST_BYTES = 4 << 20  # size limit of a configuration; long ones have 200 KiB
 
 
 def detect(request: DetectRequest) -> int:
-    """Ask or read, write the profile, and tell what is the machine's own in it, what is the base's, and what to measure."""
+    """Query the firmware or read a file, write the profile, and list reported, inherited and unmeasured values."""
     check_baud(request.baud)
     if request.out is not None:
         check_writable(request.out)
@@ -41,7 +41,7 @@ def detect(request: DetectRequest) -> int:
         text = profile_text("machine", proposal.base, settings_of(proposal, name, found.firmware), proposal.values)
     except ProfileError as error:
         first, *_ = str(error).splitlines()
-        raise ProfileError(f"{request.port or request.file}: what it tells is no machine's: {first}") from None
+        raise ProfileError(f"{request.port or request.file}: its values are not those of a machine: {first}") from None
     write_own(out, text, request.replace)
     use = out.stem if request.out is None else str(out)
     table = "\n".join(_lines(found, proposal, use))
@@ -51,7 +51,7 @@ def detect(request: DetectRequest) -> int:
 
 
 def _stem(found: Found, request: DetectRequest) -> str:
-    """A file's name of the machine's, else of the file's that was read."""
+    """File name after the machine, else after the file that was read."""
     named = found.name or (request.file.stem if request.file is not None else "") or found.dialect
     return plain_name(named).strip("._") or found.dialect
 
@@ -66,7 +66,7 @@ def _config(request: DetectRequest) -> ConfigText:
 
 
 def read_file(file: Path) -> ConfigText:
-    """A configuration, with those beside it that it names. Raises ProfileError."""
+    """Read a configuration with the files that it includes. Raises ProfileError."""
     try:
         with file.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
@@ -74,7 +74,7 @@ def read_file(file: Path) -> ConfigText:
         raise ProfileError(f"{file}: cannot be read ({reason(error)})") from None
     wide = content.startswith((BOM_UTF16_LE, BOM_UTF16_BE))  # as PowerShell's > writes
     if len(content) > MOST_BYTES or (b"\0" in content and not wide):
-        raise ProfileError(f"{file}: it is no configuration: a text of less than {MOST_BYTES >> 20} MiB is expected")
+        raise ProfileError(f"{file}: it is not a configuration: a text of less than {MOST_BYTES >> 20} MiB is expected")
 
     def beside(pattern: str) -> Sequence[ConfigText]:
         files = sorted(glob(pattern, root_dir=file.parent)) if has_magic(pattern) else [pattern]
@@ -87,19 +87,19 @@ def read_file(file: Path) -> ConfigText:
 
 def _lines(found: Found, proposal: Proposal, use: str) -> Iterator[str]:
     yield f"{found.firmware}: machine.dialect {found.dialect}, over the shipped {proposal.base}"
-    yield f"  told by the firmware: {len(proposal.values)}"
+    yield f"  reported by the firmware: {len(proposal.values)}"
     for key, reading in proposal.values.items():
         yield f"    {_short(key)} = {value_text(reading.value)}  <- {reading.source}"
     if found.probe:
         yield f"    it has {found.probe}"
     if proposal.absent:
-        yield f"  not told by it, as {proposal.base} has them: {len(proposal.absent)}"
+        yield f"  not reported, as in {proposal.base}: {len(proposal.absent)}"
         yield from (f"    {_short(key)}" for key in proposal.absent)
-    yield f"  only measured: {len(proposal.measured)}"
+    yield f"  must be measured: {len(proposal.measured)}"
     yield from (f"    {_short(key)}" for key in proposal.measured)
     if CALIBRATED[0] in proposal.measured:
         yield f"  tiltprint calibrate --machine {use} measures the points, signs and zeros of the axes, a ruler the rest"
-    yield f"  its G-code blocks are those of {proposal.base}: look at machine.gcode.start before the first print"
+    yield f"  its G-code blocks are those of {proposal.base}: check machine.gcode.start before the first print"
     yield from (f"  note: {remark}" for remark in proposal.remarks)
 
 

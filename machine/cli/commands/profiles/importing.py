@@ -1,4 +1,4 @@
-"""The profiles import command: another slicer's configuration as a material and a process of one's own."""
+"""The profiles import command: imports another slicer's configuration as a material and a process of the user's own."""
 
 import json
 import sys
@@ -15,28 +15,28 @@ from profiles.foreign.imported import KINDS, Imported, Row, imported, unchanged_
 from profiles.foreign.read import read_config
 from profiles.places import own_folder
 
-LONGEST_TEXT = 40  # of a setting of theirs in the table
+LONGEST_TEXT = 40  # of an imported value in the table
 WIDTH = 100
 AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "worked out", "left"
 
 
 def import_profiles(request: ImportRequest) -> int:
-    """Write the material and the process of a file, and say row by row what became of its settings."""
+    """Write the material and the process of a file, and list what became of each setting."""
     presets = {"process": request.process, "material": request.material, "printer": request.printer}
     if request.out is not None:
         check_folder(request.out)
     config = read_config(request.file, presets)
     for kind, name in (("process", config.process), ("material", config.material)):
         if presets[kind] not in ("", name):
-            raise ProfileError(f"--{kind}-preset {presets[kind]}: {request.file} is no bundle that has presets to choose from")
+            raise ProfileError(f"--{kind}-preset {presets[kind]}: {request.file} is not a bundle with presets to choose from")
     found = [imported(config, kind, request.name, request.file.stem) for kind in KINDS]
     rows = [row for profile in found for row in profile.rows]
     if not rows:
-        raise ProfileError(f"profile {request.file}: none of its {len(config.entries)} settings has one like it here")
+        raise ProfileError(f"profile {request.file}: none of its {len(config.entries)} settings has an equivalent here")
     found = [profile for profile in found if any(row.taken for row in profile.rows)]
     if not found:
         raise ProfileError(
-            f"profile {request.file}: {len(rows)} of its {len(config.entries)} settings have one like them here, but no value of "
+            f"profile {request.file}: {len(rows)} of its {len(config.entries)} settings have an equivalent here, but no value of "
             f"theirs can be taken, the first: {_row(rows[0])}"
         )
     files = {profile.kind: _file(request, profile) for profile in found}
@@ -52,7 +52,7 @@ def import_profiles(request: ImportRequest) -> int:
 
 
 def _file(request: ImportRequest, profile: Imported) -> Path:
-    """Where a profile goes: a name that a file may have, in the folder that is asked for, else in the user's own."""
+    """File for a profile, with a valid name, in the requested folder or the user's own."""
     stem = plain_name(profile.name).strip("._") or profile.kind
     if request.out is None:
         return own_folder(profile.kind) / f"{stem}.toml"
@@ -73,7 +73,7 @@ def _lines(config: Config, found: Sequence[Imported]) -> Iterator[str]:
         yield from _listed(f"  stay as {profile.base} has them: {len(ours)}", ours)
         yield ""
     others = unused(config)
-    yield from _listed(f"of their settings there is nothing like it here, or they are the machine's: {len(others)}", others)
+    yield from _listed(f"settings without an equivalent here, or that belong to the machine: {len(others)}", others)
 
 
 def _groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
@@ -92,7 +92,7 @@ def _row(row: Row) -> str:
 
 
 def _listed(title: str, names: Sequence[str]) -> Iterator[str]:
-    """A title and names below it, as many to a line as fit."""
+    """A title and the names below it, with as many to a line as fit."""
     yield title
     line = ""
     for name in names:

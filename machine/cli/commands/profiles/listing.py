@@ -1,4 +1,4 @@
-"""The profiles commands that list, show, save and check."""
+"""The profiles commands list, show, save and check."""
 
 import json
 import sys
@@ -13,7 +13,7 @@ from profiles.profile import KINDS, check_file, kind_of, load, load_one, rows, s
 
 
 def list_profiles() -> int:
-    """Print the shipped profiles of every kind and the user's own."""
+    """Print the names of all shipped profiles and of the user's own."""
     for kind in KINDS:
         sys.stdout.write(f"{kind}: {', '.join(shipped(kind))}\n")
         if own(kind):
@@ -22,7 +22,7 @@ def list_profiles() -> int:
 
 
 def show(name: str, as_json: bool, settings: Sequence[str]) -> int:
-    """Print the resolved values of one profile, as JSON or as lines with what each key means."""
+    """Print the resolved values of one profile, as JSON or as lines with the meaning of each key."""
     sections = load_one(name, settings)
     if as_json:
         sys.stdout.write(
@@ -37,7 +37,7 @@ def show(name: str, as_json: bool, settings: Sequence[str]) -> int:
 
 
 def _origin(model: Frozen, key: str) -> str:
-    """Where a machine's number comes from: its source, or that no source gives it."""
+    """Source of a machine's value, or "UNCALIBRATED"."""
     if not isinstance(model, Machine):
         return ""
     steps = key.split(".")
@@ -48,7 +48,7 @@ def _origin(model: Frozen, key: str) -> str:
 
 
 def save(name: str, settings: Sequence[str], out: Path) -> int:
-    """Write one profile with these settings as a profile file."""
+    """Write a profile with changed settings as a profile file."""
     from machine.pipeline.output import check_writable, write_bytes
     from machine.pipeline.profile_file import profile_text
 
@@ -60,7 +60,7 @@ def save(name: str, settings: Sequence[str], out: Path) -> int:
 
 
 def check(file: Path) -> int:
-    """Print every problem of a profile file; 1 when there are any."""
+    """Print every problem of a profile file; returns 1 if there are any."""
     problems = check_file(file)
     if not problems and kind_of(str(file)) == "machine":
         from machine.gcode.blocks import block_problems

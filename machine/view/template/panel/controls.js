@@ -44,7 +44,7 @@ function typeBoxes({ rows }, scene, bells) {
     if (!seconds[place]) return;
     const onchange = ({ target }) => { scene.hidden[target.checked ? "delete" : "add"](place); bells.ring("colours"); };
     const share = made("span", { className: "share", text: `${((100 * seconds[place]) / whole).toFixed(1)} %` });
-    $("types").append(made("label", {}, made("input", { type: "checkbox", checked: true, onchange }), swatch(typeColour(name)), name || "not told", share));
+    $("types").append(made("label", {}, made("input", { type: "checkbox", checked: true, onchange }), swatch(typeColour(name)), name || "unknown", share));
   });
 }
 
@@ -65,7 +65,7 @@ function scaleOf({ marks }) {
 
 function kindEntries(rows) {
   const used = new Set(rows.type.filter((_, i) => rows.kind[i] === KIND.extrude));
-  return [...used].sort((a, b) => a - b).map((place) => [typeColour(rows.types[place]), rows.types[place] || "not told"]);
+  return [...used].sort((a, b) => a - b).map((place) => [typeColour(rows.types[place]), rows.types[place] || "unknown"]);
 }
 
 const KINDS = ["travel", "", "retraction", "turning the table", "wipe", "prime"];

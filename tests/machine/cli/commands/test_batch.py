@@ -137,7 +137,7 @@ def test_after_ctrl_c_no_process_is_left_and_the_batch_goes_on(tmp_path: Path) -
     run.send_signal(signal.SIGINT)
     said = run.communicate()[1].splitlines()
     assert said[-2:] == [
-        f"1 of 2 models have a row in {out / 'estimate.csv'}; started again, it goes on there",
+        f"1 of 2 models have a row in {out / 'estimate.csv'}; a repeated run continues there",
         "tiltprint: interrupted",
     ]
     assert run.returncode == 130

@@ -225,7 +225,7 @@ def test_a_file_of_another_kind_is_one_sentence(tmp_path: Path, capsys: pytest.C
 def test_numbers_that_no_machine_has_are_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "m503.log"
     file.write_text(LOG.replace("X250.00", "X99999.00"))
-    assert "m503.log: what it tells is no machine's: " in refusal(capsys, tmp_path / "my.toml", file)
+    assert "m503.log: its values are not those of a machine: " in refusal(capsys, tmp_path / "my.toml", file)
     file.write_text(LOG.replace("Max:  X110.00", "Max:  X-111.00"))
     assert "axis X: M211 tells limits from -110 to -111" in refusal(capsys, tmp_path / "my.toml", file)
 

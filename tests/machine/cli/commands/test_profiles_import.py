@@ -88,12 +88,12 @@ def test_settings_whose_values_cannot_be_taken_are_no_strangers(tmp_path: Path, 
     (tmp_path / "odd.ini").write_text("perimeters = many\nlayer_height = none\n")
     assert main(["profiles", "import", str(tmp_path / "odd.ini")]) == 1
     said = capsys.readouterr().err
-    assert "2 of its 2 settings have one like them here, but no value of theirs can be taken, the first: layer_height" in said
+    assert "2 of its 2 settings have an equivalent here, but no value of theirs can be taken, the first: layer_height" in said
 
 
 @pytest.mark.parametrize(("options", "sentence"), [
     (("-o", "config.ini"), "output config.ini is a file: a folder is expected"),
-    (("--process-preset", "FINE"), "--process-preset FINE: odd.ini is no bundle that has presets to choose from"),
+    (("--process-preset", "FINE"), "--process-preset FINE: odd.ini is not a bundle with presets to choose from"),
 ])  # fmt: skip
 def test_a_wrong_option_is_told_before_settings_that_cannot_be_taken(
     options: tuple[str, ...], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

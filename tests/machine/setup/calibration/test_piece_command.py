@@ -112,13 +112,13 @@ def test_the_command_saves_what_the_readings_say(gcode: Path, mine: Path, capsys
         (["--machine", "fractal5pro", "--readings", READINGS], "was made for generic A/C table: --machine names Fractal 5 Pro"),
         (
             ["--readings", "10,0,1.2 0,0,1.2 0,0,1.2 0,0,1.2"],
-            "does not fit the others: look at it again",
+            "does not fit the others: check it",
         ),
         (["--readings", READINGS, "--readings", READINGS], "--printed is given 1 times, --readings 2 times"),
-        (["--readings", READINGS, "-o", "x.gcode"], "--printed is a way of its own"),
+        (["--readings", READINGS, "-o", "x.gcode"], "--printed excludes -o"),
         ([], "--printed goes with one of --readings TEXT and --html FILE"),
         (["--readings", READINGS, "--html", "page.html"], "--printed goes with one of --readings TEXT and --html FILE"),
-        (["--readings", READINGS, "--directions"], "--printed is a way of its own"),
+        (["--readings", READINGS, "--directions"], "--printed excludes -o"),
     ],
 )
 def test_what_cannot_be_evaluated_is_one_sentence_and_saves_nothing(

@@ -136,7 +136,10 @@ def test_the_report_is_a_table_and_saves_nothing(capsys: pytest.CaptureFixture[s
         (["--measured", "coupon.toml", "--material", "petg"], "a sheet of pla: --material pla is expected, not petg"),
         (["--measured", "nowhere.toml"], "sheet nowhere.toml cannot be read"),
         (["-o", "coupon.gcode"], "coupon.toml exists: --replace writes over it"),
-        (["-o", "x.toml"], "-o x.toml: the sheet is written there, beside the program: another ending is expected, as .gcode"),
+        (
+            ["-o", "x.toml"],
+            "-o x.toml: the sheet is written there, beside the program: another ending is expected, such as .gcode",
+        ),
         (["-o", "x.gcode", "--shape", "round"], "--shape round: bend or tensile is expected"),
         (["-o", "x.gcode", "--machine", "three_axis"], "three axes has three axes"),
         (["-o", "x.gcode", "--vary", "interface_flow=7"], "process.interface_flow is 7: it must be a number from 0.5 to 1.5"),
