@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from pathlib import Path
 from queue import SimpleQueue
@@ -35,16 +35,18 @@ ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the quest
 
 @dataclass(frozen=True)
 class JobState:
-    """A print as pages see it. resumes: the journal of the print whose rest it is; key: of the slices; starts: False where a
-    print server only gets the file; server: whether a print server prints it.
+    """A print as pages see it. status: its newest moment, with its state; live: whether more of that than the state is known;
+    told_s: when it was, seconds since 1970. resumes: the journal of the print whose rest it is; key: of the slices; starts: False
+    where a print server only gets the file; server: whether a print server prints it.
 
     question: what a person is asked before it begins; log, journal: files; webcam: where its picture is; sentence: how it ended;
     checks: what was found before, forced where it speaks against the print; words: what the printer has said; said: what the
-    program has; figures: of the program; progress: the newest moment, told_s: when it was, seconds since 1970; forcible: force
-    goes past why it was refused; stop_given: an emergency stop was heard.
+    program has; figures: of the program; forcible: force goes past why it was refused; stop_given: an emergency stop was heard.
     """
 
-    state: PrintState = PrintState.CHECKING
+    status: PrintStatus = field(default_factory=lambda: PrintStatus(PrintState.CHECKING))
+    live: bool = False
+    told_s: float = 0.0
     name: str = ""
     machine: str = ""
     port: str = ""
@@ -61,21 +63,25 @@ class JobState:
     words: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
     figures: dict[str, Any] | None = None
-    progress: PrintStatus | None = None
-    told_s: float = 0.0
     forcible: bool = False
     stop_given: bool = False
 
+    @property
+    def state(self) -> PrintState:
+        """The state of its status."""
+        return self.status.state
+
+    def changed(self, state: PrintState | None = None, **values: Any) -> "JobState":
+        """The same with other values. state: of its status."""
+        changed = replace(self, **values)
+        return changed if state is None else replace(changed, status=replace(changed.status, state=state))
+
     def json(self) -> dict[str, Any]:
-        """The state for a page. over: whether nothing of it goes on; heat_s: since when the temperatures are known, seconds since
-        1970, for the page goes on counting when nothing more comes."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        """The print and its status for a page, side by side. heat_s: since when the temperatures are known, seconds since 1970,
+        for the page goes on counting when nothing more comes."""
+        values = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "status"}
         checks = [{"text": check.text, "forced": check.forced} for check in self.checks]
-        moment = self.progress
-        if moment is not None and self.state.is_over:  # an upload that has ended says nothing of a print
-            moment = None if moment.state is PrintState.UPLOADING else replace(moment, state=self.state)
-        progress = moment and moment.json() | {"heat_s": self.told_s - moment.heat_age_s}
-        return values | {"checks": checks, "progress": progress, "over": self.state.is_over}
+        return self.status.json() | values | {"checks": checks, "heat_s": self.told_s - self.status.heat_age_s}
 
 
 def first_state(job: PrintJob) -> JobState:
@@ -146,10 +152,10 @@ class StateReporter:
         self._thread = Thread(target=self._serve, name="reporter", daemon=True)
         self._thread.start()
 
-    def tell(self, **values: Any) -> None:
-        """Change parts of the state."""
+    def tell(self, state: PrintState | None = None, **values: Any) -> None:
+        """Change values of the job, or the state of its status."""
         with self._lock:
-            self._state = replace(self._state, **values)
+            self._state = self._state.changed(state, **values)
         self._changed.set()
 
     def close(self) -> None:
@@ -244,16 +250,23 @@ class AtPage:
         self.tell(log="" if scene.log.trouble else str(scene.log.file), journal=journal)
         if scene.uploads:
             self.tell(state=PrintState.UPLOADING)
-        with nullcontext() if scene.server else stopping(self.stop):
-            yield lambda status: self._show(status, scene)
+        state = PrintState.UPLOADING if scene.uploads else PrintState.PRINTING
 
-    def _show(self, status: PrintStatus | None, scene: Scene) -> None:
+        def show(status: PrintStatus | None) -> None:
+            nonlocal state
+            if status is not None and status.state.is_printing:  # what a server tells besides is not the end of the job yet
+                state = status.state
+            self._show(status, state, scene)
+
+        with nullcontext() if scene.server else stopping(self.stop):
+            yield show
+
+    def _show(self, status: PrintStatus | None, state: PrintState, scene: Scene) -> None:
         if status is None:
-            self.tell(state=PrintState.PRINTING, progress=None, told_s=time())
+            self.tell(status=PrintStatus(state), live=False, told_s=time())
             return
-        values: dict[str, Any] = {"progress": replace(status, message=plain_line(status.message)), "told_s": time()}
-        if status.state.is_printing:  # what a server tells besides is not the end of the job yet
-            values["state"] = status.state
+        moment = replace(status, state=state, message=plain_line(status.message))
+        values: dict[str, Any] = {"status": moment, "live": not scene.uploads, "told_s": time()}
         if not scene.uploads:
             scene.messages.add(status.message)
             values["words"] = tuple(plain_line(word) for word in scene.messages.last)

@@ -3,7 +3,6 @@
 import asyncio
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from time import time
 from typing import Annotated
 
@@ -63,7 +62,7 @@ class RunningPrint:
         async for state in heard(process.hear()):
             ended = state.state.is_over
             lost = ended and self._has_lost_an_order(state)
-            self._take(replace(state, state=PrintState.CANCELLING) if lost else state)
+            self._take(state.changed(PrintState.CANCELLING) if lost else state)
         if lost:
             await self._order_anew()
         elif not ended:
@@ -88,9 +87,9 @@ class RunningPrint:
         """A fault of this program: nobody hears the print's process any more, so it ends, and the printer is made safe."""
         self._kill()
         if not self.asking:
-            self.state = replace(self.state, state=PrintState.CANCELLING)  # an end that it has told is not believed
+            self.state = self.state.changed(PrintState.CANCELLING)  # an end that it has told is not believed
         await self._end_without_process()
-        self._take(replace(self.state, sentence=f"{bug_in_words(error, sys.argv)}; {self.state.sentence}"))
+        self._take(self.state.changed(sentence=f"{bug_in_words(error, sys.argv)}; {self.state.sentence}"))
 
     def cancel(self) -> None:
         """End it, heaters off; before it has begun at once. What has opened a journal to go on with takes it away itself."""
@@ -169,7 +168,7 @@ class RunningPrint:
     def _order_late(self) -> None:
         """Give a stop or a cancel that comes when the print has just been left."""
         if _goes_on(self.state):
-            self._take(replace(self.state, state=PrintState.CANCELLING))
+            self._take(self.state.changed(PrintState.CANCELLING))
             self._late = asyncio.get_running_loop().create_task(self._order_anew())
 
     async def _order_anew(self) -> None:
@@ -179,8 +178,7 @@ class RunningPrint:
         if self._emergency:
             self._end(End(PrintState.FAILED, await asyncio.to_thread(rescue, at, True)))
             return
-        name, status = self.state.name, self.state.progress
-        away_s = time() - self.state.told_s + (0.0 if status is None else status.heat_age_s)
+        name, away_s = self.state.name, time() - self.state.told_s + self.state.status.heat_age_s
         file = name if self.job.does is Does.FOLLOW else server_name(name)
         try:
             cancelled = await asyncio.to_thread(cancel_on_server, at, file, away_s)
@@ -195,25 +193,25 @@ class RunningPrint:
         server goes on by itself."""
         at, moved = self.job.destination, not self.asking
         if not moved:
-            self._take(replace(self.state, journal=""))
+            self._take(self.state.changed(journal=""))
         if self._given_up and not self._emergency:
             self._end(NOT_BEGUN)
         elif isinstance(at, Simulated):
             stopped = "emergency stop: the simulated printer has ended"
             self._end(End(PrintState.FAILED, stopped if self._ended else f"{DIED}; the simulated printer has ended with it"))
         elif moved or self._emergency:
-            self._take(replace(self.state, state=PrintState.CANCELLING))
+            self._take(self.state.changed(PrintState.CANCELLING))
             sentence = await asyncio.to_thread(rescue, at, self._emergency)
             self._end(End(PrintState.FAILED, f"{DIED}; {sentence}" if moved and not self._ended else sentence))
         else:
             self._end(End(PrintState.FAILED, f"{DIED}; nothing had moved yet"))
 
     def _end(self, end: End) -> None:
-        self._take(replace(self.state, state=end.state, sentence=end.sentence))
+        self._take(self.state.changed(end.state, sentence=end.sentence))
 
     def _take(self, state: JobState) -> None:
         """The newest state. What is over stays as it has ended."""
-        self.state = state if follows(self.state.state, state.state) else replace(state, state=self.state.state)
+        self.state = state if follows(self.state.state, state.state) else state.changed(self.state.state)
         self._changed()
 
 
