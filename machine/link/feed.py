@@ -8,7 +8,7 @@ from math import inf
 from machine.gcode.modes import ModalState, axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
-from machine.link.journal import FINISHED, LEFT, PAUSED, Checkpoint, Journal
+from machine.link.journal import Checkpoint, Journal
 from machine.link.line_history import Barriers, LineHistory, PlannerReports, SentLine, shifts
 from machine.link.pause.park_moves import lift_move
 from machine.link.pause.pause import Pause
@@ -304,13 +304,13 @@ class Feed:
         """Record that the tip was lifted off the print for good; position: reported by the printer."""
         if self._journal is not None:
             pose = tuple((position or {}).get(letter) for letter in self.modal.axes.letters)
-            self._journal.write(replace(self._checkpoint(), state=LEFT, pose=pose))
+            self._journal.write(replace(self._checkpoint(), state=PrintState.CANCELLED, pose=pose))
 
     def _checkpoint(self) -> Checkpoint:
         history, waits = self.history, self._pause.stands if self._pause is not None else None
         number = self.exchange.connection.window.wire_number(history.number)
         # while heating again or without a port the tip still waits
-        state = FINISHED if self.finished else PAUSED if waits is not None else self.state
+        state = PrintState.DONE if self.finished else PrintState.PAUSED if waits is not None else self.state
         return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state)
 
     def _record(self, hurry: bool = False) -> None:

@@ -27,12 +27,16 @@ from typing import IO, Any, Self
 from uuid import uuid4
 from zlib import crc32
 
+from machine.link.print_state import PrintState
 from profiles.errors import JournalError, OutputError, reason
 from profiles.files import lock
 from profiles.folders import state_folders
 
 FORMAT = 3  # in 2 a full disk ended the journal without a trace, in 1 the newest record might lack a change of height
-PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print ended, the tip was lifted
+# States with another word in the file. CANCELLED: the print was ended for any reason, and the tip lifted off it.
+WORDS = {PrintState.DONE: "finished", PrintState.CANCELLED: "left"}
+STATES = {state.value: state for state in PrintState} | {word: state for state, word in WORDS.items()}
+RESUMED = "resumed in "  # followed by the path of another journal, in place of a state
 EVERY_LINES = 4  # the sender is fewer lines than this ahead of the newest record,
 EVERY_S = 0.1  # which is at most this old if anything has happened since
 SYNC_S = 1.0  # between syncs; after a restart of the computer the disk is older by this and the time of an fsync
@@ -67,7 +71,8 @@ class Checkpoint:
     number: int = 0  # wire number of the newest acknowledged line
     # X Y Z tilt turn E after the acknowledged line, unwrapped, or of a tip that has left the print; None: unknown.
     pose: tuple[float | None, ...] = ()
-    state: str = "printing"  # activity of the print
+    state: PrintState = PrintState.PRINTING
+    continued_in: str | None = None  # the journal of the run that resumed the print
 
 
 @dataclass(frozen=True)
@@ -83,13 +88,7 @@ class JournalContents:
     @property
     def finished(self) -> bool:
         """Whether the print finished."""
-        return self.last.state == FINISHED
-
-    @property
-    def continued_in(self) -> str | None:
-        """The journal of the run that resumed this print."""
-        before, resumed, name = self.last.state.partition(RESUMED)
-        return name if resumed and not before else None
+        return self.last.state is PrintState.DONE
 
 
 class Journal:
@@ -271,7 +270,7 @@ def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
     changed since."""
     if read_journal(path) != contents:
         raise JournalError(f"journal {path} has changed since it was read: its print was resumed elsewhere")
-    resumed = replace(contents.last, state=f"{RESUMED}{rest}")
+    resumed = replace(contents.last, continued_in=f"{rest}")
     try:
         record = _slot(contents.records + 1, resumed)
         if len(record) > BLOCK_BYTES:
@@ -296,7 +295,8 @@ def _record(value: Any) -> bytes:
 def _slot(number: int, checkpoint: Checkpoint) -> bytes:
     """The record of a checkpoint."""
     lines = [checkpoint.sent, checkpoint.acknowledged, checkpoint.executed, checkpoint.number]
-    return _record([number, *lines, checkpoint.pose, checkpoint.state])
+    state, rest = checkpoint.state, checkpoint.continued_in
+    return _record([number, *lines, checkpoint.pose, WORDS.get(state, state) if rest is None else f"{RESUMED}{rest}"])
 
 
 def read_journal(path: Path) -> JournalContents:
@@ -367,8 +367,12 @@ def _heading(path: Path, value: Any) -> tuple[JournalHeading, str, str]:
 def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:
     """Number and content of a record."""
     match value:
-        case [int(number), int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(state)] if _is_pose(pose):
-            return number, Checkpoint(sent, acknowledged, executed, wire, tuple(pose), state)
+        case [int(number), int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(word)] if _is_pose(pose):
+            at = Checkpoint(sent, acknowledged, executed, wire, tuple(pose))
+            if word.startswith(RESUMED):
+                return number, replace(at, continued_in=word.removeprefix(RESUMED))
+            if word in STATES:
+                return number, replace(at, state=STATES[word])
     raise JournalError(f"journal {path} is damaged: record {slot} holds no state of a print")
 
 

@@ -48,11 +48,16 @@ class PrintState(StrEnum):
         """Whether a print is running."""
         return self in ACTIVE
 
+    @property
+    def is_away(self) -> bool:
+        """Whether the tip is away from the print, or on its way there."""
+        return self in AWAY
+
 
 S = PrintState
 OVER = frozenset({S.DONE, S.CANCELLED, S.LEFT, S.DECLINED, S.REFUSED, S.FAILED})
 UNHEARD = frozenset({S.CANCELLING, S.RECONNECTING})  # without reports
-AWAY = frozenset({S.PAUSING, S.PAUSED})  # the tip is away from the print
+AWAY = frozenset({S.PAUSING, S.PAUSED})
 ACTIVE = frozenset({S.PRINTING, S.PAUSING, S.PAUSED, S.RESUMING, S.RECONNECTING, S.FINISHING, S.CANCELLING})
 _ANY = ACTIVE | OVER  # a server reports from time to time, so these follow in any order; a cancel may be refused
 
@@ -106,10 +111,12 @@ class PrintStatus:
         return self.heat_age_s >= OLD_HEAT_S or self.state in UNHEARD or self.state.is_over
 
     def json(self) -> dict[str, Any]:
-        """The status for a page, with `at` as the only nested value."""
+        """The status for a page, with `at` as the only nested value, and what the state means: scripts list no states."""
         values: dict[str, Any] = asdict(self)
         heat: dict[str, float | None] = values.pop("temperature")
-        return values | heat | {"heat_is_old": self.heat_is_old}
+        state = self.state
+        meaning = {"is_over": state.is_over, "is_printing": state.is_printing, "is_away": state.is_away}
+        return values | heat | meaning | {"heat_is_old": self.heat_is_old}
 
 
 @dataclass

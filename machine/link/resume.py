@@ -16,11 +16,11 @@ import numpy as np
 
 from machine.gcode.modes import E_AXIS, ModalState, axes_of
 from machine.kinematics.collision import Printed
-from machine.link.journal import EVERY_LINES, LEFT, PAUSED, Checkpoint
+from machine.link.journal import EVERY_LINES, Checkpoint
 from machine.link.line_history import shifts
 from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands, homed_return_moves, return_moves
 from machine.link.pause.printed_bounds import PrintedBounds
-from machine.link.print_state import ProgramPosition
+from machine.link.print_state import PrintState, ProgramPosition
 from machine.link.protocol.framing import command_of
 from machine.link.status import SEVERAL, PrinterStatus
 from machine.planning.stand import Turn
@@ -32,8 +32,8 @@ from profiles.messages import key_name, option, phrase
 from profiles.profile import Profile
 
 TOO_LITTLE = "hardly anything was printed: the program begins anew"
-PARKED = (PAUSED, LEFT)  # states in which the journal's pose is the parking position
-MOVING = ("pausing", "resuming")
+PARKED = (PrintState.PAUSED, PrintState.CANCELLED)  # states in which the journal's pose is the parking position
+MOVING = (PrintState.PAUSING, PrintState.RESUMING)
 HOME_IT = (
     f"write into {key_name('machine.gcode.resume')} of a profile of this machine how it is homed with a print on it "
     "(docs/serial.md), and name "

@@ -71,7 +71,7 @@ def _resumable(path: Path) -> ResumableJournal | None:
     except (JournalError, OSError):
         return None
     last, heading = story.last, story.heading
-    if story.finished or story.continued_in is not None or last == Checkpoint() or not isfile(heading.program):
+    if story.finished or last.continued_in is not None or last == Checkpoint() or not isfile(heading.program):
         return None
     if is_being_printed(path):
         return None

@@ -207,8 +207,10 @@ def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> P
 
 def _program(journal: Path, story: JournalContents) -> GcodeFile:
     """The program, as it was printed. Raises JournalError."""
-    if story.continued_in is not None:
-        raise JournalError(f"journal {journal}: this print was resumed already, what became of it is in {story.continued_in}")
+    if story.last.continued_in is not None:
+        raise JournalError(
+            f"journal {journal}: this print was resumed already, what became of it is in {story.last.continued_in}"
+        )
     if story.finished:
         raise JournalError(f"journal {journal}: this print ran to its end, there is nothing to resume")
     program = GcodeFile(Path(story.heading.program))

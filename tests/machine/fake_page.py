@@ -16,14 +16,13 @@ FAKE = Path(__file__).with_suffix(".js")
 needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed: the page's script is not tried without a browser")
 
 
-def on_fake_page(act: str) -> Any:
-    """What a function's body gives that runs in place of the page's `main`: by `printPanel`, `$` and what fake_page.js has."""
+def on_fake_page(act: str, script: Path = OWN / "print" / "print-panel.js") -> Any:
+    """What a function's body gives that runs in place of the page's `main`: by `$`, what fake_page.js has and what the script
+    exports, for one of the workbench's `printPanel`."""
     assert NODE is not None
-    ends = "process.stdout.write(JSON.stringify(given), () => process.exit(0));"
-    names = 'const { printPanel } = modules["print/print-panel"], { $ } = modules["template/elements"];'
-    whole = "\n".join(
-        [FAKE.read_text("utf-8"), bundle(OWN / "print" / "print-panel.js"), names, f"const given = (() => {{ {act} }})();", ends]
-    )
+    ends = "given.then((value) => process.stdout.write(JSON.stringify(value), () => process.exit(0)));"
+    names = 'const { printPanel } = modules["print/print-panel"] ?? {}, { $ } = modules["template/elements"];'
+    whole = "\n".join([FAKE.read_text("utf-8"), bundle(script), names, f"const given = (async () => {{ {act} }})();", ends])
     run = subprocess.run([NODE, "-"], input=whole, capture_output=True, text=True, timeout=60)
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout)

@@ -41,8 +41,8 @@ class PrintPage:
 
     @property
     def print(self) -> dict[str, Any]:
-        newest = self.state["prints"][-1] if self.state["prints"] else {"state": "", "over": False, "progress": None}
-        return {**newest, "progress": newest["progress"] or {}}
+        newest: dict[str, Any] = self.state["prints"][-1] if self.state["prints"] else {"state": "", "is_over": False}
+        return newest
 
     def do(self, command: str, **given: Any) -> None:
         self.say(json.dumps({"do": command, **given}))

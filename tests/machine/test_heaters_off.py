@@ -191,7 +191,7 @@ def test_a_start_block_that_cannot_be_filled_in_is_told_and_nothing_moves(monkey
     monkeypatch.setattr(f"{__name__}.PROFILE", broken)
     steps, printer = Steps(), VirtualPrinter(PROFILE.machine)
     ended = in_hand(steps, printer, monkeypatch, HEAT, HOME, HandCommand(HandDoes.LET_GO))
-    assert "{warmth}" in steps.last["progress"].message
+    assert "{warmth}" in steps.last["status"].message
     assert (ended.sentence, targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
     assert not printer.record.happened("homed XYZAC")
 
@@ -212,7 +212,7 @@ def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyP
     class Terminated(Steps):
         def take(self, *ignored: object, **told: object) -> None:
             super().take(**told)
-            status = self.last.get("progress")
+            status = self.last.get("status")
             if status is not None and status.temperature.nozzle_target_c == 215.0 and not self.raise_at:
                 self.raise_at = (-1,)
                 signal.raise_signal(signal.SIGTERM)

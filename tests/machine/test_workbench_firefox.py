@@ -195,7 +195,7 @@ def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(fir
         firefox.click("#check")
         firefox.wait("!$('run-ask').hidden")
         firefox.click("#begin")
-        second_page.until(lambda state: state["progress"])
+        second_page.until(lambda state: state.get("live"))
         second_page.command("pause")
         assert second_page.refused() == "another page commands this print: take the command over first"
         second_page.command("take")

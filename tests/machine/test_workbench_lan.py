@@ -166,7 +166,7 @@ def test_a_device_stops_the_print_of_another_page_and_the_print_outlives_its_dev
         other = PrintPage(line)
         assert other.until(lambda job: not job.get("held", True))["state"] == "printing"
         other.command("emergency")
-        assert other.until(lambda job: job["over"])["state"] == "failed"
+        assert other.until(lambda job: job["is_over"])["state"] == "failed"
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")

@@ -109,7 +109,7 @@ def test_pages_that_read_nothing_leave_the_print_what_the_command_line_sends(sli
         page.do("check", port="sim")
         page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
-        done = page.until(lambda seen: seen["over"])
+        done = page.until(lambda seen: seen["is_over"])
         page.command("forget")
         page.until(lambda seen: not seen["state"])
     assert done["sentence"] == "the print is done"
@@ -135,7 +135,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.click("#begin")
         browser.wait(f"{PRINTING} === 'printing' && $('run-told').textContent.includes('layer')")
         browser.value("{ $('feed').value = 20; $('feed').dispatchEvent(new Event('change')); }")
-        assert second_page.until(lambda seen: seen["progress"].get("feed_percent") == 20.0)["holder"] != "other"
+        assert second_page.until(lambda seen: seen.get("feed_percent") == 20.0)["holder"] != "other"
         browser.click("#pause")
         browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
         browser.click("#pause")
@@ -153,7 +153,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         second_page.do("check", port="/dev/none")
         browser.wait("$('which').options.length === 2")
         assert browser.value(PRINTING) == "paused"  # the print that is looked at stays, and so does the one that the button stops
-        second_page.until(lambda seen: seen["over"])
+        second_page.until(lambda seen: seen["is_over"])
         second_page.command("forget")
         second_page.until(lambda seen: seen["state"] == "paused")
         browser.value("{ $('printer-field').open = true; $('port-typed').focus(); }")
@@ -181,7 +181,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         heat = browser.value("[...$('run-told').querySelectorAll('dd.old')].map((each) => each.textContent)")
         assert len(heat) == 2
         assert all(re.fullmatch(r"[\d.]+ of \d+ °C, as last known \d+ s ago", text) for text in heat)
-        assert "M112" in commands_sent(Path(second_page.until(lambda seen: seen["over"])["log"]))
+        assert "M112" in commands_sent(Path(second_page.until(lambda seen: seen["is_over"])["log"]))
         second_page.command("forget")
         browser.wait(f"{PRINTING} === ''")
         assert browser.value("$('stop-words').checkVisibility()")  # until it is noted, whatever becomes of the print
@@ -268,7 +268,7 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         page.do("check", port=printer.path)
         page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
-        ended = page.until(lambda seen: seen["over"])
+        ended = page.until(lambda seen: seen["is_over"])
         assert "the printer restarted in the middle of the print" in ended["sentence"]
         browser.open(sliced.address)
         browser.click("#tab-printing")
@@ -296,11 +296,11 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         page.do("go_on", journal=ended["journal"], port=printer.path)
         page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
-        rest = page.until(lambda seen: seen["over"])
+        rest = page.until(lambda seen: seen["is_over"])
         assert rest["sentence"] == "the print is done"
         assert homed(printer) == ["homed XYZ", "homed XY"]
     first, second = (read_journal(Path(ended_print["journal"])) for ended_print in (ended, rest))
-    assert (first.continued_in, second.finished) == (rest["journal"], True)
+    assert (first.last.continued_in, second.finished) == (rest["journal"], True)
     assert browser.complaints == []
 
 
@@ -350,7 +350,7 @@ def test_print_under_the_verdict_checks_at_the_printer_of_last_time_and_moves_an
         page.do("check", port=printer.path)
         page.until(lambda seen: seen["state"] == "ready")
         page.command("cancel")
-        page.until(lambda seen: seen["over"])
+        page.until(lambda seen: seen["is_over"])
         browser.open(sliced.address)
         browser.wait("document.documentElement.dataset.line === 'open'")
         browser.click("#tab-slices")
@@ -372,9 +372,9 @@ def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced
         page.do("check", port=printer.path)
         page.until(lambda seen: seen["state"] == "ready")
         page.command("begin")
-        page.until(lambda seen: seen["progress"].get("nozzle_target_c"))
+        page.until(lambda seen: seen.get("nozzle_target_c"))
         sliced.process.send_signal(signal.SIGINT)
-        ended = page.until(lambda seen: seen["over"])
+        ended = page.until(lambda seen: seen["is_over"])
         assert sliced.process.wait(60.0) == 0
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
     assert ended["said"][-2].endswith("; heaters off")

@@ -16,7 +16,7 @@ from rich.text import Text
 from machine.cli.terminal.interrupts import calling, interrupting, stopping
 from machine.cli.terminal.keys import Keyboard, can_type, is_terminal, typing
 from machine.link.pending_commands import Control
-from machine.link.print_state import PrintState, PrintStatus
+from machine.link.print_state import AWAY, PrintState, PrintStatus
 from machine.notices import PlainLines, plain_line, reporting, say, say_lines
 from machine.printing.job import End, Scene, Show
 from machine.quantities import duration
@@ -24,7 +24,9 @@ from profiles.errors import JournalError
 
 MOST_WORDS = 4
 WORD_LENGTH = 200  # of one message: a lost connection takes two lines to describe
-COLOURS = {"printing": "green", "finishing": "green", "paused": "yellow", "pausing": "yellow", "resuming": "yellow"}
+COLOURS = dict.fromkeys((PrintState.PRINTING, PrintState.FINISHING), "green") | dict.fromkeys(
+    (*AWAY, PrintState.RESUMING), "yellow"
+)
 KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? more"
 EXIT_CODES = {PrintState.DONE: 0, PrintState.DECLINED: 1, PrintState.CANCELLED: 130, PrintState.LEFT: 130}
 

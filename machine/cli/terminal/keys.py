@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
-from machine.link.print_state import AWAY, PrintState, PrintStatus
+from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import say
 
 STEP_PERCENT = 10.0
@@ -124,7 +124,7 @@ class Keyboard:
 _ACTS: dict[str, Callable[[Keyboard], None]] = {
     "p": lambda board: board._control.ask(Command.PAUSE),
     "r": lambda board: board._control.ask(Command.RESUME),
-    " ": lambda board: board._control.ask(Command.RESUME if board._state in AWAY else Command.PAUSE),
+    " ": lambda board: board._control.ask(Command.RESUME if board._state.is_away else Command.PAUSE),
     "c": lambda board: board._cancel(),
     "q": lambda board: board._explain(),
     "+": lambda board: board._faster(STEP_PERCENT),

@@ -15,7 +15,7 @@ from typing import Any
 
 from machine.link.identification import Answer, Kind
 from machine.link.pending_commands import Command
-from machine.link.print_state import ACTIVE, PrintState, PrintStatus
+from machine.link.print_state import AWAY, PrintState, PrintStatus
 from machine.link.protocol.events import NAME
 from machine.printing.destination import Server
 from machine.printing.servers.http import Reply, Tell, entry, how_to_give_a_key, number, plain, table, temperature, whole
@@ -29,7 +29,7 @@ START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
 MOST_PAGES = 16
 SETTINGS_ARRAYS = ("move.axes", "move.extruders", "tools", "sensors.probes")
 SETTINGS_KEYS = ("boards[0]", "heat", "move.kinematics", "network")
-STOPPED = frozenset({PrintState.PAUSING, PrintState.PAUSED, PrintState.CANCELLING})
+STOPPED = AWAY | {PrintState.CANCELLING}
 STATES = {
     "idle": PrintState.READY,
     "processing": PrintState.PRINTING,
@@ -117,7 +117,7 @@ class Duet(PrintServer):
 
     def _since_start(self, phase: PrintState, before: PrintState | None) -> PrintState:
         """The phase, with idle after a print as its end: a cancelled print was paused before. before: the previous phase."""
-        if phase in ACTIVE:
+        if phase.is_printing:
             self._last = phase
         if phase is not PrintState.READY or before is None or self._last is None:
             return phase
@@ -147,7 +147,7 @@ class Duet(PrintServer):
                 return
             if "Error" in status.message:
                 raise ServerError(f"{self.name} cannot start it now: {status.message}")
-            if status.state in ACTIVE:
+            if status.state.is_printing:
                 return
             time.sleep(LOOK_S)
 

@@ -43,7 +43,7 @@ class Watched:
         self.page = page
         self.address = ""
         self.token = secrets.token_urlsafe(16)
-        self._status: PrintStatus | None = None
+        self._status = PrintStatus(PrintState.CHECKING)
         self._ended: PrintState | None = None
         self._asked, self._end_reported = Event(), Event()
 
@@ -57,8 +57,6 @@ class Watched:
         if self._ended:
             self._end_reported.set()
         status, ended = self._status, self._ended
-        if status is None:
-            return json.dumps({"state": ended or "waiting"}).encode()
         return json.dumps((replace(status, state=ended) if ended else status).json()).encode()
 
     def end(self, state: PrintState) -> None:

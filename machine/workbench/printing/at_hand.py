@@ -114,7 +114,7 @@ class Hand:
             message=self._problem,
             homed=self._homed,
         )
-        self._person.tell(state=status.state, progress=status, told_s=time())
+        self._person.tell(status=status, live=True, told_s=time())
 
     def _at(self) -> dict[str, float]:
         return dict(self._session.position or {})

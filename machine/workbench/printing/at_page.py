@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from pathlib import Path
 from queue import SimpleQueue
@@ -35,16 +35,18 @@ ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the quest
 
 @dataclass(frozen=True)
 class JobState:
-    """State of a print for pages. resumes: journal of the print that it completes; key: of the slices; starts: False if a print
-    server only stores the file; server: whether a print server prints it.
+    """A print for pages. status: its newest moment with its state, received at told_s, seconds since 1970; live: whether more of
+    the status than its state is known. resumes: journal of the print that it completes; key: of the slices; starts: False if a
+    print server only stores the file; server: whether a print server prints it.
 
     question: asked before it begins; log, journal: files; webcam: URL of its picture; sentence: how it ended; checks: results of
     the checks, forced if they speak against the print; words: the printer's messages; said: the program's messages; figures: of
-    the program; progress: the newest status, received at told_s, seconds since 1970; forcible: force overrides the refusal;
-    stop_given: an emergency stop was executed.
+    the program; forcible: force overrides the refusal; stop_given: an emergency stop was executed.
     """
 
-    state: PrintState = PrintState.CHECKING
+    status: PrintStatus = field(default_factory=lambda: PrintStatus(PrintState.CHECKING))
+    live: bool = False
+    told_s: float = 0.0
     name: str = ""
     machine: str = ""
     port: str = ""
@@ -61,21 +63,25 @@ class JobState:
     words: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
     figures: dict[str, Any] | None = None
-    progress: PrintStatus | None = None
-    told_s: float = 0.0
     forcible: bool = False
     stop_given: bool = False
 
+    @property
+    def state(self) -> PrintState:
+        """The state of its status."""
+        return self.status.state
+
+    def changed(self, state: PrintState | None = None, **values: Any) -> "JobState":
+        """A copy with other values; state: of its status."""
+        changed = replace(self, **values)
+        return changed if state is None else replace(changed, status=replace(changed.status, state=state))
+
     def json(self) -> dict[str, Any]:
-        """The state for a page. over: whether it has ended; heat_s: time of the temperatures, seconds since 1970, so that the
-        page can show their age."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        """The print and its status for a page, side by side. heat_s: time of the temperatures, seconds since 1970: the
+        page shows their age."""
+        values = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "status"}
         checks = [{"text": check.text, "forced": check.forced} for check in self.checks]
-        moment = self.progress
-        if moment is not None and self.state.is_over:  # the status of an upload is not that of a print
-            moment = None if moment.state is PrintState.UPLOADING else replace(moment, state=self.state)
-        progress = moment and moment.json() | {"heat_s": self.told_s - moment.heat_age_s}
-        return values | {"checks": checks, "progress": progress, "over": self.state.is_over}
+        return self.status.json() | values | {"checks": checks, "heat_s": self.told_s - self.status.heat_age_s}
 
 
 def first_state(job: PrintJob) -> JobState:
@@ -144,10 +150,10 @@ class StateReporter:
         self._thread = Thread(target=self._serve, name="reporter", daemon=True)
         self._thread.start()
 
-    def tell(self, **values: Any) -> None:
-        """Change fields of the state."""
+    def tell(self, state: PrintState | None = None, **values: Any) -> None:
+        """Change values of the job, or the state of its status."""
         with self._lock:
-            self._state = replace(self._state, **values)
+            self._state = self._state.changed(state, **values)
         self._changed.set()
 
     def close(self) -> None:
@@ -240,16 +246,23 @@ class AtPage:
         self.tell(log="" if scene.log.trouble else str(scene.log.file), journal=journal)
         if scene.uploads:
             self.tell(state=PrintState.UPLOADING)
-        with nullcontext() if scene.server else stopping(self.stop):
-            yield lambda status: self._show(status, scene)
+        state = PrintState.UPLOADING if scene.uploads else PrintState.PRINTING
 
-    def _show(self, status: PrintStatus | None, scene: Scene) -> None:
+        def show(status: PrintStatus | None) -> None:
+            nonlocal state
+            if status is not None and status.state.is_printing:  # other states of a server are not the end of the job
+                state = status.state
+            self._show(status, state, scene)
+
+        with nullcontext() if scene.server else stopping(self.stop):
+            yield show
+
+    def _show(self, status: PrintStatus | None, state: PrintState, scene: Scene) -> None:
         if status is None:
-            self.tell(state=PrintState.PRINTING, progress=None, told_s=time())
+            self.tell(status=PrintStatus(state), live=False, told_s=time())
             return
-        values: dict[str, Any] = {"progress": replace(status, message=plain_line(status.message)), "told_s": time()}
-        if status.state.is_printing:  # before the end of the job other states of a server are not final
-            values["state"] = status.state
+        moment = replace(status, state=state, message=plain_line(status.message))
+        values: dict[str, Any] = {"status": moment, "live": not scene.uploads, "told_s": time()}
         if not scene.uploads:
             scene.messages.add(status.message)
             values["words"] = tuple(plain_line(word) for word in scene.messages.last)

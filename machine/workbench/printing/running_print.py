@@ -3,7 +3,6 @@
 import asyncio
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from time import time
 from typing import Annotated
 
@@ -63,7 +62,7 @@ class RunningPrint:
         async for state in heard(process.hear()):
             ended = state.state.is_over
             lost = ended and self._has_lost_an_order(state)
-            self._take(replace(state, state=PrintState.CANCELLING) if lost else state)
+            self._take(state.changed(PrintState.CANCELLING) if lost else state)
         if lost:
             await self._order_anew()
         elif not ended:
@@ -87,9 +86,9 @@ class RunningPrint:
         """Handle an internal error: end the process, which no one reads, and make the printer safe."""
         self._kill()
         if not self.asking:
-            self.state = replace(self.state, state=PrintState.CANCELLING)  # an end that it has reported is not trusted
+            self.state = self.state.changed(PrintState.CANCELLING)  # an end that it has reported is not trusted
         await self._end_without_process()
-        self._take(replace(self.state, sentence=f"{bug_in_words(error, sys.argv)}; {self.state.sentence}"))
+        self._take(self.state.changed(sentence=f"{bug_in_words(error, sys.argv)}; {self.state.sentence}"))
 
     def cancel(self) -> None:
         """End the print, heaters off; at once before it has begun, unless its process must delete the journal of a resumption."""
@@ -166,7 +165,7 @@ class RunningPrint:
     def _order_late(self) -> None:
         """Execute a stop or cancel that comes just after the print was left."""
         if _goes_on(self.state):
-            self._take(replace(self.state, state=PrintState.CANCELLING))
+            self._take(self.state.changed(PrintState.CANCELLING))
             self._late = asyncio.get_running_loop().create_task(self._order_anew())
 
     async def _order_anew(self) -> None:
@@ -176,8 +175,7 @@ class RunningPrint:
         if self._emergency:
             self._end(End(PrintState.FAILED, await asyncio.to_thread(rescue, at, True)))
             return
-        name, status = self.state.name, self.state.progress
-        away_s = time() - self.state.told_s + (0.0 if status is None else status.heat_age_s)
+        name, away_s = self.state.name, time() - self.state.told_s + self.state.status.heat_age_s
         file = name if self.job.does is Does.FOLLOW else server_name(name)
         try:
             cancelled = await asyncio.to_thread(cancel_on_server, at, file, away_s)
@@ -191,25 +189,25 @@ class RunningPrint:
         """Handle the death of the process: make the printer safe if it was used. A print on a print server continues."""
         at, moved = self.job.destination, not self.asking
         if not moved:
-            self._take(replace(self.state, journal=""))
+            self._take(self.state.changed(journal=""))
         if self._given_up and not self._emergency:
             self._end(NOT_BEGUN)
         elif isinstance(at, Simulated):
             stopped = "emergency stop: the simulated printer has ended"
             self._end(End(PrintState.FAILED, stopped if self._ended else f"{DIED}; the simulated printer has ended with it"))
         elif moved or self._emergency:
-            self._take(replace(self.state, state=PrintState.CANCELLING))
+            self._take(self.state.changed(PrintState.CANCELLING))
             sentence = await asyncio.to_thread(rescue, at, self._emergency)
             self._end(End(PrintState.FAILED, f"{DIED}; {sentence}" if moved and not self._ended else sentence))
         else:
             self._end(End(PrintState.FAILED, f"{DIED}; nothing had moved yet"))
 
     def _end(self, end: End) -> None:
-        self._take(replace(self.state, state=end.state, sentence=end.sentence))
+        self._take(self.state.changed(end.state, sentence=end.sentence))
 
     def _take(self, state: JobState) -> None:
-        """Set the newest state. The final state of a print does not change."""
-        self.state = state if follows(self.state.state, state.state) else replace(state, state=self.state.state)
+        """The newest state. What is over stays as it has ended."""
+        self.state = state if follows(self.state.state, state.state) else state.changed(self.state.state)
         self._changed()
 
 

@@ -4,6 +4,7 @@ import json
 import os
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from zlib import crc32
 
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from machine.gcode.lines import GcodeFile
 from machine.link import journal as journal_module
 from machine.link.journal import BLOCK_BYTES, EVERY_LINES, SLOTS, Checkpoint, Journal, JournalHeading, mark_resumed, read_journal
+from machine.link.print_state import PrintState
 from machine.printing.journal_folder import KEPT, new_journal
 from profiles.errors import JournalError, OutputError
 from profiles.profile import load
@@ -22,7 +24,7 @@ HEADING = JournalHeading("/prints/a.gcode", "00" * 32, "a", {"machine": {"name":
 POSE = (1.5, -2.0, 60.25, 30.0, 725.0, 12.34567)
 
 
-def at(line: int, state: str = "printing") -> Checkpoint:
+def at(line: int, state: PrintState = PrintState.PRINTING) -> Checkpoint:
     return Checkpoint(line + 4, line, max(0, line - 16), line + 5, POSE, state)
 
 
@@ -184,7 +186,25 @@ def test_a_resumed_journal_names_the_one_that_goes_on(tmp_path_factory: pytest.T
     before = read_journal(path)
     mark_resumed(path, before, Path("rest"))
     after = read_journal(path)
-    assert (after.continued_in, after.last.executed) == ("rest", before.last.executed)
+    assert (after.last.continued_in, after.last.executed) == ("rest", before.last.executed)
+
+
+@pytest.mark.parametrize(("state", "word"), [
+    (PrintState.PRINTING, "printing"), (PrintState.PAUSED, "paused"),
+    (PrintState.DONE, "finished"), (PrintState.CANCELLED, "left"),
+])  # fmt: skip
+def test_a_state_has_the_word_in_the_file_that_it_always_had(state: PrintState, word: str, tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", HEADING) as journal:
+        journal.write(at(20, state))
+    assert f'12.34567],"{word}"]'.encode() in journal.path.read_bytes()
+    assert read_journal(journal.path).last == at(20, state)
+
+
+def test_a_record_with_a_state_that_no_print_has_is_damage(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", HEADING) as journal:
+        journal.write(replace(at(20), state="dancing"))  # type: ignore[arg-type]
+    with pytest.raises(JournalError, match="is damaged: record 1 holds no state of a print"):
+        read_journal(journal.path)
 
 
 def test_a_journal_that_was_resumed_elsewhere_meanwhile_is_not_resumed_again(tmp_path: Path) -> None:

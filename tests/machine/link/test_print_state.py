@@ -1,9 +1,13 @@
 """The states of a print: which may follow which, and what a page is told of a moment."""
 
+import ast
 import json
+import re
+from pathlib import Path
 
 import pytest
 
+from machine.link import print_state
 from machine.link.print_state import OVER, TABLE, PrintState, PrintStatus, follows
 from machine.link.protocol.events import Temperature
 from machine.printing import server_print
@@ -33,8 +37,37 @@ def test_a_moment_is_told_to_a_page_as_it_is() -> None:
     status = PrintStatus(PrintState.PAUSED, 2.0, Temperature(210.0, 215.0), file_line=7, at={"X": 1.0}, heat_age_s=20.0)
     page = json.loads(json.dumps(status.json()))
     assert (page["state"], page["file_line"], page["at"], page["nozzle_c"]) == ("paused", 7, {"X": 1.0}, 210.0)
+    assert (page["is_printing"], page["is_away"], page["is_over"]) == (True, True, False)
     assert page["heat_is_old"]
     assert "temperature" not in page
+
+
+MACHINE = Path(print_state.__file__).parents[1]
+WORDS = {state.value for state in PrintState}
+
+
+def test_no_script_lists_states_of_a_print() -> None:
+    lists = {
+        (script.name, array)
+        for script in MACHINE.rglob("*.js")
+        for array in re.findall(r"\[[^][]*\]", script.read_text("utf-8"))
+        if len(WORDS & set(re.findall(r"\"([a-z ]+)\"", array))) > 1
+    }
+    assert lists == set()
+
+
+def test_the_states_in_which_a_print_is_over_are_listed_in_one_place() -> None:
+    def states(items: list[ast.expr]) -> set[str]:
+        names = {item.attr.lower() for item in items if isinstance(item, ast.Attribute)}
+        return {*names, *(str(item.value) for item in items if isinstance(item, ast.Constant))} & OVER
+
+    places = {
+        file.name
+        for file in MACHINE.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        if isinstance(node, ast.List | ast.Tuple | ast.Set) and len(states(node.elts)) > len(OVER) // 2
+    }
+    assert places == {"print_state.py"}
 
 
 def test_the_temperatures_of_a_server_that_does_not_answer_grow_old(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHe
 from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.pending_commands import Control
 from machine.link.port import open_port
-from machine.link.print_state import PrintStatus
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.framing import frame
 from machine.link.resume import InterruptedPrint, ResumePoint, heights_mm, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
@@ -353,7 +353,7 @@ def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> 
     assert way.line == still.index("M106 S10") + 1
 
 
-@pytest.mark.parametrize("state", ["paused", "left"])
+@pytest.mark.parametrize("state", [PrintState.PAUSED, PrintState.CANCELLED])
 def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> None:
     moment = Checkpoint(LINE + 3, LINE, LINE, 100, (159.0, -159.0, 120.0, 30.0, 725.0, 5.0), state)
     before = plan_resume(cut_off(PROGRAM, moment), asked(), PROFILE).before
@@ -370,7 +370,7 @@ def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text
     with journal_of(text, "first") as journal:
         print_lines(text, PATH, on_progress=see, control=Control(stop), medium=printer.medium, profile=PROFILE, journal=journal)
     last = read_journal(journal.path).last
-    assert last.state == "left"
+    assert last.state is PrintState.CANCELLED
     assert last.pose[:5] == pytest.approx(tuple(printer.record.end[-1, :5]), abs=0.005)
 
 
@@ -399,7 +399,7 @@ def test_a_marlin_that_has_restarted_believes_itself_at_its_home_positions_and_i
 
 
 TURN = PROGRAM.index("G0 A30 C725 F6000")
-ON_THE_WAY = Checkpoint(LINE + 3, LINE, LINE, 100, (10.0, 10.0, 62.0, 30.0, 725.0, 5.0), "pausing")
+ON_THE_WAY = Checkpoint(LINE + 3, LINE, LINE, 100, (10.0, 10.0, 62.0, 30.0, 725.0, 5.0), PrintState.PAUSING)
 NOWHERE = [*START, "G1 X1 E1", "G28", *(f"M106 S{k}" for k in range(60)), "G1 X5 E1"]
 FOLLOWING = PROFILE.model_copy(update={"machine": PROFILE.machine.model_copy(update={"coordinates": "workpiece"})})
 MOVED = {"X": 50.0, "Y": 50.0, "Z": 50.0}
@@ -555,7 +555,11 @@ def test_the_command_lists_the_prints_that_can_be_resumed_and_no_others(
     text: GcodeFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(text.path.parent))
-    states = {"cut-off": Checkpoint(20, 20, 10, 20), "done": Checkpoint(20, 20, 20, 20, state="finished"), "begun": Checkpoint()}
+    states = {
+        "cut-off": Checkpoint(20, 20, 10, 20),
+        "done": Checkpoint(20, 20, 20, 20, state=PrintState.DONE),
+        "begun": Checkpoint(),
+    }
     for name, state in states.items():
         with continue_journal(text, PROFILE, name) as journal:
             journal.write(state)
@@ -613,7 +617,7 @@ def test_a_journal_stays_whole_when_the_printer_does_not_answer(
     with on_terminal(lambda data, baud: b"") as path:
         assert main(["resume", str(journal.path), "--port", path, "--yes"]) == 1
     assert "is --baud the firmware's rate" in capsys.readouterr().err
-    assert read_journal(journal.path).continued_in is None
+    assert read_journal(journal.path).last.continued_in is None
 
 
 def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that_nobody_gives(
@@ -626,7 +630,7 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
         assert main(["resume", str(journal.path), "--port", printer.path]) == 1
         assert not printer.record.happened("nozzle")
     with journal_of(text, "done") as journal:
-        journal.write(Checkpoint(120, 120, 100, 20, state="finished"))
+        journal.write(Checkpoint(120, 120, 100, 20, state=PrintState.DONE))
     assert main(["resume", str(journal.path), "--port", "x"]) == 1
     assert main(["resume", str(journal.path), "--port", "sim"]) == 1
     errors = capsys.readouterr().err

@@ -9,9 +9,9 @@ HEARD = """
     printPanel();
     const heats = { nozzle_c: 209.6, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, heat_s: 0, heat_is_old: false };
     const moment = { state: "printing", ...heats, at: {}, elapsed_s: 5 };
-    const known = { number: 1, name: "box", port: "sim", state: "printing", told_s: 0, checks: [], words: [], said: [] };
-    const tell = (more, told = {}) => {
-      const print = { ...known, ...more, progress: { ...moment, ...told } };
+    const known = { number: 1, name: "box", port: "sim", is_printing: true, live: true, checks: [], words: [], said: [] };
+    const tell = (more) => {
+      const print = { ...known, ...moment, ...more };
       fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [print] });
     };
     const heat = () => [1, 3].map((place) => $("run-told").children[place].textContent);
@@ -32,8 +32,8 @@ def test_what_has_just_been_told_is_not_marked() -> None:
 
 @needs_node
 @pytest.mark.parametrize("tell", [
-    "tell({ state: 'failed', over: true, sentence: 'emergency stop: the printer has halted' });",
-    "tell({}, { state: 'reconnecting', heat_is_old: true });",
+    "tell({ state: 'failed', is_over: true, heat_is_old: true, sentence: 'emergency stop: the printer has halted' });",
+    "tell({ state: 'reconnecting', heat_is_old: true });",
     "",  # the line to the workbench is lost, or the print hangs
 ])  # fmt: skip
 @pytest.mark.parametrize(("after_ms", "ago"), [(12_000, "12 s"), (5 * 60_000 + 30_000, "5 min"), (2 * 3_600_000, "2 h")])
@@ -43,4 +43,6 @@ def test_what_nobody_tells_any_more_is_marked_with_its_age(tell: str, after_ms: 
 
 @needs_node
 def test_at_the_end_of_a_print_it_is_marked_at_once() -> None:
-    assert on_fake_page(f"{HEARD} fake.wait(2000); tell({{ state: 'done', over: true }}); return heat();") == marked("2 s")
+    assert on_fake_page(
+        f"{HEARD} fake.wait(2000); tell({{ state: 'done', is_over: true, heat_is_old: true }}); return heat();"
+    ) == marked("2 s")

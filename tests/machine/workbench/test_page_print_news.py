@@ -7,10 +7,11 @@ PAGE = """
     globalThis.Notification = class { constructor(text) { said.push(text); } static requestPermission() { said.push("asked"); } };
     Notification.permission = "granted";
     printPanel();
-    const known = { name: "box", port: "sim", checks: [], words: [], said: [], holder: modules["page/line"].OWN_PAGE };
-    const heats = { nozzle_c: 200, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, at: {}, elapsed_s: 5 };
+    const known = { name: "box", port: "sim", live: true, checks: [], words: [], said: [] };
+    known.holder = modules["page/line"].OWN_PAGE;
+    const heats = { heat_s: 0, nozzle_c: 200, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, at: {}, elapsed_s: 5 };
     const tell = (state, share, more = {}) => {
-      const print = { ...known, number: 1, state, progress: { state: "printing", share, heat_s: 0, ...heats }, ...more };
+      const print = { ...known, number: 1, state, is_printing: state === "printing", share, ...heats, ...more };
       fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [print] });
     };
     fake.sockets[0].open();
@@ -21,14 +22,14 @@ PAGE = """
 def test_the_title_of_the_tab_tells_how_much_is_printed_and_nothing_when_it_is_over() -> None:
     told = on_fake_page(
         f"{PAGE} const titles = []; tell('printing', 0.429); titles.push(document.title);"
-        " tell('done', 1, { over: true, sentence: 'the print is done' }); titles.push(document.title); return titles;"
+        " tell('done', 1, { is_over: true, sentence: 'the print is done' }); titles.push(document.title); return titles;"
     )
     assert told == ["42 % – tiltprint", "tiltprint"]
 
 
 @needs_node
 def test_the_browser_says_once_that_a_print_of_this_page_is_over() -> None:
-    over = "tell('done', 1, { over: true, sentence: 'the print is done' });"
+    over = "tell('done', 1, { is_over: true, sentence: 'the print is done' });"
     assert on_fake_page(f"{PAGE} tell('printing', 0.5); {over} {over} return said;") == ["box: the print is done"]
     assert on_fake_page(f"{PAGE} known.holder = 'another page'; tell('printing', 0.5); {over} return said;") == []
     assert on_fake_page(f"{PAGE} {over} return said;") == []  # it was over before this page was there
@@ -56,8 +57,8 @@ def test_temperatures_of_ten_minutes_are_lines_with_the_newest_at_the_right_edge
 @needs_node
 def test_a_warning_stands_beside_the_state_on_the_tab_and_in_the_bar_of_every_tab() -> None:
     lost = "this print can no longer be resumed"
-    more = f"{{ progress: {{ state: 'printing', share: 0.5, heat_s: 0, ...heats, warning: '{lost}' }} }}"
     told = on_fake_page(
-        f"{PAGE} tell('printing', 0.5, {more}); return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
+        f"{PAGE} tell('printing', 0.5, {{ warning: '{lost}' }});"
+        " return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
     )
     assert told == [f"printing, 50 % · {lost}", f"box at sim: printing, 50 % · {lost}", f"box: printing: {lost}"]

@@ -7,7 +7,7 @@ from tests.machine.fake_page import needs_node, on_fake_page
 # Two prints run, the second one is the newest; the page is of none of them.
 TWO_PRINTS = """
     printPanel();
-    const known = { port: "sim", state: "printing", progress: null, checks: [], words: [], said: [] };
+    const known = { port: "sim", state: "printing", at: {}, checks: [], words: [], said: [] };
     const prints = [1, 2].map((number) => ({ ...known, number, name: `box ${number}` }));
     const state = { ports: null, asking: false, journals: null, prints };
     fake.sockets[0].open();

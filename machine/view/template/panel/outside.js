@@ -29,7 +29,6 @@ export function outsideOf({ scene, findings, code, chooseTheme, camera, bells })
 }
 
 const ASK_EVERY_MS = 1000;
-const OVER = ["done", "cancelled", "left", "declined", "failed"], AWAY = ["pausing", "paused"]; // the tip, from the print
 const NOT_ARRIVED = "that has not arrived: use the terminal, or the printer's own switch";
 
 /** Follows a running print, asking the computer that served the page for what the printer has acknowledged. */
@@ -42,14 +41,13 @@ export function follow(scene, player) {
     const state = await fetch("state", { cache: "no-store" }).then((answer) => answer.json()).catch(() => null);
     tell({ live: state ? liveTold(state) : "the print's computer does not answer" });
     if (!state) return setTimeout(ask, 5 * ASK_EVERY_MS);
-    const over = OVER.includes(state.state), away = AWAY.includes(state.state);
-    hide({ orders: over });
-    [pause.hidden, resume.hidden] = [away, !away];
+    hide({ orders: state.is_over });
+    [pause.hidden, resume.hidden] = [state.is_away, !state.is_away];
     if (state.file_line && state.file_line !== shown && !player.playing) {
       shown = state.file_line;
       scene.goToLine(state.file_line);
     }
-    return over ? null : setTimeout(ask, ASK_EVERY_MS);
+    return state.is_over ? null : setTimeout(ask, ASK_EVERY_MS);
   };
   ask();
 }

@@ -13,7 +13,7 @@ import pytest
 from machine.cli.terminal import keys as keys_module
 from machine.cli.terminal.keys import ALONE_S, CANCELLING, HINT_S, LEAVING, MORE, SURE, Keyboard, can_type, typing
 from machine.link.pending_commands import Command, Control, PendingCommand
-from machine.link.print_state import PrintStatus
+from machine.link.print_state import PrintState, PrintStatus
 from tests.machine.peers import PATIENCE_S
 
 MOMENT = PrintStatus(elapsed_s=0.0)
@@ -23,7 +23,7 @@ def asked(*keys: str, state: str = "printing") -> list[PendingCommand]:
     """What a run of keys asks for."""
     control = Control()
     board = Keyboard(control)
-    board.follow(replace(MOMENT, state=state))
+    board.follow(replace(MOMENT, state=PrintState(state)))
     for key in keys:
         board.press(key)
     return list(iter(control.take, None))

@@ -8,7 +8,7 @@ import pytest
 
 from machine.link.journal import Journal, JournalHeading, read_journal
 from machine.link.pending_commands import Command
-from machine.link.print_state import PrintStatus
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
@@ -238,7 +238,7 @@ def test_the_journal_of_a_pause_tells_where_the_tip_waits_also_while_it_is_heate
             medium=watcher.printer.medium,
         )  # fmt: skip
     last = read_journal(journal.path).last
-    assert last.state == "paused"
+    assert last.state is PrintState.PAUSED
     assert last.pose[:5] == pytest.approx(watcher.printer.record.end[-1, :5], abs=1e-3)
 
 

@@ -65,7 +65,7 @@ def ordered(watched: Watched, name: str, method: str = "POST", **headers: str) -
 
 def test_the_page_and_the_state_are_served(watched: Watched) -> None:
     assert asked(watched, "/")[1] == b"<p>the page</p>"
-    assert json.loads(asked(watched, "/state")[1]) == {"state": "waiting"}
+    assert json.loads(asked(watched, "/state")[1])["state"] == "checking"
     watched.follow(HALF)
     state = json.loads(asked(watched, "/state")[1])
     assert (state["state"], state["file_line"], state["acknowledged"], state["total"]) == ("printing", 123, 50, 100)
@@ -141,7 +141,7 @@ def test_without_the_token_or_the_origin_of_the_page_nothing_is_ordered(watched:
 def test_only_this_computer_by_name_is_answered(watched: Watched, host: str, status: int) -> None:
     answer, content = asked(watched, "/state", Host=host.format(port=port_of(watched)))
     assert answer.status == status
-    assert (b"waiting" in content) == (status == 200)
+    assert (b"checking" in content) == (status == 200)
 
 
 def test_no_other_page_may_frame_it_or_keep_it(watched: Watched) -> None:
@@ -194,7 +194,7 @@ def test_a_print_that_fails_is_told_as_failed() -> None:
     running = next(print_)
     with pytest.raises(KeyboardInterrupt):
         next(print_)
-    assert json.loads(running.state()) == {"state": "failed"}
+    assert json.loads(running.state())["state"] == "failed"
 
 
 def test_a_warning_is_told_as_long_as_the_print_lasts() -> None:

@@ -53,7 +53,7 @@ def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
 
     thread = Thread(target=serve, daemon=True)
     thread.start()
-    wait_until(lambda: told.state.get("state") == "in hand")
+    wait_until(lambda: "status" in told.state)
     try:
         yield person, told
     finally:
@@ -64,18 +64,18 @@ def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
 def test_a_printer_is_heated_homed_and_moved_and_its_heaters_go_off_when_it_is_let_go_of() -> None:
     with in_hand() as (person, told):
         person.hear(HandCommand(HandDoes.JOG, "X", 1.0))
-        wait_until(lambda: "once it was homed here" in told.state["progress"].message)
+        wait_until(lambda: "once it was homed here" in told.state["status"].message)
         person.hear(HandCommand(HandDoes.HEAT))
-        wait_until(lambda: told.state["progress"].temperature.nozzle_target_c == PROFILE.material.first_layer_nozzle_c)
-        assert told.state["progress"].temperature.bed_target_c == PROFILE.material.bed_c
+        wait_until(lambda: told.state["status"].temperature.nozzle_target_c == PROFILE.material.first_layer_nozzle_c)
+        assert told.state["status"].temperature.bed_target_c == PROFILE.material.bed_c
         person.hear(HandCommand(HandDoes.HOME))
-        wait_until(lambda: told.state["progress"].homed)
-        before = told.state["progress"].at
+        wait_until(lambda: told.state["status"].homed)
+        before = told.state["status"].at
         person.hear(HandCommand(HandDoes.JOG, "X", 5.0))
-        wait_until(lambda: told.state["progress"].at["X"] == pytest.approx(before["X"] + 5.0, abs=0.01))
+        wait_until(lambda: told.state["status"].at["X"] == pytest.approx(before["X"] + 5.0, abs=0.01))
         for _ in range(4):  # farther than the axis goes
             person.hear(HandCommand(HandDoes.JOG, "X", 99.0))
-        wait_until(lambda: "are allowed" in told.state["progress"].message)
+        wait_until(lambda: "are allowed" in told.state["status"].message)
     assert told.state["end"] == End(PrintState.DONE, "let go of; the heaters are off")
 
 

@@ -1,7 +1,6 @@
 """What is known of slices is not asked for again: a print of them is refused before a printer is asked, or begins sooner."""
 
 import asyncio
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -160,8 +159,14 @@ def test_a_file_that_names_no_printer_is_as_none(text: str) -> None:
 
 
 @pytest.mark.parametrize("end", [PrintState.CANCELLED, PrintState.FAILED, PrintState.DONE])
-def test_the_last_moment_of_a_print_that_is_over_has_the_state_in_which_it_ended(end: PrintState) -> None:
-    printing = JobState(PrintState.PRINTING, progress=PrintStatus(PrintState.PRINTING))
-    assert printing.json()["progress"]["state"] == PrintState.PRINTING
-    assert replace(printing, state=end).json()["progress"]["state"] == end
-    assert replace(printing, state=end, progress=PrintStatus(PrintState.UPLOADING)).json()["progress"] is None
+def test_a_print_that_is_over_keeps_its_last_moment_in_the_state_in_which_it_ended(end: PrintState) -> None:
+    printing = JobState(PrintStatus(PrintState.PRINTING, layer=7), live=True).json()
+    assert (printing["state"], printing["is_printing"], printing["is_over"]) == ("printing", True, False)
+    ended = JobState(PrintStatus(PrintState.PRINTING, layer=7), live=True).changed(end, sentence="over").json()
+    assert (ended["state"], ended["is_printing"], ended["is_over"], ended["layer"], ended["sentence"]) == (
+        end,
+        False,
+        True,
+        7,
+        "over",
+    )

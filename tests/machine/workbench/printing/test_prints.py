@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -83,7 +82,7 @@ def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable
         prints.begin("me", order(port))
         begun = await reach(lambda current: current.state.state == "ready")
         begun.begin()
-        await reach(lambda current: current.state.progress and runs(current))
+        await reach(lambda current: current.state.live and runs(current))
         end(prints, begun)
         state = (await reach(lambda current: current.over)).state
         await asyncio.gather(*prints._tasks)
@@ -93,7 +92,7 @@ def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable
 
 
 def heats(current: RunningPrint) -> bool:
-    return current.state.progress is not None and current.state.progress.temperature.nozzle_target_c == 210.0
+    return current.state.status.temperature.nozzle_target_c == 210.0
 
 
 def process_of(current: RunningPrint) -> "subprocess.Popen[bytes]":
@@ -218,7 +217,7 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.workbench.printing.at_page import JobState
 from mdp.kernels.workers import frame, read_frames
 for state in (PrintState.PRINTING, PrintState.LEFT):
-    told = JobState(state, "hour", server=True, progress=PrintStatus(), told_s=time.time(), sentence="it goes on")
+    told = JobState(PrintStatus(state), True, time.time(), "hour", server=True, sentence="it goes on")
     sys.stdout.buffer.write(frame(told))
     sys.stdout.flush()
     for _ in zip(range(2 if state == WAITS_FOR else 0), read_frames(sys.stdin.buffer)):
@@ -313,9 +312,9 @@ def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_name
     ):
         show(None)
         show(PrintStatus(elapsed_s=1.0))
-        assert (heard.state["journal"], heard.state["progress"].warning) == (str(tmp_path / "j"), "")
+        assert (heard.state["journal"], heard.state["status"].warning) == (str(tmp_path / "j"), "")
         show(PrintStatus(elapsed_s=2.0, warning="this print can no longer be resumed"))
-    assert (heard.state["journal"], heard.state["progress"].warning) == ("", "this print can no longer be resumed")
+    assert (heard.state["journal"], heard.state["status"].warning) == ("", "this print can no longer be resumed")
 
 
 @pytest.mark.parametrize(("kind", "profile"), [("octoprint", PROFILE), ("duet", load("gen5x"))])
@@ -348,7 +347,7 @@ class Attended:
         threading.Thread(target=lambda: self.heard.tell(end=carry_out(wanted, self.person)[0]), daemon=True).start()
         self.until(lambda state: "state" in state)
         self.person.hear(BEGIN)
-        self.until(lambda state: state.get("progress") and state["progress"].state == "printing")
+        self.until(lambda state: state.get("status") and state["status"].state == "printing")
 
     def ended(self) -> End:
         """How it ended, once it has."""
@@ -375,10 +374,10 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
         assert job.files["hour.gcode"].decode() == HOUR
         current.person.hear(Command.FEED, 150.0)
         current.person.hear(Command.PAUSE)
-        current.until(lambda state: (state["progress"].state, state["progress"].feed_percent) == ("paused", 150.0))
+        current.until(lambda state: (state["status"].state, state["status"].feed_percent) == ("paused", 150.0))
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
         current.person.hear(Command.RESUME)
-        current.until(lambda state: state["progress"].state == "printing")
+        current.until(lambda state: state["status"].state == "printing")
         for word, sentence, state in ((Command.CANCEL, "the print was stopped", "cancelled"), (LEAVE, left, "printing")):
             current.person.hear(word)
             assert current.ended().sentence == sentence.format(address)
@@ -427,7 +426,7 @@ def page_of(prints: Prints, name: str = "me") -> PageOfPrints:
 
 
 def enter(current: RunningPrint, state: str) -> None:
-    current.state = replace(current.state, state=PrintState(state))
+    current.state = current.state.changed(PrintState(state))
 
 
 def prints_with_one(port: str = "sim") -> Prints:

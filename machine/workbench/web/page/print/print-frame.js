@@ -59,7 +59,7 @@ export function followIn(print) {
   let follows = false, shown = 0;
   const same = () => print()?.key && print().key === store.state?.sliced?.key;
   const tell = () => {
-    const line = print()?.progress?.file_line;
+    const line = print()?.file_line;
     if (!follows || !same() || !line || line === shown) return;
     shown = line;
     post("line", { line });
@@ -80,7 +80,7 @@ export function followIn(print) {
     tell();
   };
   return () => {
-    const runs = same() && print().progress && !print().over;
+    const runs = same() && print().live && !print().is_over;
     hide({ follow: !runs });
     tell();
     if (follows && (!store.looking || !runs)) set(false);

@@ -71,7 +71,7 @@ export function printPanel() {
   const send = (command) => { problem(""); socket.send(command); };
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
   const print = () => state.prints.find((job) => job.number === chosen) || null;
-  const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => !job.over);
+  const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => !job.is_over);
   /** A command to the print that is looked at, if there is one. */
   const toldTo = (command) => { if (print()) send({ ...command, print: print().number }); };
 
@@ -97,11 +97,11 @@ export function printPanel() {
     notifyOver(state.prints, OWN_PAGE);
     showBar(running(), print());
     stops.told();
-    document.documentElement.dataset.printing = print() ? (print().over ? "over" : print().state) : "";
+    document.documentElement.dataset.printing = print() ? (print().is_over ? "over" : print().state) : "";
   }
 
   setInterval(() => {
-    if (print()?.progress) showProgress(print()); // its temperatures grow old
+    if (print()?.live) showProgress(print()); // its temperatures grow old
     if (!state.prints.some((job) => silence(job))) return;
     showPrint(print(), commands());
     showBar(running(), print());
@@ -115,7 +115,7 @@ export function printPanel() {
   const toPrint = () => {
     update({ looking: false });
     $("tab-printing").click();
-    if (known && port() && !state.prints.some((job) => !job.over && job.port === port())) check();
+    if (known && port() && !state.prints.some((job) => !job.is_over && job.port === port())) check();
   };
   for (const event of ["change", "input"]) listen(event, { ports: () => { known = true; showPort(); unforce(); } });
   listen("focus", {
@@ -174,7 +174,7 @@ const SAME_PRESS_MS = 1000; // who presses twice in a fright means the print of 
 /** Emergency stops, and in the bar at the foot, which nothing covers, what has become of them, until a person has noted it. */
 function stopsAsked(prints, send, isOpen) {
   let asked = new Set(), late = 0, pressed = { number: 0, at: -Infinity };
-  const going = ({ over }) => !over;
+  const going = ({ is_over: over }) => !over;
   const stopped = () => prints().filter(({ number }) => asked.has(number));
   const say = (text) => {
     sayIn("stop-words", text);

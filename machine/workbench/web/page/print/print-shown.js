@@ -10,9 +10,6 @@ const HEARD = new Map(); // by the number of a print: what was heard of it last,
 let shownState = "";
 
 const IN_HAND = "in hand";
-/** States in which a print is under way, and in which the tip is away from it. */
-const LIVE = ["printing", "pausing", "paused", "resuming", "reconnecting", "finishing", "cancelling"];
-const AWAY = ["pausing", "paused"], COMMANDED = LIVE.filter((state) => state !== "cancelling");
 
 export function hear(prints) {
   for (const { number, state, told_s: told } of prints) {
@@ -22,9 +19,9 @@ export function hear(prints) {
 }
 
 /** That a print which goes on has not been heard of for a while: it may hang, or what lies between; "" where it has. */
-export function silence({ number, state, over, progress }) {
+export function silence({ number, is_over: over, live }) {
   const past = performance.now() - (HEARD.get(number)?.at ?? Infinity);
-  return !over && progress && state !== "uploading" && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
+  return !over && live && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
 }
 
 export const sure = (whether) => hide({ sure: !whether });
@@ -36,24 +33,26 @@ export function showWhich(prints, chosen) {
   $("which").value = chosen;
 }
 
-const BEFORE = { checking: "checking …", uploading: "handing the file over", printing: "starting", cancelling: "ending" }; // any moment is known
+const BEFORE = { checking: "checking …", printing: "starting", cancelling: "ending" }; // any moment is known
 
 /** What stands above a print: how it is, or how it has ended. */
 function stateOf(print) {
-  const { state, over, progress, starts } = print;
-  if (over) return print.sentence;
-  if (progress) return state === "uploading" ? progress.message : stateTold(print);
+  const { state, starts } = print;
+  if (print.is_over) return print.sentence;
+  if (print.live) return stateTold(print);
+  if (state === "uploading") return print.message || "handing the file over";
   return state === "ready" ? (starts ? "ready to print" : "ready to be handed over") : BEFORE[state] || "";
 }
 
 export function showPrint(print, commands) {
   hide({ run: !print });
   if (!print) return void ($("printer-field").open = true);
-  const { state, over, progress, figures, server, starts, resumes } = print, uploads = state === "uploading";
-  const runs = [...LIVE, IN_HAND].includes(state), asking = !runs && !uploads && (!over || state === "refused"), paused = AWAY.includes(state);
+  const { state, is_over: over, is_away: paused, live, figures, server, starts, resumes } = print, uploads = state === "uploading";
+  const runs = print.is_printing || state === IN_HAND, asking = !runs && !uploads && (!over || state === "refused");
+  const commanded = print.is_printing && state !== "cancelling" && commands;
   tell({
     "run-title": `${resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`, "run-state": stateOf(print),
-    "run-news": `${print.name}: ${over ? print.sentence : [state, progress?.warning].filter(Boolean).join(": ")}`, // a reader need not hear every per cent
+    "run-news": `${print.name}: ${over ? print.sentence : [state, print.warning].filter(Boolean).join(": ")}`, // a reader need not hear every per cent
     "ask-told": print.question || (starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
       : "The server keeps the file; nothing prints before somebody starts it there."),
     "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Leave it", "pause": paused ? "Resume" : "Pause",
@@ -61,10 +60,10 @@ export function showPrint(print, commands) {
     "held-told": print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.",
   });
   hide({
-    "run-ask": state !== "ready" || !commands, "run-live": !progress, "run-upload": !uploads || !commands, "leave-printing": !server,
-    "run-commands": !COMMANDED.includes(state) || !commands, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
+    "run-ask": state !== "ready" || !commands, "run-live": !live && !uploads, "run-upload": !uploads || !commands, "leave-printing": !server,
+    "run-commands": !commanded, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
   });
-  if (!COMMANDED.includes(state) || !commands) sure(false);
+  if (!commanded) sure(false);
   $("run-state").className = over ? state : "";
   $("pause").dataset.print = paused ? "resume" : "pause";
   $("run-log").href = `prints/${print.number}/log`;
@@ -73,7 +72,7 @@ export function showPrint(print, commands) {
   listIn("run-words", print.words.slice(-FEW));
   listIn("run-said", runs || uploads || over ? print.said.filter((line) => !print.log || !line.includes(print.log)).slice(-FEW) : []);
   tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
-  if (progress) showProgress(print);
+  if (live || uploads) showProgress(print);
   const kind = `${print.number} ${over ? "over" : runs ? "runs" : state}`;
   if (shownState !== kind) { $("printer-field").open = over; $("rest-field").open = false; }
   shownState = kind;
@@ -81,7 +80,7 @@ export function showPrint(print, commands) {
 }
 
 function stateTold(print) {
-  const { state, share, left_s: left, message, warning } = print.progress;
+  const { state, share, left_s: left, message, warning } = print;
   return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message, warning].filter(Boolean).join(" · ");
 }
 
@@ -95,23 +94,23 @@ function ago(moment_s) {
 }
 
 export function showProgress(print) {
-  const { progress, state, over } = print, old = over || progress.heat_is_old || silence(print);
+  const { is_over: over, state } = print, old = print.heat_is_old || silence(print);
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
-  const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target ? ` of ${target.toFixed(0)}` : ""} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
-  $("run-progress").value = progress.share || 0;
-  if (progress.state === "uploading") return tellIn("run-told", []);
+  const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target ? ` of ${target.toFixed(0)}` : ""} °C${old ? `, as last known ${ago(print.heat_s)}` : ""}`, old ? "old" : ""];
+  $("run-progress").value = print.share || 0;
+  if (state === "uploading") return tellIn("run-told", []);
   hide({ "run-progress": state === IN_HAND });
   tellIn("run-told", [
-    progress.part != null && ["part", of(progress.part, progress.parts)],
-    progress.layer != null && ["layer", of(progress.layer, progress.layers)],
-    heat("nozzle", progress.nozzle_c, progress.nozzle_target_c),
-    heat("bed", progress.bed_c, progress.bed_target_c),
-    Object.keys(progress.at).length && ["position", Object.entries(progress.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
-    (progress.total != null || progress.acknowledged) && ["line", of(progress.acknowledged, progress.total)],
-    [over ? "took" : "so far", duration(progress.elapsed_s)],
-    !over && progress.left_s != null && ["done at", clock(Date.now() / 1000 + progress.left_s)],
+    print.part != null && ["part", of(print.part, print.parts)],
+    print.layer != null && ["layer", of(print.layer, print.layers)],
+    heat("nozzle", print.nozzle_c, print.nozzle_target_c),
+    heat("bed", print.bed_c, print.bed_target_c),
+    Object.keys(print.at).length && ["position", Object.entries(print.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
+    (print.total != null || print.acknowledged) && ["line", of(print.acknowledged, print.total)],
+    [over ? "took" : "so far", duration(print.elapsed_s)],
+    !over && print.left_s != null && ["done at", clock(Date.now() / 1000 + print.left_s)],
   ].filter(Boolean));
-  for (const [id, percent] of [["feed", progress.feed_percent], ["flow", progress.flow_percent]]) {
+  for (const [id, percent] of [["feed", print.feed_percent], ["flow", print.flow_percent]]) {
     if ($(id).dataset.held) continue;
     $(id).value = percent;
     tell({ [`${id}-told`]: `${Math.round(percent)} %` });
@@ -123,12 +122,12 @@ export function showBar(running, looked) {
   const shown = running.includes(looked) ? looked : running.at(-1);
   hide({ "bar-told": !shown, "emergency": !shown, "print-bar": !shown && $("stop-told").hidden });
   if (!shown) return;
-  tell({ "bar-told": `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown) : shown.state}` });
+  tell({ "bar-told": `${shown.name} at ${shown.port}: ${stateTold(shown)}` });
   $("emergency").dataset.print = shown.number;
 }
 
 let model = "", percent = null;
-const heard = new Map(); // state by the number of a print that this page commands
+const heard = new Map(); // whether it runs, by the number of a print that this page commands
 
 const tellTitle = () => { document.title = [percent === null ? "" : `${percent} %`, model, "tiltprint"].filter(Boolean).join(" – "); };
 
@@ -140,7 +139,7 @@ export function titleOfModel(name) {
 
 /** How far the newest print that runs is, in the title; null: none runs. */
 export function titleOfPrints(running) {
-  const share = running.at(-1)?.progress?.share;
+  const share = running.at(-1)?.share;
   percent = running.length && share != null ? Math.floor(100 * share) : null;
   tellTitle();
 }
@@ -152,12 +151,11 @@ export function askToNotify() {
 
 /** Says of prints that this page commands that they are over, where the page itself is not seen. */
 export function notifyOver(prints, page) {
-  for (const { number, holder, state, over, name, sentence } of prints) {
-    const ended = over && LIVE.includes(heard.get(number));
-    if (ended && globalThis.Notification?.permission === "granted" && document.hidden !== false) {
+  for (const { number, holder, is_over: over, is_printing: runs, name, sentence } of prints) {
+    if (over && heard.get(number) && globalThis.Notification?.permission === "granted" && document.hidden !== false) {
       new Notification(`${name}: ${sentence}`, { tag: `${location.pathname} ${number}` });
     }
-    if (holder === page || heard.has(number)) heard.set(number, state);
+    if (holder === page || heard.has(number)) heard.set(number, runs);
   }
 }
 
@@ -171,7 +169,7 @@ export function handPanel(ask) {
 
 export function showHand(print, commands) {
   hide({ "hand-live": print?.state !== IN_HAND || !commands });
-  for (const button of $("hand-jog").children) button.disabled = !print?.progress?.homed;
+  for (const button of $("hand-jog").children) button.disabled = !print?.homed;
 }
 
 const EVERY_MS = 2000;
@@ -187,7 +185,7 @@ export function webcamPanel(print) {
   };
   setInterval(async () => {
     const job = print();
-    if (!job?.webcam || job.over) return forget();
+    if (!job?.webcam || job.is_over) return forget();
     if (asking || document.hidden || $("printing").hidden) return;
     asking = true;
     const answer = await fetch(`prints/${job.number}/webcam`).catch(() => null), picture = answer?.ok ? await answer.blob().catch(() => null) : null;
@@ -210,12 +208,12 @@ addEventListener("pagehide", () => kept.keep({ samples: [...SAMPLES] }));
 /** Keep what is told of the temperatures of prints, once each. */
 export function keepHeats(prints) {
   for (const number of SAMPLES.keys()) if (!prints.some((print) => print.number === number)) SAMPLES.delete(number);
-  for (const { number, progress } of prints) {
-    if (!progress || progress.nozzle_c == null) continue;
+  for (const { number, ...print } of prints) {
+    if (print.nozzle_c == null) continue;
     const own = SAMPLES.get(number) || [];
-    if (own.at(-1)?.at_s === progress.heat_s) continue;
-    own.push({ at_s: progress.heat_s, nozzle: progress.nozzle_c, bed: progress.bed_c, nozzleTarget: progress.nozzle_target_c, bedTarget: progress.bed_target_c });
-    while (own[0].at_s < progress.heat_s - KEPT_S) own.shift();
+    if (own.at(-1)?.at_s === print.heat_s) continue;
+    own.push({ at_s: print.heat_s, nozzle: print.nozzle_c, bed: print.bed_c, nozzleTarget: print.nozzle_target_c, bedTarget: print.bed_target_c });
+    while (own[0].at_s < print.heat_s - KEPT_S) own.shift();
     SAMPLES.set(number, own);
   }
 }
