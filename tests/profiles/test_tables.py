@@ -45,7 +45,9 @@ def test_a_changed_row_is_made_good() -> None:
 
 
 def test_the_page_lists_the_placeholders_that_blocks_may_hold() -> None:
-    listed = {word for row in re.findall(r"^\| (`\{.*?) \|", PLACEHOLDERS, re.MULTILINE) for word in re.findall(r"\{(\w+)\}", row)}
+    listed = {
+        word for row in re.findall(r"^\| (`\{.*?) \|", PLACEHOLDERS, re.MULTILINE) for word in re.findall(r"\{(\w+)\}", row)
+    }
     with pytest.raises(ProfileError, match="placeholder") as caught:
         write_gcode(program_of("empty", ()), load(settings=['machine.gcode.before_layer="{nothing}"']))
     assert listed == set(str(caught.value).partition("allowed are ")[2].split(", "))
