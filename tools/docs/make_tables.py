@@ -18,7 +18,9 @@ AXIS = re.compile(r"(?<=^machine)\.(x|y|z|tilt|turn)\.")
 SHORT = {
     "^a whole number from (.*)": r"\1, whole",
     "^a number (from )?": "",
-    " and up to ": " to ",
+    "above (\\S+) and up to ": r"> \1, ≤ ",
+    r"(-?[\d.]+) to (-?\d)": r"\1–\2",
+    "true or false": "true, false",
     "^(a list of|one of|a|one) ": "",
     '"': "",
 }
