@@ -116,7 +116,7 @@ class Table(Frozen):
 
 
 class Blocks(Frozen):
-    """G-code blocks; {placeholders} are listed in docs/profiles.md."""
+    """G-code blocks; {placeholders} are listed in docs/machines.md."""
 
     start: Block = advanced("Start G-code", "custom script begin", effect=Effect.NONE)(
         ..., "before the first part: homing, heating, priming"

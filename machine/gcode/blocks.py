@@ -79,7 +79,7 @@ def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator
 
 
 def block_values(profile: Profile, block: str) -> dict[str, object]:
-    """The placeholders of a block, in the order of docs/profiles.md, each with an example value."""
+    """The placeholders of a block, in the order of docs/machines.md, each with an example value."""
     if block == RESUME:
         return resume_placeholders(profile.machine, (0.0, 0.0, 0.0), level(profile.machine), 0.0)
     values = placeholders("check", profile, [], 0.0, 0.0)

@@ -15,29 +15,39 @@ from profiles.errors import ProfileError
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys
 from tests.machine.moves import program_of
-from tools.docs.make_tables import PROFILES, page, table
+from tools.docs.harness import DOCS
+from tools.docs.make_tables import KEYS, page, table
 
-TEXT = PROFILES.read_text(encoding="utf-8")
+TEXT = KEYS.read_text(encoding="utf-8")
+PLACEHOLDERS = (DOCS / "machines.md").read_text(encoding="utf-8")
 
 
 def test_the_tables_of_the_page_are_those_of_the_models() -> None:
     assert page(TEXT) == TEXT
 
 
+def axes_of(row: str) -> list[str]:
+    """The axes that share a row: x, y and z of `machine.x\\|y\\|z.limits_mm`; a word of no meaning for a row of one key."""
+    return found[0].split("\\|") if (found := re.search(r"(\w+\\\|)+\w+", row)) else ["alone"]
+
+
 @pytest.mark.parametrize("section", SECTIONS)
 def test_the_page_has_a_row_for_every_key(section: str) -> None:
     rows = re.findall(rf"^\| `({section}\.[^`]*)` \|", TEXT, re.MULTILINE)
-    assert rows == [key for key, _ in keys(SECTIONS[section], f"{section}.")]
+    shown = [re.sub(r"(\w+\\\|)+\w+", axis, row) for row in rows for axis in axes_of(row)]
+    assert sorted(shown) == sorted(key for key, _ in keys(SECTIONS[section], f"{section}."))
 
 
 def test_a_changed_row_is_made_good() -> None:
-    row = "| `process.walls` | number of walls | a whole number from 0 to 50 | `3` |"
+    row = "| `process.walls` | number of walls | 0–50, whole | `3` |"
     assert row in table("process")
     assert page(TEXT.replace(row, "| `process.walls` | legs |")) == TEXT
 
 
 def test_the_page_lists_the_placeholders_that_blocks_may_hold() -> None:
-    listed = {word for row in re.findall(r"^\| (`\{.*?) \|", TEXT, re.MULTILINE) for word in re.findall(r"\{(\w+)\}", row)}
+    listed = {
+        word for row in re.findall(r"^\| (`\{.*?) \|", PLACEHOLDERS, re.MULTILINE) for word in re.findall(r"\{(\w+)\}", row)
+    }
     with pytest.raises(ProfileError, match="placeholder") as caught:
         write_gcode(program_of("empty", ()), load(settings=['machine.gcode.before_layer="{nothing}"']))
     assert listed == set(str(caught.value).partition("allowed are ")[2].split(", "))

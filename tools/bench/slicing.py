@@ -107,13 +107,18 @@ def figures(laid: Print, mesh: Mesh, profile: Profile, layers: int) -> Sequence[
             extrudes & program.rows_of_types(Kind.INNER_WALL.value),
         )
     ]
+    minutes, filament_m = minutes_and_metres(program, profile)
+    thin_m = float(length_mm[extrudes & (program.width_mm > 0.0) & (program.width_mm < THIN_MM - 0.015)].sum()) / 1000.0
+    shares = band_shares(laid, mesh, profile.process.layer_height_mm, layers)
+    return (laid.core_s, minutes, filament_m, retractions, *metres, *shares, thin_m)
+
+
+def minutes_and_metres(program: ParsedProgram, profile: Profile) -> tuple[float, float]:
+    """Printing time and filament of a program by one estimate for all slicers."""
     acceleration = program.remarks.acceleration[program.remark]
     stops = np.zeros(len(program.line), dtype=np.bool_)
     times_s = move_times(program.changes(), program.feed / 60.0, stops, profile.machine, acceleration)
-    filament_m = float(program.e_mm.sum()) / 1000.0
-    thin_m = float(length_mm[extrudes & (program.width_mm > 0.0) & (program.width_mm < THIN_MM - 0.015)].sum()) / 1000.0
-    shares = band_shares(laid, mesh, profile.process.layer_height_mm, layers)
-    return (laid.core_s, float(times_s.sum()) / 60.0, filament_m, retractions, *metres, *shares, thin_m)
+    return float(times_s.sum()) / 60.0, float(program.e_mm.sum()) / 1000.0
 
 
 def band_shares(laid: Print, mesh: Mesh, height_mm: float, layers: int) -> tuple[float, float]:

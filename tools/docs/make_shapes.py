@@ -51,7 +51,13 @@ def channel_block() -> m3.Manifold:
     return block - tube(way, 7.0)
 
 
-SHAPES: dict[str, m3.Manifold] = {"elbow": elbow(), "y30": wye(30.0), "y60": wye(60.0), "channel": channel_block()}
+SHAPES: dict[str, m3.Manifold] = {
+    "elbow": elbow(),
+    "y30": wye(30.0),
+    "y60": wye(60.0),
+    "t": wye(90.0),
+    "channel": channel_block(),
+}
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Make the generated parts of the docs: `python tools/docs/make_tables.py`; tests compare them with the code.
+"""Makes the parts of the docs that follow from code: `python tools/docs/make_tables.py`; tests hold them against the code.
 
-docs/profiles.md: the tables of all keys. docs/serial.md: the states of a conversation with a printer.
+docs/keys.md: the tables of all keys. docs/serial.md: the states of a conversation with a printer, as the sender uses them.
 """
 
 import json
+import re
 from collections import defaultdict
 from typing import Any
 
@@ -12,31 +13,66 @@ from profiles.profile import SECTIONS, load
 from profiles.wording import allowed, keys
 from tools.docs.harness import DOCS, marked
 
-PROFILES, SERIAL = DOCS / "profiles.md", DOCS / "serial.md"
+KEYS, SERIAL = DOCS / "keys.md", DOCS / "serial.md"
+AXIS = re.compile(r"(?<=^machine)\.(x|y|z|tilt|turn)\.")
+SHORT = {
+    "^a whole number from (.*)": r"\1, whole",
+    "^a number (from )?": "",
+    "above (\\S+) and up to ": r"> \1, ≤ ",
+    r"(-?[\d.]+) to (-?\d)": r"\1–\2",
+    "true or false": "true, false",
+    "^(a list of|one of|a|one) ": "",
+    '"': "",
+}
 
 
 def table(section: str) -> str:
-    """A Markdown table of a section's keys: meaning, allowed values, default."""
+    """A Markdown table of a section's keys: the beginning of what each means, what is allowed, the default.
+
+    Rows that differ only in the axis share a line.
+    """
     defaults = getattr(load(), section)
-    lines = ["| key | meaning | must be | default |", "|---|---|---|---|"]
+    rows: dict[tuple[str, ...], list[str]] = defaultdict(list)
     for key, field in keys(SECTIONS[section], f"{section}."):
-        shown = "" if field.is_required() else f"`{json.dumps(field.get_default(), default=str)}`"
-        lines.append(f"| `{key}` | {field.description} | {allowed(field)} | {shown or _given(defaults, key)} |")
+        shown = json.dumps(field.get_default(), default=str) if not field.is_required() else _given(defaults, key)
+        stem = AXIS.sub(".*.", key)
+        rows[stem, _beginning(field.description or ""), _short(allowed(field)), "" if stem != key else shown].append(key)
+    lines = ["| key | meaning | allowed | default |", "|---|---|---|---|"]
+    for (_, meaning, values, shown), names in rows.items():
+        default = f"`{shown}`" if shown and shown != "null" else ""
+        lines.append(f"| {_joined(names)} | {meaning} | {values} | {default} |")
     return "\n".join(lines) + "\n"
 
 
 def _given(model: Any, key: str) -> str:
-    """The default profile's value for a required key; multi-line texts are not repeated."""
+    """What the default profile gives for a key that every profile must give; "" for what does not fit a cell."""
     for step in key.split(".")[1:]:
         model = getattr(model, step)
-    if isinstance(model, str) and "\n" in model:
-        return "given by the file"
     text = json.dumps(model, default=lambda value: value.model_dump())
-    return f"given by the file: `{text}`" if len(text) < 80 else "given by the file"
+    return text if len(text) < 30 else ""
+
+
+def _joined(names: list[str]) -> str:
+    """Keys in one cell: `machine.x.limits_mm`, or `machine.x|y|z.limits_mm` with the bars escaped for Markdown."""
+    axes = "\\|".join(found[1] for name in names if (found := AXIS.search(name)))
+    return f"`{AXIS.sub(f'.{axes}.', names[0]) if axes else names[0]}`"
+
+
+def _beginning(meaning: str) -> str:
+    """A meaning up to its first semicolon, or to a colon or bracket behind three words or more."""
+    found = re.match(r"(?:\S+ ){2}\S+?[^;:(]*(?=[;:(])|[^;]*", meaning)
+    return (found[0] if found else meaning).rstrip()
+
+
+def _short(values: str) -> str:
+    """Allowed values without the words that a column of them repeats."""
+    for long, short in SHORT.items():
+        values = re.sub(long, short, values)
+    return values
 
 
 def diagram() -> str:
-    """The transition table as Markdown: a Mermaid diagram with an arrow for each pair of states, and the meaning of its words."""
+    """The table of states as a Mermaid diagram with an arrow for each pair of states."""
     lines = ["```mermaid", "stateDiagram-v2", f"    [*] --> {next(iter(State)).name}"]
     for state, row in TABLE.items():
         leads: dict[State, list[str]] = defaultdict(list)
@@ -44,8 +80,7 @@ def diagram() -> str:
             leads[target].append(_word(signal))
         lines += [f"    {state.name} --> {target.name}: {', '.join(words)}" for target, words in leads.items()]
     lines += [f"    {state.name} --> [*]" for state, row in TABLE.items() if not row]
-    lines += ["```", "", "| state | |", "|---|---|", *(f"| {state.name} | {state.value} |" for state in State)]
-    lines += ["", "| signal | |", "|---|---|", *(f"| {_word(signal)} | {signal.value} |" for signal in Signal)]
+    lines.append("```")
     return "\n".join(lines) + "\n"
 
 
@@ -54,12 +89,12 @@ def _word(signal: Signal) -> str:
 
 
 def page(text: str) -> str:
-    """A page with updated tables and diagram."""
+    """A page with its tables and its diagram made again."""
     text = marked(text, r"keys of (\w+)", lambda match: table(match[2]))
     return marked(text, "states", lambda match: diagram())
 
 
 if __name__ == "__main__":
-    for file in (PROFILES, SERIAL):
+    for file in (KEYS, SERIAL):
         file.write_text(page(file.read_text(encoding="utf-8")), encoding="utf-8")
         print(f"wrote {file.name}")

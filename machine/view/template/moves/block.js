@@ -1,4 +1,4 @@
-// Block: the page's own bytes (docs/view.md): a header and named arrays behind base64 and deflate.
+// Block: the page's own bytes (docs/page-format.md): a header and named arrays behind base64 and deflate.
 
 const MAGIC = "TILTVW01";
 const HOLDS = { u8: Uint8Array, u16: Uint16Array, i32: Int32Array, f32: Float32Array, f64: Float64Array };
