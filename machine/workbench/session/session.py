@@ -11,7 +11,7 @@ from weakref import finalize
 from machine.pipeline.embedded_profile import settings_inside
 from machine.pipeline.given_plan import with_plan_settings
 from machine.pipeline.project import Project, unpack
-from machine.pipeline.requests import Given
+from machine.pipeline.requests import PLACING, Given
 from machine.workbench.bench.bench import (
     Bench,
     History,
@@ -48,7 +48,6 @@ from profiles.frozen import Effect
 from profiles.profile import Profile
 
 MOST_SESSIONS = 20
-READ_BY = ("process.scale", "process.rotate_deg")  # settings that decide how a model is read
 
 
 @dataclass(frozen=True)
@@ -109,8 +108,8 @@ class Session(SessionBase):
             self.start(tasks.warm())
 
     async def open_model(self, path: Path, name: str, anew: bool = True, plate: int | None = None) -> None:
-        """Put the model of a file on the bench. anew: without the scale and the turns that were set for another one before it;
-        plate: of a slicer file.
+        """Put the model of a file on the bench. anew: without the scale, the turns and the place that were set for the one before
+        it; plate: of a slicer file.
 
         Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
         """
@@ -118,18 +117,9 @@ class Session(SessionBase):
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self.resting.stop()  # it would be waited for
         with self.waiting(f"reading {name}"):
-            bench = self._bench_for(name) if anew else self.bench
+            bench = for_another_model(self.bench) if anew else self.bench
             model = await self._read(path, name, bench.profile, plate, asks=True)
         self.do(f"open {name}", with_model(bench, model))
-
-    def _bench_for(self, name: str) -> Bench:
-        """The bench for a model of a name, without what is set for the reading of another one."""
-        bench = self.bench
-        settings = tuple(setting for setting in bench.given.settings if key_of(setting) not in READ_BY)
-        if bench.model is None or bench.model.name == name or settings == bench.given.settings:
-            return bench
-        given = replace(bench.given, settings=settings)
-        return with_profile(bench, given, profile_as_given(given, bench.profile))
 
     async def open_in_unit(self, *, unit: str) -> None:
         """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
@@ -137,7 +127,7 @@ class Session(SessionBase):
         if waits is None or unit not in waits.units:
             expected = f"one of {', '.join(waits.units)} is expected" if waits else "no model waits for its unit"
             raise PlanError(f"unit is {unit!r}: {expected}")
-        unscaled = self._bench_for(waits.name)
+        unscaled = for_another_model(self.bench)
         given = with_typed(unscaled.given, "process.scale", f"{waits.units[unit]:g}", unscaled.profile)
         scaled = with_profile(unscaled, given, profile_as_given(given, unscaled.profile))
         with self.waiting(f"reading {waits.name}"):
@@ -320,6 +310,15 @@ class Session(SessionBase):
         return model
 
 
+def for_another_model(bench: Bench) -> Bench:
+    """The bench without what was set for the model that lies on it alone."""
+    settings = tuple(setting for setting in bench.given.settings if key_of(setting) not in PLACING)
+    if bench.model is None or settings == bench.given.settings:
+        return bench
+    given = replace(bench.given, settings=settings)
+    return with_profile(bench, given, profile_as_given(given, bench.profile))
+
+
 def _remove_files(*files: Path | None) -> None:
     """Remove the files of a model that is not used any more."""
     for file in filter(None, files):
@@ -355,7 +354,7 @@ class Workbench:
         self.sessions[self._last] = session = self._make(self.pools)
         session.benches = self._benches
         if like is not None:
-            session.history = History(Step("", emptied(like.bench)))
+            session.history = History(Step("", emptied(for_another_model(like.bench))))
         session.listeners.append(self._list_again)
         session.warm()
         self._list_again()

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, with_front, with_profile
 from machine.workbench.session.base import hear_from
-from machine.workbench.session.commands import obey
-from machine.workbench.session.session import Session
+from machine.workbench.session.commands import obey, redo, undo
+from machine.workbench.session.session import Session, Workbench
 from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
 from machine.workbench.work.worker_pool import WorkerPools
@@ -176,21 +176,42 @@ def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
     assert read.name.endswith(" at 2")
 
 
-def test_a_scale_that_was_set_for_a_model_is_not_that_of_the_next_one() -> None:
+SET_FOR_ONE = Given(
+    settings=("process.walls=4", "process.scale=25.4", "process.rotate_deg=[90,0,0]", "process.place_mm=[20.0, 0.0]")
+)
+
+
+@pytest.mark.parametrize("name", ["b", "a"])  # of another file, or of the same one opened again
+def test_a_model_starts_at_its_own_size_way_and_place_whatever_was_set_for_the_one_before(name: str) -> None:
     async def work(session: Session) -> None:
         async def read(task: Any, *given: Any, **more: Any) -> Any:
             return model(f"{given[1]} at {given[2].process.scale:g}") if task.__name__ == "read_model" else ()
 
         session.quick.run = read  # type: ignore[method-assign]
-        set_for_one = Given(settings=("process.walls=4", "process.scale=25.4", "process.rotate_deg=[90,0,0]"))
-        session.do("set", with_profile(session.bench, set_for_one, load(settings=set_for_one.settings)))
-        await session.open_model(Path("b"), "b")
+        session.do("set", with_profile(session.bench, SET_FOR_ONE, load(settings=SET_FOR_ONE.settings)))
+        await session.open_model(Path(name), name)
+        undo(session)
+        assert session.bench.profile.process.scale == 25.4
+        redo(session)
 
     bench = when_done(work).bench
     assert bench.model is not None
-    assert bench.model.name == "b at 1"
+    assert bench.model.name == f"{name} at 1"
     assert (bench.given.settings, bench.profile.process.walls) == (("process.walls=4",), 4)
-    assert (bench.profile.process.scale, bench.profile.process.rotate_deg) == (1.0, (0, 0, 0))
+    process = bench.profile.process
+    assert (process.scale, process.rotate_deg, process.place_mm) == (1.0, (0, 0, 0), (0.0, 0.0))
+
+
+def test_a_further_bench_has_the_settings_of_another_one_but_not_the_scale_of_its_model() -> None:
+    async def opened() -> Given:
+        workbench = Workbench(lambda pools: Session(load(), Given(), pools))
+        first = workbench.sessions[workbench.open()]
+        first.do("open a", Bench(load(settings=SET_FOR_ONE.settings), model("a"), given=SET_FOR_ONE))
+        given = workbench.sessions[workbench.open(first)].bench.given
+        await workbench.close_all()
+        return given
+
+    assert asyncio.run(opened()).settings == ("process.walls=4",)
 
 
 def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_told_later() -> None:
