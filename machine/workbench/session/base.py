@@ -63,9 +63,9 @@ class SessionBase(Observable):
     executed at a time, and nothing else changes the bench meanwhile.
 
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
-    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; stopped: what became
-    of work that was stopped last; quick, long, hand: its tasks in the pools; received: the files of its pages; followers: called
-    after every change of the bench.
+    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the
+    last command has changed beside what it was for; quick, long, hand: its tasks in the pools; received: the files of its pages;
+    followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -73,7 +73,7 @@ class SessionBase(Observable):
         self.history = History(Step("", bench))
         self.problems: dict[str, str] = {}
         self.answers: dict[str, str] = {}
-        self.busy = self.stopped = ""
+        self.busy = self.note = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
         self.turn = asyncio.Lock()  # first come, first served
@@ -145,22 +145,25 @@ class SessionBase(Observable):
         self.notify()
 
     def do(self, word: str, bench: Bench, lost: str = "") -> None:
-        """Take a further step, which can be undone. lost: what it has taken away, beside what its step says itself."""
+        """Take a further step, which can be undone. lost: what it has removed, beside what its step says itself."""
         self.advance(self.history.do(word, bench), lost)
 
     def advance(self, history: History, lost: str = "") -> None:
-        """Go on with another history; a step forth tells what it has taken away."""
+        """Go on with another history; a step forth tells what it has removed."""
         forth = history.before[-1:] == (self.history.now,)
         self.problems.clear()  # they told of what lay there before
-        self.stopped = ""
+        self.note = ""
         for sentence in (lost, history.now.lost if forth else ""):
-            self.add_problem(sentence)
+            self.add_note(sentence)
         self.become(history)
 
     def add_problem(self, sentence: str) -> None:
         """Tell a sentence beside what is told already."""
-        if sentence:
-            self._tell_problem("; ".join(filter(None, (self.problems.get(asking.get(), ""), sentence))))
+        self._tell_problem("; ".join(filter(None, (self.problems.get(asking.get(), ""), sentence))))
+
+    def add_note(self, sentence: str) -> None:
+        """Tell all pages what has changed, beside what they are told already."""
+        self.note = "; ".join(filter(None, (self.note, sentence)))
 
     def _tell_problem(self, sentence: str) -> None:
         page = asking.get()

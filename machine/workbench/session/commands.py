@@ -135,7 +135,7 @@ def obey(session: Session, asked: Asked) -> None:
     """Have done what a page asks for, `{"do": NAME, ...}`, after all that was asked for before. Raises PlanError for what is no
     command; why it cannot be done the page is told later, by the name `ask` of its command."""
     session.forget_problem()
-    session.stopped = ""
+    session.note = ""
     name, arguments = read_command(asked, COMMANDS)
     act: Callable[[], Work] = partial(perform, session, name, arguments)
     if name == "stop":  # what is to be stopped ends at once, whatever its bench is busy with

@@ -137,7 +137,7 @@ class Slicing(Derived[Slices]):
 
     def interrupted(self) -> None:
         """Tell the pages."""
-        self._session.add_problem(ENDED)
+        self._session.add_note(ENDED)
 
     async def _slice(self, bench: Bench) -> Slices:
         walls: dict[int, bytes] = {}

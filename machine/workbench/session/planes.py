@@ -1,7 +1,7 @@
 """Planes: how the model on a bench stands and rests, and planes on it: prepared as soon as a model lies there, tried while they
 are in a person's hand, taken when they can be cut."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import count
@@ -9,7 +9,7 @@ from math import hypot, inf
 from typing import Any
 
 from machine.workbench.bench.bench import Bench, with_cuts, with_zones
-from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, snap
+from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, planned_part, snap
 from machine.workbench.bench.values import Asked, vector_of
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.work.cutting import load_kernels, make_ready, near_neck, nearest, try_cuts
@@ -209,22 +209,28 @@ class PlaneTrials:
     async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
         """Take other zones; planes that they forbid go, and the reason is told. word: for the step in the history. Raises
         PlanError for what makes no sense, and where a plane that would go is locked."""
-        before, removed = self._session.bench, list[str]()
-        bench = with_zones(before, await self._session.quick.run(mark, before, marking))
+        before = self._session.bench
+        marked = with_zones(before, await self._session.quick.run(mark, before, marking))
+        bench, removed = await self.without_invalid(marked)
+        for part, reason in removed.items():
+            if planned_part(before, part) in before.locked:
+                raise PlanError(f"the plane of part {part} is locked and would be in the way: {reason}")
+        self._session.do(word, bench, removed_in_words(removed))
+
+    async def without_invalid(self, bench: Bench) -> tuple[Bench, dict[int, str]]:
+        """A bench with those of its planes that can be cut, and the reasons why others cannot, by the numbers of their parts."""
+        numbers, removed = list(range(2, bench.parts + 1)), dict[int, str]()
         while bench.cuts:
             trial = await self.attempt(bench, bench.cuts)
             if not trial.rejected:
                 break
-            part = bench.cuts[trial.rejected_part - 2]
-            if part in bench.locked:
-                raise PlanError(f"the plane of part {trial.rejected_part} is locked and would be in the way: {trial.rejected}")
-            removed.append(trial.rejected)
-            bench = with_cuts(bench, tuple(cut for cut in bench.cuts if cut is not part))
-        self._session.do(word, bench, _removed_in_words(word, removed))
+            index = trial.rejected_part - 2
+            removed[numbers.pop(index)] = trial.rejected
+            bench = with_cuts(bench, (*bench.cuts[:index], *bench.cuts[index + 1 :]))
+        return bench, removed
 
 
-def _removed_in_words(word: str, reasons: Sequence[str]) -> str:
-    if not reasons:
-        return ""
-    planes = "a plane was" if len(reasons) == 1 else f"{len(reasons)} planes were"
-    return f"{word}: {planes} taken away: {'; '.join(dict.fromkeys(reasons))}"
+def removed_in_words(removed: Mapping[int, str]) -> str:
+    """Which cuts were removed and why, as a sentence; "" for none. removed: reasons by the numbers of their parts."""
+    sentences = "; ".join(f"the cut of part {part} was removed: {reason}" for part, reason in removed.items())
+    return sentences and f"{sentences} (Undo brings {'it' if len(removed) == 1 else 'them'} back)"

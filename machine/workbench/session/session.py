@@ -17,7 +17,6 @@ from machine.workbench.bench.bench import (
     History,
     Step,
     emptied,
-    with_cuts,
     with_model,
     with_model_turned_as_read,
     with_plan,
@@ -31,7 +30,7 @@ from machine.workbench.bench.settings import check_block, key_of, profile_as_giv
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.long_work import Comparing, Finding, Slicing, prices_of
-from machine.workbench.session.planes import PlaneTrials, Readiness, resting_of, standing_of
+from machine.workbench.session.planes import PlaneTrials, Readiness, removed_in_words, resting_of, standing_of
 from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled, read_model
@@ -238,7 +237,7 @@ class Session(SessionBase):
         before = self.bench
         given = change(before.given)
         check_block(profile_as_given(given, before.profile), key)
-        bench, refused = await self._with_profile(word, before, given)
+        bench, refused = await self._with_profile(before, given)
         if given != before.given:
             self.do(word, bench, refused)
 
@@ -271,13 +270,13 @@ class Session(SessionBase):
 
         def tell() -> None:
             found = [self.finding.take_best(bench, search)] if search is not None or "search" in waiting else []
-            self.stopped = " ".join([*found, *words])
+            self.add_note(" ".join([*found, *words]))
 
         return tell
 
-    async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
-        """A bench with another profile; planes that it forbids go, with the reason, so do rows of the front that cannot be cut at
-        another place on the plate, and a model that it scales or turns otherwise is read again."""
+    async def _with_profile(self, before: Bench, given: Given) -> tuple[Bench, str]:
+        """A bench with another profile; planes that it forbids go, and a sentence says why; so do rows of the front that
+        cannot be cut at another place on the plate, and a model that it scales or turns otherwise is read again."""
         bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
@@ -291,12 +290,10 @@ class Session(SessionBase):
         if effect == Effect.REACH and bench.rows:
             rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
             bench = with_rows(bench, rows)
-        if bench.cuts is not None and effect >= Effect.REACH:
-            trial = await self.trials.attempt(bench, bench.cuts)
-            if trial.rejected:
-                why = f"{word}: the planes were taken away, for part {trial.rejected_part} cannot be cut off: {trial.rejected}"
-                return replace(with_cuts(bench, ()), cuts=None), why
-        return bench, ""
+        if bench.cuts is None or effect < Effect.REACH:
+            return bench, ""
+        bench, removed = await self.trials.without_invalid(bench)
+        return bench if bench.cuts else replace(bench, cuts=None), removed_in_words(removed)
 
     async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
         """The model of a file, whose mesh stays as long as anybody has it. asks: where its size is none that a printer makes, the

@@ -145,7 +145,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "problems": session.problems,
         "answers": session.answers,
         "busy": session.busy,
-        "stopped": session.stopped,
+        "note": session.note,
         "preparing": bool(session.readiness.progress),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": terminal_words(history.now.word) if history.before else "",

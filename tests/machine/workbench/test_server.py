@@ -355,16 +355,18 @@ def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbi
         bench.send(folder / "tee.stl")
         page.do("add", normal=[1, 0, 0], offset_mm=8.0)
         page.until(lambda state: state["parts"] == 2)
+        page.do("add", normal=[0, 0, 1], offset_mm=20.0, after=1)
+        page.until(lambda state: state["parts"] == 3)
         page.do("set", key="process.walls", value="400")
         assert "Walls is 400" in page.until(lambda state: state["problem"])["problem"]
         page.do("profile", kind="machine", name="three_axis")
-        gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["problem"])
-        assert gone["parts"] == 0
-        assert "the planes were taken away, for part 2 cannot be cut off: " in gone["problem"]
+        gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["note"])
+        assert ([cut["offset_mm"] for cut in gone["cuts"]], gone["problem"]) == ([20.0], "")
+        assert gone["note"].startswith("the cut of part 3 was removed: ")
         page.do("undo")
-        page.until(lambda state: state["parts"] == 2 and state["given"]["machine"] == "generic_ac")
+        page.until(lambda state: state["parts"] == 3 and state["given"]["machine"] == "generic_ac")
         page.do("set", key="process.scale", value="2")
-        assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 2  # the planes go along
+        assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 3  # the planes go along
         page.do("undo")
 
 

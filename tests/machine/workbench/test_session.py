@@ -24,7 +24,7 @@ from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
-from profiles.messages import key_name, option
+from profiles.messages import option
 from profiles.profile import Profile, load
 from tests.machine.workbench.models import model
 
@@ -245,7 +245,7 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
 
     session = when_done(work)
     assert [stop.at for stop in session.bench.stops] == ["1:3"]
-    assert session.problem.startswith(
+    assert session.note.startswith(
         f"turn the model: taken away with part 2: {option('pause', '2:8.4mm')} (Undo brings it back); slicing has ended"
     )
 
@@ -256,7 +256,7 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
         await asyncio.sleep(0)
         obey(session, {"do": "turn", "axis": "x", "deg": 90})
         await asyncio.sleep(0)
-        assert session.problem.startswith("slicing has ended")
+        assert session.note.startswith("slicing has ended")
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
         assert session.slicing.progress is not None
@@ -341,8 +341,9 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
         async def answer(task: Any, *given: Any, **more: Any) -> Any:
             if task.__name__ != "try_cuts":
                 return Standing((40.0, 8.0, 40.0), 0.0, "") if task.__name__ == "stand" else None
-            far = given[1].profile.process.place_mm[0] > 50.0 and any(cut.offset_mm > 20.0 for cut in given[2])
-            return Trial((), 3, "Z would go too far") if far else Trial(())
+            far = [part for part, cut in enumerate(given[2], start=2) if cut.offset_mm > 20.0]
+            is_there = given[1].profile.process.place_mm[0] > 50.0 and far
+            return Trial((), far[0], "Z would go too far") if is_there else Trial(())
 
         async def price(task: Any, bench: Bench, row: int, **more: Any) -> Any:
             return bench.rows[row]
@@ -352,13 +353,12 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
         for x in (30, 60):
             obey(session, {"do": "set", "key": "process.place_mm", "value": f"[{x}, 0]"})
             await settled(session)
-            cut.append((session.bench.parts, len(session.bench.rows), session.problem))
+            cut.append((session.bench.parts, len(session.bench.rows), session.note))
         obey(session, {"do": "undo"})
 
     cut: list[tuple[int, int, str]] = []
     session = when_done(work)
-    why = f"set {key_name('process.place_mm')}: the planes were taken away, for part 3 cannot be cut off: Z would go too far"
-    assert cut == [(3, 3, ""), (0, 2, why)]
+    assert cut == [(3, 3, ""), (2, 2, "the cut of part 2 was removed: Z would go too far (Undo brings it back)")]
     assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
 
 
@@ -373,10 +373,10 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
             session.finding.progress = Searched("stage 1", best)
             obey(session, {"do": "stop"})
             await asyncio.sleep(0)
-            told.append(session.stopped)
+            told.append(session.note)
             await settled(session)
         obey(session, {"do": "dismiss"})
-        told.append(session.stopped)
+        told.append(session.note)
 
     when_done(work)
     assert told == [
@@ -417,9 +417,9 @@ def test_a_stop_ends_the_search_at_once_though_a_command_before_it_is_still_exec
         assert is_seeking(session)
         async with session.turn:
             obey(session, {"do": "stop"})
-            assert (is_seeking(session), session.stopped) == (False, "")
+            assert (is_seeking(session), session.note) == (False, "")
 
-    assert when_done(work).stopped == "The search was stopped before it had cut anything: all is as it was."
+    assert when_done(work).note == "The search was stopped before it had cut anything: all is as it was."
 
 
 def test_a_stop_reaches_work_that_still_waits_for_its_turn() -> None:
@@ -429,7 +429,7 @@ def test_a_stop_reaches_work_that_still_waits_for_its_turn() -> None:
                 obey(session, {"do": name})
         await settled(session)
         assert (is_seeking(session), session.slicing.progress, session.slicing.number) == (False, None, 0)
-        stopped.append(session.stopped)
+        stopped.append(session.note)
         obey(session, {"do": "slice"})
 
     stopped: list[str] = []

@@ -39,7 +39,7 @@ function main() {
   tabsOf((tab) => update({ tab }));
   const restoreLook = keptLook(camera, picture);
   onState(tellState);
-  onState(({ stopped }) => notice(stopped, "stopped"));
+  onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
   const panels = [problemLine, elapsedTimes, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
