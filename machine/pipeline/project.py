@@ -90,7 +90,8 @@ class Project:
     them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
     parts: 0 where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the
     print waits for a person; marks_in_plan: the plan has the boxes that the model's own file marks; figures: of the print,
-    for people and other programs; plate: of the model where that is a slicer file.
+    for people and other programs; plate: of the model where that is a slicer file; recommended: how many parts the search would
+    take, 0: there was none.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Project:
     written_s: float = 0.0
     plate: int | None = None
     marks_in_plan: bool = False
+    recommended: int = 0
 
     def applied(self, request: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
         """A request for the model inside: the project decides what the command line leaves open.
@@ -177,6 +179,7 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
         copies=project.copies,
         plate=project.plate,
         marks_in_plan=project.marks_in_plan,
+        recommended=project.recommended,
         figures=project.figures,
     )
     write_whole(folder / RECORD, record.model_dump_json().encode())
@@ -284,6 +287,7 @@ def _project_of(folder: Path, record: Record) -> Project:
         stops=record.stops,
         copies=record.copies,
         marks_in_plan=record.marks_in_plan,
+        recommended=record.recommended,
         plate=record.plate,
         own_names=own_names,
         figures=record.figures,

@@ -22,10 +22,9 @@ ENDED = "slicing has ended, for what lies on the workbench is another now: slice
 class Finding(Derived[Found]):
     """A search ends whose model is gone or lies otherwise, or whose settings, marks or locked planes are others now.
 
-    notes: of the last one; laid: how it found the model turned, and how it has turned it."""
+    laid: how it found the model turned, and how it has turned it."""
 
     def __init__(self, session: SessionBase) -> None:
-        self.notes: tuple[str, ...] = ()
         self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
         self._how = True, CLASSIC
         super().__init__(
@@ -58,10 +57,10 @@ class Finding(Derived[Found]):
         return f"The search was stopped, and the best so far is taken: {best.parts} parts."
 
     def _accept_found(self, found: Found) -> None:
-        self.notes, now = found.notes, self._session.bench
+        now = self._session.bench
         laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
         self.laid = None if laid is now else (now.rotation, laid.rotation)
-        self._session.do("find parts", with_front(laid, found.front))
+        self._session.do("find parts", with_front(laid, found.front, found.notes))
 
 
 def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:

@@ -20,6 +20,7 @@ from machine.workbench.bench.bench import (
     with_model,
     with_model_turned_as_read,
     with_plan,
+    with_prices,
     with_profile,
     with_rotation,
     with_rows,
@@ -118,7 +119,11 @@ class Session(SessionBase):
         with self.waiting(f"reading {name}"):
             bench = for_another_model(self.bench) if anew else self.bench
             model = await self._read(path, name, bench.profile, plate, asks=True)
-        self.do(f"open {name}", with_model(bench, model))
+        await self._replace(f"open {name}", with_model(bench, model))
+
+    async def _replace(self, word: str, bench: Bench) -> None:
+        """Take other work onto the bench, after what lies there is kept."""
+        self.do(word, bench, await self.keeping.put_away())
 
     async def open_in_unit(self, *, unit: str) -> None:
         """Put the model on the bench for whose unit the pages were asked, scaled as that says. Raises UserError."""
@@ -132,7 +137,7 @@ class Session(SessionBase):
         with self.waiting(f"reading {waits.name}"):
             model = await self._read(waits.path, waits.name, scaled.profile)
         self.unscaled = None
-        self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
+        await self._replace(f"open {waits.name} in {unit}", with_model(scaled, model))
 
     async def open_plate(self, *, plate: int) -> None:
         """Put another plate of the slicer file on the bench there. Raises UserError."""
@@ -180,7 +185,7 @@ class Session(SessionBase):
         Raises UserError; the folder stays as it is then.
         """
         async with self.keeping.opening(folder):
-            self.do(word, await self._bench_of(project))
+            await self._replace(word, await self._bench_of(project))
 
     async def _bench_of(self, project: Project) -> Bench:
         """A bench with a project on it. Raises UserError."""
@@ -202,7 +207,8 @@ class Session(SessionBase):
                 bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
         locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
-        return replace(bench, locked=locked, stops=project.stops, copies=project.copies)
+        bench = replace(bench, locked=locked, stops=project.stops, copies=project.copies)
+        return with_prices(replace(bench, recommended=project.recommended), {}) if bench.rows else bench
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""
@@ -217,7 +223,7 @@ class Session(SessionBase):
         with self.waiting(f"cutting by {plan.name}"):
             profile = with_plan_settings(bench.profile.of_all_parts, plan)
             rows = await self.quick.run(measure_plan, bench, plan)
-        self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
+        await self._replace(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
     async def make(self, word: str, task: Callable[..., Value], *given: Any) -> Value:
         """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""

@@ -174,7 +174,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "refused": _refused(session),
         "units": _units(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
-        "notes": session.finding.notes if bench.rows else (),
+        "notes": bench.notes if bench.rows else (),
         "laid": _laid(session),
         "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
@@ -186,6 +186,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "benches": session.benches,
+        "kept": session.keeping.released,
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }

@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from shlex import split
+from typing import Any
 
 import manifold3d as m3
 import numpy as np
@@ -20,6 +21,8 @@ from mdp.save import stl
 from tests.machine.running_workbench import PATIENCE_S, QUICK, Running, is_there, workbench
 from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import box, tee
+
+FOUND = ("front", "recommended", "cuts")
 
 
 @pytest.fixture(scope="module")
@@ -368,6 +371,45 @@ def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbi
         page.do("set", key="process.scale", value="2")
         assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 3  # the planes go along
         page.do("undo")
+
+
+def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as_it_was_when_it_is_opened_again(
+    bench: Running, folder: Path
+) -> None:
+    (folder / "own.stl").write_bytes(stl(tee()))
+    (folder / "next.stl").write_bytes(stl(box(10.0, 10.0, 10.0)))
+    origin = f"http://127.0.0.1:{bench.port}"
+
+    def name_of(state: dict[str, Any]) -> str | None:
+        return state["model"] and str(state["model"]["name"])
+
+    def kept() -> list[dict[str, Any]]:
+        return [work for work in json.loads(bench.ask("kept")[1]) if work["name"] == "own.stl"]
+
+    with bench.line() as page:
+        bench.send(folder / "own.stl")
+        page.do("search", orient=False)
+        searched = page.until(lambda state: name_of(state) == "own.stl" and state["front"] and not state["search"])
+        assert searched["recommended"] == 2
+        before = page.state["kept"]
+        bench.send(folder / "next.stl")  # at once, before the autosave
+        opened = page.until(lambda state: name_of(state) == "next.stl")
+        assert opened["note"] == "own.stl, cut into 2 parts, is kept under Earlier work (Undo brings it back)"
+        assert opened["kept"] > before
+        page.do("undo")
+        assert page.until(lambda state: name_of(state) == "own.stl")["parts"] == 2
+        page.do("redo")
+        page.until(lambda state: name_of(state) == "next.stl")
+        (work,) = [work for work in kept() if work["parts"] == 2][-1:]
+        assert bench.ask(f"kept/{work['key']}", "POST", Origin=origin)[0] == 200
+        again = page.until(lambda state: name_of(state) == "own.stl")
+        assert {key: again[key] for key in FOUND} == {key: searched[key] for key in FOUND}
+        bench.send(folder / "next.stl")
+        page.until(lambda state: name_of(state) == "next.stl")
+        for work in kept():
+            assert bench.ask(f"kept/{work['key']}", "DELETE", Origin=origin)[0] == 200
+        assert kept() == []
+        assert bench.ask("kept/nothing", "DELETE", Origin=origin)[0] == 422
 
 
 def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:

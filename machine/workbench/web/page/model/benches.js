@@ -40,16 +40,16 @@ function benchRow({ number, name, parts, work }) {
 
 export function benchesPanel() {
   listen("click", { another: () => openBench() });
-  offer("kept");
+  onNew(({ kept, benches }) => [kept, benches.map(({ number, name }) => [number, name])], () => offer("kept"));
   onNew(({ benches }) => benches, (benches) => {
     hide({ benches: benches.length < 2 });
     putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
   });
 }
 
-const OFFERS = {
-  kept: ["kept-works", ({ kept, name, parts, written_s: written }) => [kept, `Work of ${moment(written)}`, name ? `${name}${parts ? `, ${partsInWords(parts)}` : ""}` : "cannot be read here"]],
-  left: ["left-files", ({ number, name, bytes, written_s: written }) => [number, name, `${Math.ceil(bytes / 1000).toLocaleString("en")} kB, ${moment(written)}`]],
+const OFFERS = { // most: models that are listed, until all of them are asked for
+  kept: { list: "kept-works", most: 5, wordsOf: ({ parts, written_s: written }) => [parts ? partsInWords(parts) : "uncut", moment(written)] },
+  left: { list: "left-files", most: 5, wordsOf: ({ bytes, written_s: written }) => [`${Math.ceil(bytes / 1000).toLocaleString("en")} kB`, moment(written)] },
 };
 
 function moment(seconds) {
@@ -57,14 +57,27 @@ function moment(seconds) {
   return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 }
 
-/** What is there from earlier: work that was kept, or files that a workbench has left which was killed. */
+/** What is there from earlier, by its models, the newest first: work that was kept, or files that a workbench has left which was killed. */
 export async function offer(what) {
-  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, inWords] = OFFERS[what];
+  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], models = new Map();
+  for (const one of found) models.set(one.name, [...(models.get(one.name) || []), one]);
+  const rows = [...models].map(([name, several]) => ({ id: name, told: JSON.stringify(several), make: () => modelRow(what, several) }));
+  const { list, most } = OFFERS[what], showAll = () => { OFFERS[what].most = Infinity; offer(what); };
+  const all = { id: "/all", told: `${rows.length}`, make: () => made("li", {}, button(`Show all ${rows.length}`, showAll)) };
   hide({ [`${what}-field`]: !found.length });
-  $(list).replaceChildren(...found.map((one) => {
-    const [name, title, words] = inWords(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
-    return button("", open, {}, made("span", { text: title }), made("small", { text: words }));
-  }));
+  putRows(rows.length > most ? [...rows.slice(0, most), all] : rows, $(list));
+}
+
+/** The newest of a model's name; older ones on demand. */
+function modelRow(what, [newest, ...older]) {
+  const rows = () => made("ul", { className: "offers" }, ...older.map((one) => made("li", {}, ...offerRow(what, one))));
+  return made("li", {}, ...offerRow(what, newest), ...(older.length ? [made("details", {}, made("summary", { text: `${older.length} older` }), rows())] : []));
+}
+
+/** Its buttons: it is opened, or removed; a refusal comes by the line. */
+function offerRow(what, one) {
+  const name = one.name || "cannot be read here", words = OFFERS[what].wordsOf(one).join(", "), act = (method) => () => fetch(`${what}/${one.key}`, { method }).then(() => offer(what), () => {});
+  return [button("", act("POST"), {}, made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE"))];
 }
 
 const PAIRED = "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself.";
