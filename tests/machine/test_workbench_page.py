@@ -164,6 +164,26 @@ def test_a_model_of_a_size_that_no_printer_makes_is_asked_for_its_unit_and_opene
     browser.wait("$('title').textContent === 'tee.stl' && $('scale').value === '100'")
 
 
+def test_a_file_that_is_sent_slowly_is_seen_to_be_under_way_and_may_be_broken_off(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    slowly = {"offline": False, "latency": 0, "downloadThroughput": -1}
+    browser._send("Network.emulateNetworkConditions", **slowly, uploadThroughput=100_000)
+    try:
+        browser.value(
+            """{ const chosen = new DataTransfer();
+            chosen.items.add(new File([new Uint8Array(3e6)], "large.stl"));
+            $('file').files = chosen.files;
+            $('file').dispatchEvent(new Event('change')); }"""
+        )
+        browser.wait("!$('sending').hidden && $('sending-bar').value > 0")
+        assert browser.value("/^Sending large.stl: [0-9.]+ of 3.0 MB$/.test($('sending-told').textContent)")
+        browser.click("#sending-cancel")
+        browser.wait("$('sending').hidden")
+    finally:
+        browser._send("Network.emulateNetworkConditions", **slowly, uploadThroughput=-1)
+    assert browser.value("[$('title').textContent, $('problem').hidden]") == ["tee.stl", True]
+
+
 LEFT = [(n, f"{'abcdefga'[n]}.stl") for n in range(8)]  # the last one is an older a.stl
 
 

@@ -150,7 +150,14 @@ def test_a_page_of_a_workbench_that_hangs_waits_for_it(browser: Browser) -> None
         try:
             browser.value("{ window.whyUnanswered = modules['page/line'].whyUnanswered; window.why = whyUnanswered(); }")
             assert browser.value("window.why") == "lost"
+            browser.wait("document.documentElement.dataset.line === 'silent'")
+            assert browser.value("[$('notice').textContent, $('demo').matches(':disabled'), $('save').disabled]") == [
+                "tiltprint does not answer; waiting for it.",
+                True,
+                True,
+            ]
         finally:
             running.process.send_signal(signal.SIGCONT)
         assert browser.value("whyUnanswered()") == "lost"  # it answers, so a line will open
-        assert browser.value("document.documentElement.dataset.line") == "open"
+        browser.wait("document.documentElement.dataset.line === 'open' && !$('demo').matches(':disabled')")
+        assert browser.value("$('notice').hidden")

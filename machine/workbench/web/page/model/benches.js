@@ -22,14 +22,24 @@ async function openBench(model = null) {
     notice("The browser opens no further page by itself: the new bench is in the list.", "benches");
     setTimeout(() => notice("", "benches"), TOLD_MS);
   }
-  if (model) await sendFile(model, `../${told.number}/`);
+  if (model) await sendFile(model, `../${told.number}/`, tellSending);
 }
 
 /** What a person has dropped or chosen: the first model, and plans after it, for this bench; every further model on a bench of its own. */
 export async function takeFiles(files) {
   const isPlan = ({ name }) => name.toLowerCase().endsWith(".toml"), [first = [], ...further] = files.filter((file) => !isPlan(file));
   further.forEach((model) => openBench(model));
-  for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
+  for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file, "", tellSending);
+}
+
+/** How much of a file is sent, with a button that breaks it off. */
+function tellSending(sending) {
+  hide({ sending: !sending });
+  if (!sending) return;
+  const { file, loaded, total, abort } = sending, mb = (bytes) => (bytes / 1e6).toFixed(1);
+  Object.assign($("sending-bar"), { value: loaded, max: total });
+  tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
+  $("sending-cancel").onclick = abort;
 }
 
 function benchRow({ number, name, parts, work }) {
