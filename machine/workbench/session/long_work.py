@@ -9,10 +9,11 @@ import numpy as np
 from machine.program import Alternative
 from machine.workbench.bench.bench import Bench, locked_plan, rows_to_price, with_front, with_prices, with_rotation
 from machine.workbench.session.base import WAITING, Derived, SessionBase
-from machine.workbench.work.cutting import Found, Searched, find_parts, price_row
+from machine.workbench.work.cutting import Found, Searched, find_parts, price_cuts, price_row
 from machine.workbench.work.slices import Sliced, SlicesSoFar, compare_bench, slice_bench
 from mdp.decomposition import FrontRow
 from mdp.ranking.ranker import CLASSIC
+from mdp.search.plan_file import planned_parts
 from profiles.errors import PlanError, UserError
 from profiles.frozen import Vector
 
@@ -83,6 +84,21 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
         session, lambda bench: None if bench.priced else (bench.sought, bench.rows, bench.locked), price, accept=accept
     )
     return prices_now
+
+
+def price_by_hand(session: SessionBase) -> Derived[FrontRow | None]:
+    """The row of planes that a person has changed since they were found; None where they cannot be cut."""
+
+    def decides(bench: Bench) -> tuple[object, ...] | None:
+        is_found = bench.cuts is None or any(planned_parts(row) == bench.cuts for row in bench.rows)
+        return None if is_found or not bench.rows else (bench.sought, bench.cuts, bench.locked)
+
+    async def price(bench: Bench) -> FrontRow | None:
+        with suppress(UserError):
+            return await session.long.run(price_cuts, bench)
+        return None
+
+    return Derived(session, decides, price)
 
 
 @dataclass(frozen=True, eq=False)

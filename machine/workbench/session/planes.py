@@ -122,7 +122,8 @@ class Refused:
 
 
 class PlaneTrials:
-    """trial: of the planes that were tried last, and the bench that they were tried on. refused: those that were refused last."""
+    """trial: of the planes that were tried last, and the bench that they were tried on. refused: those that were refused last.
+    uncut: the area that needs support in one piece, mm2."""
 
     def __init__(self, session: SessionBase, readiness: Readiness) -> None:
         self.trial: tuple[Bench, Cuts, Trial] | None = None
@@ -130,6 +131,7 @@ class PlaneTrials:
         self._session, self._readiness = session, readiness
         self._held: Cuts | None = None  # by a person's hand
         self._figures = Derived(session, self._to_try, self._try)
+        self.uncut = Derived(session, self._uncut, self._try_uncut)
         session.followers.append(self.settle)
 
     def hold(self, cuts: Cuts) -> None:
@@ -205,6 +207,14 @@ class PlaneTrials:
             if self.trial is not tried:
                 return
             self.trial = tried = bench, cuts, trial
+
+    def _uncut(self, bench: Bench) -> tuple[object, ...] | None:
+        """What decides which area needs support in one piece; None where it is not worked out by itself."""
+        return None if bench.model is None or bench.model.faces > MANY_FACES else bench.sought
+
+    async def _try_uncut(self, bench: Bench) -> float | None:
+        await self._readiness.wait()
+        return (await self.attempt(bench, ())).support_area_mm2
 
     async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
         """Take other zones; planes that they forbid go, and the reason is told. word: for the step in the history. Raises

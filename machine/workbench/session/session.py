@@ -30,7 +30,7 @@ from machine.workbench.bench.model import Model
 from machine.workbench.bench.settings import check_block, key_of, profile_as_given, with_given, with_typed
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.session.keeping import Keeping
-from machine.workbench.session.long_work import Comparing, Finding, Slicing, prices_of
+from machine.workbench.session.long_work import Comparing, Finding, Slicing, price_by_hand, prices_of
 from machine.workbench.session.planes import PlaneTrials, Readiness, removed_in_words, resting_of, standing_of
 from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
@@ -71,7 +71,7 @@ class Session(SessionBase):
         self.slicing, self.readiness = Slicing(self), Readiness(self)
         self.standing, self.resting = standing_of(self), resting_of(self, self.readiness)
         self.trials = PlaneTrials(self, self.readiness)
-        self.finding, self._prices = Finding(self), prices_of(self)
+        self.finding, self._prices, self.by_hand = Finding(self), prices_of(self), price_by_hand(self)
         self.comparing = Comparing(self, self.slicing)
         self.pieces = Derived(self, lambda bench: bench.shaped, self._draw_pieces, by_itself=False)
         self.keeping = Keeping(self)

@@ -412,6 +412,30 @@ def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as
         assert bench.ask("kept/nothing", "DELETE", Origin=origin)[0] == 422
 
 
+def test_figures_and_the_list_of_orientations_follow_what_a_hand_does(bench: Running, folder: Path) -> None:
+    (folder / "hand.stl").write_bytes(stl(tee()))
+    with bench.line() as page:
+        bench.send(folder / "hand.stl")
+        page.until(lambda state: state["model"] and state["model"]["name"] == "hand.stl" and state["resting"])
+        assert [rest["words"] for rest in page.state["resting"] if rest["present"]] == ["as in the file"]
+        page.do("search", orient=False)
+        page.until(lambda state: state["front"] and not state["search"] and state["needing_mm2"] is not None)
+        whole, cut = page.state["front"]
+        assert page.state["needing_mm2"] == whole["support_area_mm2"]  # one number on both tabs
+        assert page.state["by_hand"] is None
+        (plane,) = page.state["cuts"]
+        page.do("move", part=2, normal=plane["normal"], offset_mm=plane["offset_mm"] - 5.0)
+        moved = page.until(lambda state: state["undo"] == "move a plane")
+        assert moved["by_hand"] is None  # not known yet, rather than that of the planes before
+        by_hand = page.until(lambda state: state["by_hand"])["by_hand"]
+        assert (by_hand["parts"], by_hand["planes"]) == (2, moved["cuts"])
+        assert by_hand["time_s"] != cut["time_s"]
+        page.do("turn", axis="x", deg=30)
+        turned = page.until(lambda state: state["undo"] == "turn the model" and state["overhang_mm2"] is not None)
+        (present,) = (rest for rest in turned["resting"] if rest["present"])
+        assert (present["words"], present["overhang_mm2"]) == ("as it lies now", turned["overhang_mm2"])
+
+
 def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:
     deaf = []
     for _ in range(10):

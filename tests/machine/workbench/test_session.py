@@ -17,6 +17,7 @@ from machine.workbench.bench.bench import Bench, with_front, with_profile
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey, redo, undo
 from machine.workbench.session.session import Session, Workbench
+from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
 from machine.workbench.work.worker_pool import WorkerPools
@@ -24,7 +25,7 @@ from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
-from profiles.messages import option
+from profiles.messages import advice, option
 from profiles.profile import Profile, load
 from tests.machine.workbench.models import model
 
@@ -248,6 +249,21 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
     assert session.note.startswith(
         f"turn the model: taken away with part 2: {option('pause', '2:8.4mm')} (Undo brings it back); slicing has ended"
     )
+
+
+def test_advice_to_take_a_number_of_parts_goes_when_it_is_taken() -> None:
+    rows = (FrontRow((), 9.0, 0.0, 9.0, chosen=True), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0))
+    advised: list[list[str]] = []
+
+    async def work(session: Session) -> None:
+        session.do("find", with_front(session.bench, rows, ("no face hangs", f"2 parts would be better: {advice('parts', 2)}")))
+        for parts in (1, 2):
+            obey(session, {"do": "take", "parts": parts})
+            await settled(session)
+            advised.append(snapshot(session)["notes"])
+
+    when_done(work)
+    assert [len(notes) for notes in advised] == [2, 1]
 
 
 def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:

@@ -50,7 +50,7 @@ export function modelOf(picture) {
       stood = how;
       const found = overhanging(triangles, rotation[2], limit, platform);
       red = found.red;
-      if (turning || area === null) tell({ overhang: mm2(found.area) });
+      if (turning || area === null) tell({ overhang: mm2(found.area), needing: "" });
       const stands = standingBy(rotation, triangles.vertices, lift), [least, most] = stands.box;
       picture?.stand(stands);
       update({ seen: { size_mm: sub(most, least) } });
@@ -147,9 +147,9 @@ export function thumbnailsOf(picture) {
     const now = JSON.stringify([resting, laid]), drawn = triangles && picture, views = laid && drawn ? [["as it stood", laid.before], ["as it lies now", laid.after]] : [];
     if (now === told && triangles === model) return;
     [told, model] = [now, triangles];
-    $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
+    $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area, present }) => {
       const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
-      return button("", lay, {}, thumbnail(drawn, rotation), made("span", { text: words }), made("small", { text: mm2(area) }));
+      return button("", lay, { ariaPressed: String(present) }, thumbnail(drawn, rotation), made("span", { text: words }), made("small", { text: mm2(area) }));
     }));
     hide({ laid: !views.length });
     $("laid").replaceChildren(...views.map(([words, rotation]) => made("figure", {}, thumbnail(drawn, rotation), made("figcaption", { text: words }))));
