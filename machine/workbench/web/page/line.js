@@ -85,16 +85,6 @@ export function ask(command, answered) {
   send({ ...command, ask: name });
 }
 
-/** Sends a file of the person's to a bench, sending({file, loaded, total, abort()}) as it goes, null in the end; what is wrong with it comes back by the line. */
-export const sendFile = (file, to, sending) => new Promise((done) => {
-  const request = new XMLHttpRequest(), abort = () => request.abort();
-  request.upload.onprogress = ({ loaded, total }) => sending({ file, loaded, total, abort });
-  request.upload.onloadend = () => sending(null); // it is read now, of which the state tells
-  request.onloadend = done;
-  request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE })}`);
-  request.send(file);
-});
-
 /** A function of a key and its address that gives take() what is there, read: only what was asked for last, and once; null: nothing.
  * insists: what is not there is asked for again, as it always is where the line is lost; begin(): something is asked for. */
 export function newest({ read, take, insists = false, begin = () => {} }) {

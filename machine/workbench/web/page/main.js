@@ -6,7 +6,7 @@ import { LINE_TOLD, openLine, send } from "./line.js";
 import { putNew, unitButtons, withWholeOptions } from "./lists.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
-import { facetsOf, fetchModel, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
+import { facetsOf, modelFetcher, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
 import { ringsOf } from "./model/rings.js";
 import { marksPanel } from "./parts/marks-panel.js";
 import { partsList, partsPanel } from "./parts/parts-panel.js";
@@ -26,9 +26,10 @@ import { keptLook, onState, store, subscribe, update } from "./store.js";
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
   themeSwitch((dark) => update({ dark }));
+  const fetchModel = modelFetcher(picture, () => follow(store.state));
   const follow = async (state) => {
     update({ state, turning: null });
-    await fetchModel(state.model, picture, () => follow(store.state));
+    await fetchModel(state.model);
     restoreLook();
     if (store.state.version === state.version) root.dataset.version = state.version;
   };

@@ -1,7 +1,7 @@
 // Benches: several models at once, each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
 
 import { $, button, hide, listen, made, notice, partsInWords, tell } from "../../../../view/template/elements.js";
-import { lineAt, sendFile } from "../line.js";
+import { lineAt, OWN_PAGE } from "../line.js";
 import { clock, putRows, removeButton } from "../lists.js";
 import { onNew } from "../store.js";
 
@@ -22,25 +22,30 @@ async function openBench(model = null) {
     notice("The browser opens no further page by itself: the new bench is in the list.", "benches");
     setTimeout(() => notice("", "benches"), TOLD_MS);
   }
-  if (model) await sendFile(model, `../${told.number}/`, tellSending);
+  if (model) await sendFile(model, `../${told.number}/`);
 }
 
 /** What a person has dropped or chosen: the first model, and plans after it, for this bench; every further model on a bench of its own. */
 export async function takeFiles(files) {
   const isPlan = ({ name }) => name.toLowerCase().endsWith(".toml"), [first = [], ...further] = files.filter((file) => !isPlan(file));
   further.forEach((model) => openBench(model));
-  for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file, "", tellSending);
+  for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
 }
 
-/** How much of a file is sent, with a button that breaks it off. */
-function tellSending(sending) {
-  hide({ sending: !sending });
-  if (!sending) return;
-  const { file, loaded, total, abort } = sending, mb = (bytes) => (bytes / 1e6).toFixed(1);
-  Object.assign($("sending-bar"), { value: loaded, max: total });
-  tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
-  $("sending-cancel").onclick = abort;
-}
+/** Sends a file to a bench and shows how much of it is sent, with a button that breaks it off; what is wrong with it comes back by the line. */
+const sendFile = (file, to = "") => new Promise((done) => {
+  const request = new XMLHttpRequest(), mb = (bytes) => (bytes / 1e6).toFixed(1);
+  request.upload.onprogress = ({ loaded, total }) => {
+    hide({ sending: false });
+    Object.assign($("sending-bar"), { value: loaded, max: total });
+    tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
+  };
+  request.upload.onloadend = () => hide({ sending: true }); // it is read now, of which the state tells
+  request.onloadend = done;
+  $("sending-cancel").onclick = () => request.abort();
+  request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE })}`);
+  request.send(file);
+});
 
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
@@ -57,7 +62,7 @@ export function benchesPanel() {
   });
 }
 
-const OFFERS = { // most: models that are listed, until all of them are asked for
+const OFFERS = { // most: entries that are listed, until all of them are asked for
   kept: { list: "kept-works", most: 5, wordsOf: ({ parts, written_s: written }) => [parts ? partsInWords(parts) : "uncut", moment(written)] },
   left: { list: "left-files", most: 5, wordsOf: ({ bytes, written_s: written }) => [`${Math.ceil(bytes / 1000).toLocaleString("en")} kB`, moment(written)] },
 };
@@ -67,27 +72,20 @@ function moment(seconds) {
   return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 }
 
-/** What is there from earlier, by its models, the newest first: work that was kept, or files that a workbench has left which was killed. */
+/** What is there from earlier, the newest first: work that was kept, or files that a workbench has left which was killed; at first the newest of each name. */
 export async function offer(what) {
-  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], models = new Map();
-  for (const one of found) models.set(one.name, [...(models.get(one.name) || []), one]);
-  const rows = [...models].map(([name, several]) => ({ id: name, told: JSON.stringify(several), make: () => modelRow(what, several) }));
-  const { list, most } = OFFERS[what], showAll = () => { OFFERS[what].most = Infinity; offer(what); };
-  const all = { id: "/all", told: `${rows.length}`, make: () => made("li", {}, button(`Show all ${rows.length}`, showAll)) };
+  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], { list, most } = OFFERS[what];
+  const shown = most < Infinity ? found.filter(({ name }, k) => found.findIndex((one) => one.name === name) === k).slice(0, most) : found;
+  const rows = shown.map((one) => ({ id: `${one.key}`, told: JSON.stringify(one), make: () => offerRow(what, one) }));
+  const showAll = () => { OFFERS[what].most = Infinity; offer(what); }, all = { id: "/all", told: `${found.length}`, make: () => made("li", {}, button(`Show all ${found.length}`, showAll)) };
   hide({ [`${what}-field`]: !found.length });
-  putRows(rows.length > most ? [...rows.slice(0, most), all] : rows, $(list));
-}
-
-/** The newest of a model's name; older ones on demand. */
-function modelRow(what, [newest, ...older]) {
-  const rows = () => made("ul", { className: "offers" }, ...older.map((one) => made("li", {}, ...offerRow(what, one))));
-  return made("li", {}, ...offerRow(what, newest), ...(older.length ? [made("details", {}, made("summary", { text: `${older.length} older` }), rows())] : []));
+  putRows(shown.length < found.length ? [...rows, all] : rows, $(list));
 }
 
 /** Its buttons: it is opened, or removed; a refusal comes by the line. */
 function offerRow(what, one) {
   const name = one.name || "cannot be read here", words = OFFERS[what].wordsOf(one).join(", "), act = (method) => () => fetch(`${what}/${one.key}`, { method }).then(() => offer(what), () => {});
-  return [button("", act("POST"), {}, made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE"))];
+  return made("li", {}, button("", act("POST"), {}, made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE")));
 }
 
 const PAIRED = "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself.";
