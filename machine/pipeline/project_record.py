@@ -59,6 +59,7 @@ class Record(_Table):
     copies: Annotated[int, Field(ge=1, le=MOST_COPIES)]
     plate: Annotated[int, Field(ge=0)] | None = None
     marks_in_plan: bool = True
+    recommended: Annotated[int, Field(ge=0, le=MOST_PARTS)] = 0
     figures: dict[str, float] = {}
 
     @model_validator(mode="after")

@@ -39,6 +39,7 @@ from machine.pipeline.output import check_roles, printing_files
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_dialect
 from machine.printing.destination import SerialPort, Simulated, at_printer
+from machine.printing.history import recorded
 from machine.printing.job import NOT_MOVED, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import continue_journal
 from machine.printing.serial_log import new_log
@@ -126,6 +127,10 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
     If several heights of the tip are possible, the user chooses it. Raises PrinterError, and JournalError when no user can
     answer.
     """
+    return recorded(rest, cut_off.at.name, lambda: _print_rest(cut_off, rest, job, person))
+
+
+def _print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: Person) -> End:
     with _further_journal(cut_off, job) as further:
 
         def begin(status: PrinterStatus) -> ResumePoint:

@@ -17,6 +17,7 @@ from machine.link.stream import Outcome, print_lines
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import AtPrinter, SerialPort, Simulated
+from machine.printing.history import recorded
 from machine.printing.job import CANCELLED, DONE, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import new_journal
 from machine.printing.ports import describe_answer, identify_printer
@@ -53,6 +54,9 @@ class SerialPrinter:
 
     def print(self, loaded: LoadedProgram) -> End:
         """Stream the program, with a log and a journal, and report how it ended."""
+        return recorded(loaded, self._at.name, lambda: self._print(loaded))
+
+    def _print(self, loaded: LoadedProgram) -> End:
         simulated = isinstance(self._at, Simulated)
         journalled = self._journal(loaded) if not simulated or self._job.journal is not None else nullcontext()
         title = f"{loaded.name} to {'the simulated printer' if simulated else self._at.name}"

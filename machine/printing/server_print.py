@@ -11,6 +11,7 @@ from machine.link.print_state import PrintState, PrintStatus, ProgramPosition, l
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_free
+from machine.printing.history import recorded
 from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog
@@ -75,6 +76,9 @@ class ServerPrinter:
         """
         if not self._job.starts:
             return self.send(loaded)
+        return recorded(loaded, self.server.name, lambda: self._print(loaded))
+
+    def _print(self, loaded: LoadedProgram) -> End:
         person, server, upload = self.person, self.server, GcodeUpload(loaded.name, loaded.program.lines)
         try:
             file = hand_over(server, upload, loaded.name, self._scene(), person)

@@ -279,7 +279,9 @@ def _reason_text(problem: Problem, node: Node, plane: Plane, limits: Bounds, rea
             sliver = f"its plane would leave a sliver {phrase('thin', f'{sliver_mm:.2g}', visible)} mm thin"
             text = f"{sliver}: {limits.fragile_mm:g} is the least ({key_name('search.fragile_mm')})"
         case Reason.KEEP:
-            text = f"its plane would pass through zone {problem.zones.crossed(plane)} of [[keep]], which stays whole"
+            number = problem.zones.crossed(plane)
+            zone = phrase("protected", f"zone {number} of [[keep]], which stays whole", number)
+            text = f"its plane would pass through {zone}"
         case Reason.WEAK:
             stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
             text += f": {problem.settings.nozzle_load_n:g} N at its top are {stress}"

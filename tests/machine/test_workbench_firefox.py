@@ -64,7 +64,7 @@ def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) ->
     assert "24.0 × 6.0 × 24.0 mm" in firefox.value("$('model-told').textContent")
     standing = firefox.value("$('overhang').textContent")
     firefox.wait("$('resting').children.length > 1")
-    firefox.click("#resting button")
+    firefox.click("#resting button:nth-child(2)")
     firefox.wait(done("lay the model down"))
     assert firefox.value("$('overhang').textContent") != standing
     undo(firefox, "open tee.stl")

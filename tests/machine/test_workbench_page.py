@@ -164,6 +164,50 @@ def test_a_model_of_a_size_that_no_printer_makes_is_asked_for_its_unit_and_opene
     browser.wait("$('title').textContent === 'tee.stl' && $('scale').value === '100'")
 
 
+def test_a_file_that_is_sent_slowly_is_seen_to_be_under_way_and_may_be_broken_off(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    slowly = {"offline": False, "latency": 0, "downloadThroughput": -1}
+    browser._send("Network.emulateNetworkConditions", **slowly, uploadThroughput=100_000)
+    try:
+        browser.value(
+            """{ const chosen = new DataTransfer();
+            chosen.items.add(new File([new Uint8Array(3e6)], "large.stl"));
+            $('file').files = chosen.files;
+            $('file').dispatchEvent(new Event('change')); }"""
+        )
+        browser.wait("!$('sending').hidden && $('sending-bar').value > 0")
+        assert browser.value("/^Sending large.stl: [0-9.]+ of 3.0 MB$/.test($('sending-told').textContent)")
+        browser.click("#sending-cancel")
+        browser.wait("$('sending').hidden")
+    finally:
+        browser._send("Network.emulateNetworkConditions", **slowly, uploadThroughput=-1)
+    assert browser.value("[$('title').textContent, $('problem').hidden]") == ["tee.stl", True]
+
+
+LEFT = [(n, f"{'abcdefga'[n]}.stl") for n in range(8)]  # the last one is an older a.stl
+
+
+def test_files_that_were_left_are_listed_by_their_names_five_at_first_each_with_a_button_that_removes_it(
+    browser: Browser, bench: Running
+) -> None:
+    browser.open(bench.address)
+    browser.wait("performance.getEntriesByName(new URL('left', location)).length")
+    files = json.dumps([{"key": key, "name": name, "bytes": 1500, "written_s": 1e9 - key} for key, name in LEFT])
+    browser.value(
+        f"""{{ const real = fetch; window.asked = [];
+        const left = (what, method) => {{ asked.push([what, method]); return new Response({json.dumps(files)}); }};
+        fetch = async (what, more) => (/^left/.test(what) ? left(what, more?.method) : real(what, more)); }}"""
+    )
+    names = "[...$('left-files').querySelectorAll(':scope > li > button:first-child')].map((b) => b.firstChild.textContent)"
+    browser.value("modules['model/benches'].offer('left')")
+    assert browser.value(names) == ["a.stl", "b.stl", "c.stl", "d.stl", "e.stl", "Show all 8"]
+    browser.click("#left-files > li:last-child button")
+    browser.wait(f"{names}.length === 8")
+    browser.click("#left-files > li:nth-child(7) > [aria-label^='Remove g.stl, 2 kB']")
+    browser.wait("asked.length === 4")  # listed, all listed, removed, listed again
+    assert browser.value("asked[2]") == ["left/6", "DELETE"]
+
+
 def test_work_that_takes_longer_than_a_moment_tells_how_long_it_is_under_way(browser: Browser, bench: Running) -> None:
     browser.open(bench.address)
     browser.wait(f"document.documentElement.dataset.version && {IDLE}")

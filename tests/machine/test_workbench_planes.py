@@ -76,13 +76,14 @@ def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_aw
         assert [zone["kind"] for zone in state["zones"]] == ["no_seam", "no_support"]
         assert sum(byte == 2 for byte in bench.ask(f"marks/{state['marks']}")[1]) == 6  # the flat back of the T
         page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
-        state = page.until(lambda state: state["problem"])
-        assert "a plane was taken away: its plane would pass through zone 1 of [[keep]]" in state["problem"]
+        state = page.until(lambda state: state["note"])
+        why = "its plane would pass through protected area 1 (Undo brings it back)"
+        assert (state["note"], state["problem"]) == (f"the cut of part 3 was removed: {why}", "")
         assert [cut["offset_mm"] for cut in state["cuts"]] == [20.0]
         page.do("lock", part=2, locked=True)
         page.do("mark", kind="keep", min_mm=[-2, -2, 19], max_mm=[2, 2, 21])
         problem = page.until(lambda state: "locked" in state["problem"])["problem"]
-        assert problem.startswith("the plane of part 2 is locked and would be in the way: its plane would pass through zone 2")
+        assert problem.endswith("part 2 is locked and would be in the way: its plane would pass through protected area 2")
         Path("plan.toml").write_bytes(bench.ask("plan.toml")[1])
         plan = Path("plan.toml").read_text()
         assert all(

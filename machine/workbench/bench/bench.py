@@ -32,13 +32,14 @@ MOST_KEPT_FACES = 5_000_000  # of the models of all steps, some 25 bytes each: e
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A model, its orientation, and its cuts.
+    """A model, how it is turned, and how it is cut.
 
-    rotation: rows of the matrix that turns the model as read. cuts: base planes of parts 2, 3, ... in print order; None: not cut
-    yet. rows: the front from which the cuts were chosen, with increasing numbers of parts; recommended: number of parts that the
-    search prefers, 0: no search yet; priced: times and filament of the rows are those for this profile. locked: cuts that a
-    search keeps and that cannot be moved. stops: pauses, each of which follows its part; copies: of the model on the plate; both
-    remain until another model is opened.
+    rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
+    None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
+    search would take, 0: no search has been; priced: times and plastic of the rows are for this profile, as far as there are any.
+    locked: those of the cuts that a search begins with and nobody moves. stops: where the print waits for a person, each with its
+    part wherever that goes; copies: how many of the model on the plate; both stay until another model is opened. notes: what the
+    search that found the rows says.
     """
 
     profile: Profile
@@ -53,6 +54,7 @@ class Bench:
     priced: bool = True
     stops: tuple[Stop, ...] = ()
     copies: int = 1
+    notes: tuple[str, ...] = ()
 
     @property
     def parts(self) -> int:
@@ -63,6 +65,12 @@ class Bench:
     def planned(self) -> bool:
         """Whether it has cuts or zones, which only a plan file can store."""
         return self.cuts is not None or self.zones != NO_ZONES
+
+    @property
+    def worked_on(self) -> bool:
+        """Whether anybody has cut, marked or turned its model, or prepared its print."""
+        prepared = self.stops, self.copies, self.profile.parts
+        return self.model is not None and (self.planned or self.turned is not None or prepared != ((), 1, []))
 
     @property
     def turned(self) -> Floats | None:
@@ -219,14 +227,15 @@ def _placing(bench: Bench, factor: float = 1.0) -> Placing:
     return Placing.of(bench.model, bench.turned, bench.profile.search.pedestal_mm, factor)
 
 
-def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """Set the front of a search with its prices, and cut by its chosen row. Limbs may get other reference points."""
+def with_front(bench: Bench, rows: Sequence[FrontRow], notes: tuple[str, ...] = ()) -> Bench:
+    """The front of a search with its prices and notes, cut by the row that it has chosen. A limb may be named by another point
+    there than it was before."""
     chosen = next(row for row in rows if row.chosen)
     parts = planned_parts(chosen)
     names = {before: _same_cut(before, parts) for before in bench.cuts or ()}
     cuts, locked = (tuple(names.get(part, part) for part in several) for several in (bench.cuts or (), bench.locked))
     named = replace(bench, rows=tuple(rows), recommended=chosen.parts, cuts=cuts, locked=frozenset(locked), priced=True)
-    return with_cuts(named, parts)
+    return with_cuts(replace(named, notes=notes), parts)
 
 
 def _same_cut(part: PlannedPart, parts: Sequence[PlannedPart]) -> PlannedPart:

@@ -47,6 +47,7 @@ PHRASES = {
     "least offset": "the offset must be at least {} mm",
     "offset": "the offset is {} mm",
     "thin": "{}",
+    "protected": "protected area {}",
     "one part": "take 1 under In how many parts",
     "settings": "Settings",
     "": "",

@@ -20,6 +20,7 @@ from machine.link.port import stable_name
 from machine.pipeline.output import write_bytes
 from machine.pipeline.requests import BAUD
 from machine.printing.destination import Destination, SerialPort, Server, Simulated, parse_destination
+from machine.printing.history import past_prints
 from machine.printing.job import PrintJob
 from machine.printing.journal_folder import ResumableJournal, resumable_journals
 from machine.printing.ports import answer_words, ask_ports, known_ports, port_json
@@ -43,6 +44,7 @@ class Prints(Observable):
         self._pages: Counter[str] = Counter()
         self._ports: list[dict[str, Any]] | None = None
         self._journals: list[ResumableJournal] | None = None
+        self._history = past_prints()
         self._reads_journals = False
         self._over: Flag | None = None  # cancels the running query of ports
         self._tasks: set[asyncio.Task[None]] = set()
@@ -71,6 +73,7 @@ class Prints(Observable):
             "asking": self._over is not None,
             "last_printer": printer_json(self._last_printer) if self._last_printer else None,
             "journals": self._journals_state(),
+            "history": self._history,
             "prints": [
                 {**job.state.json(), "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
                 for job in self.prints
@@ -129,6 +132,8 @@ class Prints(Observable):
             await begun.run()
         except Exception as error:  # noqa: BLE001 - whatever happened, the print is marked as ended
             await begun.fail(error)
+        self._history = await asyncio.to_thread(past_prints)
+        self.notify()
 
     def stop_at_once(self, number: object) -> None:
         """Stop the print with this number, or all if the number is missing or was never used: when in doubt everything stops. The

@@ -58,12 +58,13 @@ async def in_loop(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, Val
 
 
 class SessionBase(Observable):
-    """Session state, used from one event loop; pages wait for `changed`. Commands change the bench while they hold `turn`, so
-    that one is executed at a time.
+    """All from the event loop; the pages wait for `changed`. Whatever changes the bench does so in its `turn`: one command is
+    executed at a time, and nothing else changes the bench meanwhile.
 
-    problems: last error of each page, "" for all pages; answers: named command -> why it was refused, "" if done; busy: what the
-    pages wait for; stopped: result of the work that was stopped last; quick, long, hand: its tasks in the pools; received: files
-    of its pages; followers: called after every change of the bench.
+    problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
+    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the
+    last command has changed beside what it was for; quick, long, hand: its tasks in the pools; received: the files of its pages;
+    followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -71,7 +72,7 @@ class SessionBase(Observable):
         self.history = History(Step("", bench))
         self.problems: dict[str, str] = {}
         self.answers: dict[str, str] = {}
-        self.busy = self.stopped = ""
+        self.busy = self.note = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
         self.turn = asyncio.Lock()  # fair: first come, first served
@@ -142,22 +143,25 @@ class SessionBase(Observable):
         self.notify()
 
     def do(self, word: str, bench: Bench, lost: str = "") -> None:
-        """Add a step, which can be undone. lost: what it has removed, in addition to the step's own sentence."""
+        """Take a further step, which can be undone. lost: what it has removed, beside what its step says itself."""
         self.advance(self.history.do(word, bench), lost)
 
     def advance(self, history: History, lost: str = "") -> None:
-        """Replace the history; a step forward reports what it has removed."""
+        """Go on with another history; a step forth tells what it has removed."""
         forth = history.before[-1:] == (self.history.now,)
         self.problems.clear()  # they were about the previous bench
-        self.stopped = ""
+        self.note = ""
         for sentence in (lost, history.now.lost if forth else ""):
-            self.add_problem(sentence)
+            self.add_note(sentence)
         self.become(history)
 
     def add_problem(self, sentence: str) -> None:
         """Add a sentence to the current page's errors."""
-        if sentence:
-            self._tell_problem("; ".join(filter(None, (self.problems.get(asking.get(), ""), sentence))))
+        self._tell_problem("; ".join(filter(None, (self.problems.get(asking.get(), ""), sentence))))
+
+    def add_note(self, sentence: str) -> None:
+        """Tell all pages what has changed, beside what they are told already."""
+        self.note = "; ".join(filter(None, (self.note, sentence)))
 
     def _tell_problem(self, sentence: str) -> None:
         page = asking.get()

@@ -132,7 +132,7 @@ def obey(session: Session, asked: Asked) -> None:
     """Queue a page's command `{"do": NAME, ...}`. Raises PlanError for an unknown command; later errors are reported to the page
     under the name `ask` of its command."""
     session.forget_problem()
-    session.stopped = ""
+    session.note = ""
     name, arguments = read_command(asked, COMMANDS)
     act: Callable[[], Work] = partial(perform, session, name, arguments)
     if name == "stop":  # running work ends at once, even while the bench is busy

@@ -30,6 +30,7 @@ class Keeping:
         self._saving: asyncio.Task[None] | None = None
         self._writing, self._ended = asyncio.Lock(), asyncio.Event()
         self._path: Path | None = None  # of the saved model
+        self.released = 0  # how often work of this session became earlier work, or was opened again
         self._opening = False
         self._trouble = ""
         self._reported: tuple[str, Path | None] = "", None  # error, and the model for which it was reported
@@ -88,8 +89,25 @@ class Keeping:
         self._release()
         return self._trouble
 
+    async def put_away(self) -> str:
+        """Make earlier work of what lies on the bench, which is kept elsewhere from then on. A sentence says so, "" where nobody
+        has done anything that would be missed, or it could not be kept."""
+        bench = self._session.bench
+        if not bench.worked_on or bench.model is None:
+            return ""
+        if self.behind:
+            await self._write_newest()
+        if self._trouble:
+            return ""
+        async with self._writing:
+            self._release()
+            self._path = None
+        cut = f", cut into {bench.parts} parts," if bench.parts > 1 else ""
+        return f"{bench.model.name}{cut} is kept under Earlier work (Undo brings it back)"
+
     def _release(self) -> None:
         """Release the folder, so that its work can be opened elsewhere."""
+        self.released += 1
         if self._lock is not None:
             os.close(self._lock)
         self._folder, self._lock = None, None

@@ -9,10 +9,11 @@ import numpy as np
 from machine.program import Alternative
 from machine.workbench.bench.bench import Bench, locked_plan, rows_to_price, with_front, with_prices, with_rotation
 from machine.workbench.session.base import WAITING, Derived, SessionBase
-from machine.workbench.work.cutting import Found, Searched, find_parts, price_row
+from machine.workbench.work.cutting import Found, Searched, find_parts, price_cuts, price_row
 from machine.workbench.work.slices import Sliced, SlicesSoFar, compare_bench, slice_bench
 from mdp.decomposition import FrontRow
 from mdp.ranking.ranker import CLASSIC
+from mdp.search.plan_file import planned_parts
 from profiles.errors import PlanError, UserError
 from profiles.frozen import Vector
 
@@ -20,12 +21,11 @@ ENDED = "slicing has ended, for what lies on the workbench is another now: slice
 
 
 class Finding(Derived[Found]):
-    """Search for parts, cancelled when the model, its orientation, settings, marks or locked planes change.
+    """A search ends whose model is gone or lies otherwise, or whose settings, marks or locked planes are others now.
 
-    notes: of the last search; laid: the rotations before and after it."""
+    laid: how it found the model turned, and how it has turned it."""
 
     def __init__(self, session: SessionBase) -> None:
-        self.notes: tuple[str, ...] = ()
         self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
         self._how = True, CLASSIC
         super().__init__(
@@ -58,10 +58,10 @@ class Finding(Derived[Found]):
         return f"The search was stopped, and the best so far is taken: {best.parts} parts."
 
     def _accept_found(self, found: Found) -> None:
-        self.notes, now = found.notes, self._session.bench
+        now = self._session.bench
         laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
         self.laid = None if laid is now else (now.rotation, laid.rotation)
-        self._session.do("find parts", with_front(laid, found.front))
+        self._session.do("find parts", with_front(laid, found.front, found.notes))
 
 
 def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
@@ -84,6 +84,21 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
         session, lambda bench: None if bench.priced else (bench.sought, bench.rows, bench.locked), price, accept=accept
     )
     return prices_now
+
+
+def price_by_hand(session: SessionBase) -> Derived[FrontRow | None]:
+    """The row of planes that a person has changed since they were found; None where they cannot be cut."""
+
+    def decides(bench: Bench) -> tuple[object, ...] | None:
+        is_found = bench.cuts is None or any(planned_parts(row) == bench.cuts for row in bench.rows)
+        return None if is_found or not bench.rows else (bench.sought, bench.cuts, bench.locked)
+
+    async def price(bench: Bench) -> FrontRow | None:
+        with suppress(UserError):
+            return await session.long.run(price_cuts, bench)
+        return None
+
+    return Derived(session, decides, price)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +152,7 @@ class Slicing(Derived[Slices]):
 
     def interrupted(self) -> None:
         """Notify the pages."""
-        self._session.add_problem(ENDED)
+        self._session.add_note(ENDED)
 
     async def _slice(self, bench: Bench) -> Slices:
         walls: dict[int, bytes] = {}

@@ -1,6 +1,6 @@
 """Planes on a bench: preparation as soon as there is a model, trials while the user drags them, and their application."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import count
@@ -8,7 +8,7 @@ from math import hypot, inf
 from typing import Any
 
 from machine.workbench.bench.bench import Bench, with_cuts, with_zones
-from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, snap
+from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, planned_part, snap
 from machine.workbench.bench.values import Asked, vector_of
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.work.cutting import load_kernels, make_ready, near_neck, nearest, try_cuts
@@ -121,7 +121,8 @@ class Refused:
 
 
 class PlaneTrials:
-    """trial: bench, planes and figures of the last trial. refused: the planes that were refused last."""
+    """trial: of the planes that were tried last, and the bench that they were tried on. refused: those that were refused last.
+    uncut: the area that needs support in one piece, mm2."""
 
     def __init__(self, session: SessionBase, readiness: Readiness) -> None:
         self.trial: tuple[Bench, Cuts, Trial] | None = None
@@ -129,6 +130,7 @@ class PlaneTrials:
         self._session, self._readiness = session, readiness
         self._held: Cuts | None = None  # planes that the user drags
         self._figures = Derived(session, self._to_try, self._try)
+        self.uncut = Derived(session, self._uncut, self._try_uncut)
         session.followers.append(self.settle)
 
     def hold(self, cuts: Cuts) -> None:
@@ -205,25 +207,39 @@ class PlaneTrials:
                 return
             self.trial = tried = bench, cuts, trial
 
+    def _uncut(self, bench: Bench) -> tuple[object, ...] | None:
+        """What decides which area needs support in one piece; None where it is not worked out by itself."""
+        return None if bench.model is None or bench.model.faces > MANY_FACES else bench.sought
+
+    async def _try_uncut(self, bench: Bench) -> float | None:
+        await self._readiness.wait()
+        return (await self.attempt(bench, ())).support_area_mm2
+
     async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
         """Apply other zones; removes planes that they forbid, and reports why. word: name of the history step. Raises PlanError
         for invalid zones, and if a forbidden plane is locked."""
-        before, removed = self._session.bench, list[str]()
-        bench = with_zones(before, await self._session.quick.run(mark, before, marking))
+        before = self._session.bench
+        marked = with_zones(before, await self._session.quick.run(mark, before, marking))
+        bench, removed = await self.without_invalid(marked)
+        for part, reason in removed.items():
+            if planned_part(before, part) in before.locked:
+                raise PlanError(f"the plane of part {part} is locked and would be in the way: {reason}")
+        self._session.do(word, bench, removed_in_words(removed))
+
+    async def without_invalid(self, bench: Bench) -> tuple[Bench, dict[int, str]]:
+        """A bench with those of its planes that can be cut, and the reasons why others cannot, by the numbers of their parts."""
+        numbers, removed = list(range(2, bench.parts + 1)), dict[int, str]()
         while bench.cuts:
             trial = await self.attempt(bench, bench.cuts)
             if not trial.rejected:
                 break
-            part = bench.cuts[trial.rejected_part - 2]
-            if part in bench.locked:
-                raise PlanError(f"the plane of part {trial.rejected_part} is locked and would be in the way: {trial.rejected}")
-            removed.append(trial.rejected)
-            bench = with_cuts(bench, tuple(cut for cut in bench.cuts if cut is not part))
-        self._session.do(word, bench, _removed_in_words(word, removed))
+            index = trial.rejected_part - 2
+            removed[numbers.pop(index)] = trial.rejected
+            bench = with_cuts(bench, (*bench.cuts[:index], *bench.cuts[index + 1 :]))
+        return bench, removed
 
 
-def _removed_in_words(word: str, reasons: Sequence[str]) -> str:
-    if not reasons:
-        return ""
-    planes = "a plane was" if len(reasons) == 1 else f"{len(reasons)} planes were"
-    return f"{word}: {planes} taken away: {'; '.join(dict.fromkeys(reasons))}"
+def removed_in_words(removed: Mapping[int, str]) -> str:
+    """Which cuts were removed and why, as a sentence; "" for none. removed: reasons by the numbers of their parts."""
+    sentences = "; ".join(f"the cut of part {part} was removed: {reason}" for part, reason in removed.items())
+    return sentences and f"{sentences} (Undo brings {'it' if len(removed) == 1 else 'them'} back)"

@@ -11,16 +11,16 @@ from weakref import finalize
 from machine.pipeline.embedded_profile import settings_inside
 from machine.pipeline.given_plan import with_plan_settings
 from machine.pipeline.project import Project, unpack
-from machine.pipeline.requests import Given
+from machine.pipeline.requests import PLACING, Given
 from machine.workbench.bench.bench import (
     Bench,
     History,
     Step,
     emptied,
-    with_cuts,
     with_model,
     with_model_turned_as_read,
     with_plan,
+    with_prices,
     with_profile,
     with_rotation,
     with_rows,
@@ -30,8 +30,8 @@ from machine.workbench.bench.model import Model
 from machine.workbench.bench.settings import check_block, key_of, profile_as_given, with_given, with_typed
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.session.keeping import Keeping
-from machine.workbench.session.long_work import Comparing, Finding, Slicing, prices_of
-from machine.workbench.session.planes import PlaneTrials, Readiness, resting_of, standing_of
+from machine.workbench.session.long_work import Comparing, Finding, Slicing, price_by_hand, prices_of
+from machine.workbench.session.planes import PlaneTrials, Readiness, removed_in_words, resting_of, standing_of
 from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled, read_model
@@ -48,7 +48,6 @@ from profiles.frozen import Effect
 from profiles.profile import Profile
 
 MOST_SESSIONS = 20
-READ_BY = ("process.scale", "process.rotate_deg")  # settings that determine how a model is read
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class Session(SessionBase):
         self.slicing, self.readiness = Slicing(self), Readiness(self)
         self.standing, self.resting = standing_of(self), resting_of(self, self.readiness)
         self.trials = PlaneTrials(self, self.readiness)
-        self.finding, self._prices = Finding(self), prices_of(self)
+        self.finding, self._prices, self.by_hand = Finding(self), prices_of(self), price_by_hand(self)
         self.comparing = Comparing(self, self.slicing)
         self.pieces = Derived(self, lambda bench: bench.shaped, self._draw_pieces, by_itself=False)
         self.keeping = Keeping(self)
@@ -108,25 +107,22 @@ class Session(SessionBase):
             self.start(tasks.warm())
 
     async def open_model(self, path: Path, name: str, anew: bool = True, plate: int | None = None) -> None:
-        """Put the model of a file on the bench. `anew`: drop the scale and rotation set for a previous model; plate: of a slicer
-        file. Raises UserError with the command line's message; if the size suggests a wrong unit, it requests the unit.
+        """Put the model of a file on the bench. anew: without the scale, the turns and the place that were set for the one before
+        it; plate: of a slicer file.
+
+        Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
         """
         self.readiness.load()
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self.resting.stop()  # the new model would wait for it
         with self.waiting(f"reading {name}"):
-            bench = self._bench_for(name) if anew else self.bench
+            bench = for_another_model(self.bench) if anew else self.bench
             model = await self._read(path, name, bench.profile, plate, asks=True)
-        self.do(f"open {name}", with_model(bench, model))
+        await self._replace(f"open {name}", with_model(bench, model))
 
-    def _bench_for(self, name: str) -> Bench:
-        """The bench for a model with this name, without settings for the reading of another one."""
-        bench = self.bench
-        settings = tuple(setting for setting in bench.given.settings if key_of(setting) not in READ_BY)
-        if bench.model is None or bench.model.name == name or settings == bench.given.settings:
-            return bench
-        given = replace(bench.given, settings=settings)
-        return with_profile(bench, given, profile_as_given(given, bench.profile))
+    async def _replace(self, word: str, bench: Bench) -> None:
+        """Take other work onto the bench, after what lies there is kept."""
+        self.do(word, bench, await self.keeping.put_away())
 
     async def open_in_unit(self, *, unit: str) -> None:
         """Open the model whose unit was unknown, scaled by the chosen unit. Raises UserError."""
@@ -134,13 +130,13 @@ class Session(SessionBase):
         if waits is None or unit not in waits.units:
             expected = f"one of {', '.join(waits.units)} is expected" if waits else "no model waits for its unit"
             raise PlanError(f"unit is {unit!r}: {expected}")
-        unscaled = self._bench_for(waits.name)
+        unscaled = for_another_model(self.bench)
         given = with_typed(unscaled.given, "process.scale", f"{waits.units[unit]:g}", unscaled.profile)
         scaled = with_profile(unscaled, given, profile_as_given(given, unscaled.profile))
         with self.waiting(f"reading {waits.name}"):
             model = await self._read(waits.path, waits.name, scaled.profile)
         self.unscaled = None
-        self.do(f"open {waits.name} in {unit}", with_model(scaled, model))
+        await self._replace(f"open {waits.name} in {unit}", with_model(scaled, model))
 
     async def open_plate(self, *, plate: int) -> None:
         """Open another plate of the slicer file. Raises UserError."""
@@ -188,7 +184,7 @@ class Session(SessionBase):
         Raises UserError; the folder is then unchanged.
         """
         async with self.keeping.opening(folder):
-            self.do(word, await self._bench_of(project))
+            await self._replace(word, await self._bench_of(project))
 
     async def _bench_of(self, project: Project) -> Bench:
         """A bench for a project. Raises UserError."""
@@ -210,7 +206,8 @@ class Session(SessionBase):
                 bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
         locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
-        return replace(bench, locked=locked, stops=project.stops, copies=project.copies)
+        bench = replace(bench, locked=locked, stops=project.stops, copies=project.copies)
+        return with_prices(replace(bench, recommended=project.recommended), {}) if bench.rows else bench
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan file. Raises UserError if it cannot be read, or is for another model."""
@@ -225,7 +222,7 @@ class Session(SessionBase):
         with self.waiting(f"cutting by {plan.name}"):
             profile = with_plan_settings(bench.profile.of_all_parts, plan)
             rows = await self.quick.run(measure_plan, bench, plan)
-        self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
+        await self._replace(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
     async def make(self, word: str, task: Callable[..., Value], *given: Any) -> Value:
         """Run a task on the parts of the bench. Raises UserError if they cannot be cut."""
@@ -245,7 +242,7 @@ class Session(SessionBase):
         before = self.bench
         given = change(before.given)
         check_block(profile_as_given(given, before.profile), key)
-        bench, refused = await self._with_profile(word, before, given)
+        bench, refused = await self._with_profile(before, given)
         if given != before.given:
             self.do(word, bench, refused)
 
@@ -278,13 +275,13 @@ class Session(SessionBase):
 
         def tell() -> None:
             found = [self.finding.take_best(bench, search)] if search is not None or "search" in waiting else []
-            self.stopped = " ".join([*found, *words])
+            self.add_note(" ".join([*found, *words]))
 
         return tell
 
-    async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
-        """A bench with another profile. Removes planes that it forbids, with the reason, and rows of the front that cannot be cut
-        elsewhere on the plate; reads the model again if its scale or rotation changes."""
+    async def _with_profile(self, before: Bench, given: Given) -> tuple[Bench, str]:
+        """A bench with another profile; planes that it forbids go, and a sentence says why; so do rows of the front that
+        cannot be cut at another place on the plate, and a model that it scales or turns otherwise is read again."""
         bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
@@ -298,12 +295,10 @@ class Session(SessionBase):
         if effect == Effect.REACH and bench.rows:
             rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
             bench = with_rows(bench, rows)
-        if bench.cuts is not None and effect >= Effect.REACH:
-            trial = await self.trials.attempt(bench, bench.cuts)
-            if trial.rejected:
-                why = f"{word}: the planes were taken away, for part {trial.rejected_part} cannot be cut off: {trial.rejected}"
-                return replace(with_cuts(bench, ()), cuts=None), why
-        return bench, ""
+        if bench.cuts is None or effect < Effect.REACH:
+            return bench, ""
+        bench, removed = await self.trials.without_invalid(bench)
+        return bench if bench.cuts else replace(bench, cuts=None), removed_in_words(removed)
 
     async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
         """The model of a file, whose mesh file exists as long as the model. asks: ask the page for the unit if the size suggests
@@ -315,6 +310,15 @@ class Session(SessionBase):
             raise MeshError(model.question if asks and asking.get() else model.sentence)
         finalize(model, _remove_files, model.mesh_file, model.shapes_file)
         return model
+
+
+def for_another_model(bench: Bench) -> Bench:
+    """The bench without what was set for the model that lies on it alone."""
+    settings = tuple(setting for setting in bench.given.settings if key_of(setting) not in PLACING)
+    if bench.model is None or settings == bench.given.settings:
+        return bench
+    given = replace(bench.given, settings=settings)
+    return with_profile(bench, given, profile_as_given(given, bench.profile))
 
 
 def _remove_files(*files: Path | None) -> None:
@@ -351,7 +355,7 @@ class Workbench:
         self.sessions[self._last] = session = self._make(self.pools)
         session.benches = self._benches
         if like is not None:
-            session.history = History(Step("", emptied(like.bench)))
+            session.history = History(Step("", emptied(for_another_model(like.bench))))
         session.listeners.append(self._list_again)
         session.warm()
         self._list_again()

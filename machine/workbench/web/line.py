@@ -20,6 +20,7 @@ from profiles.errors import PlanError, UserError
 from profiles.messages import check_text
 
 MOST_COMMAND = 100_000  # characters
+BEAT_S = 0.5
 _states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
 CLOSED = "this bench is not open any more"
 CLOSED_CODE = 4404  # of a websocket of a closed bench
@@ -32,8 +33,9 @@ DEVICE_COMMANDS = {name: arguments_of(function) for name, function in DEVICE_FUN
 async def talk(session: Session, socket: WebSocket) -> None:
     """Send states and receive commands until either side ends. A page that does not read only blocks itself."""
     await socket.accept()
+    beat_s = BEAT_S if "beats" in socket.query_params else None
     try:
-        await until_either_ends(tell(session, lambda: snapshot(session), socket), _hear(session, socket))
+        await until_either_ends(tell(session, lambda: snapshot(session), socket, beat_s), _hear(session, socket))
     finally:
         if not session.closed:
             session.trials.settle()  # of a plane that the page was dragging
@@ -71,14 +73,21 @@ async def receive(socket: WebSocket) -> str:
     return message.get("text") or ""
 
 
-async def tell(source: Observable, state: Callable[[], dict[str, Any]], socket: WebSocket) -> None:
-    """Send the newest state at every change, rendered for the page and encoded once for all pages; a slow page skips states."""
+async def tell(source: Observable, state: Callable[[], dict[str, Any]], socket: WebSocket, beat_s: float | None = None) -> None:
+    """The newest state whenever there is one, in the page's words and encoded once for all pages; what came in between while a
+    slow page was reading is left out. beat_s: without news for so long it is sent an empty message, from which it knows that its
+    server is there; None: never."""
     while not source.closed:
         seen, text = _states.get(source, (-1, ""))
         if seen != source.version:
             seen, text = _states[source] = source.version, json.dumps(in_page_words(state()))
         await send(socket, text)
-        await source.changed(seen)
+        while source.version == seen:
+            try:
+                async with asyncio.timeout(beat_s):
+                    await source.changed(seen)
+            except TimeoutError:
+                await send(socket, "")
     await socket.close(CLOSED_CODE, CLOSED)
 
 

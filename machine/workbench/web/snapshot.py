@@ -5,6 +5,8 @@ from dataclasses import asdict
 from hashlib import sha256
 from typing import Any
 
+import numpy as np
+
 from machine.dryrun.findings import Finding
 from machine.program import Alternative
 from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
@@ -16,17 +18,19 @@ from machine.workbench.bench.model import Model
 from machine.workbench.session.commands import Need, lacking
 from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session
+from machine.workbench.work.models import Resting
 from mdp.joint import Joint
 from mdp.overhang import PLATE_TOLERANCE_MM, threshold
 from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import MeshVolume, Modifier, Zone
 from profiles.material import Material
-from profiles.messages import terminal_words
+from profiles.messages import advice, terminal_words
 from profiles.profile import Profile
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # limit for drawing
+SAME_UP = 1e-6  # between the directions of two orientations that differ by a turn about z
 # Text of a button, and its command.
 SLICE_AGAIN = {"text": "Slice again", "command": {"do": "slice"}}
 SUPPORT_ON = {"text": "Switch support on", "command": {"do": "set", "key": "process.support", "value": "auto"}}
@@ -143,7 +147,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "problems": session.problems,
         "answers": session.answers,
         "busy": session.busy,
-        "stopped": session.stopped,
+        "note": session.note,
         "preparing": bool(session.readiness.progress),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": terminal_words(history.now.word) if history.before else "",
@@ -153,14 +157,16 @@ def snapshot(session: Session) -> dict[str, Any]:
         "scale": bench.profile.process.scale,
         "standing": standing and {"size_mm": standing.size_mm, "problem": standing.problem},
         "overhang_mm2": standing and standing.overhang_mm2,
+        "needing_mm2": session.trials.uncut.result,
         "pedestal_mm": bench.profile.search.pedestal_mm,
         "pedestal": pedestal_key(bench, standing),
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATE_TOLERANCE_MM,
-        "resting": [asdict(rest) for rest in session.resting.result or ()],
+        "resting": _resting(session),
         "search": None if search is None else {"text": search.text, "planes": planes},
         **slices_state(session),
         "front": [front_record(row) for row in bench.rows],
+        "by_hand": session.by_hand.result and front_record(session.by_hand.result),
         "parts": bench.parts,
         "recommended": bench.recommended,
         "cuts": _cuts(bench.cuts or ()),
@@ -172,7 +178,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "refused": _refused(session),
         "units": _units(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
-        "notes": session.finding.notes if bench.rows else (),
+        "notes": [note for note in bench.notes if bench.rows and advice("parts", bench.parts) not in note],
         "laid": _laid(session),
         "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
@@ -184,9 +190,23 @@ def snapshot(session: Session) -> dict[str, Any]:
         "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "benches": session.benches,
+        "kept": session.keeping.released,
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }
+
+
+def _resting(session: Session) -> list[dict[str, Any]]:
+    """The orientations in which the model rests, `present` where it does so now; its own first where it is none of them."""
+    bench, standing, found = session.bench, session.standing.result, session.resting.result
+    if not found:
+        return []
+    up = np.array(bench.rotation[2])
+    rows = [asdict(rest) | {"present": bool(np.abs(rest.rotation[2] - up).max() < SAME_UP)} for rest in found]
+    if standing is not None and not any(row["present"] for row in rows):
+        now = Resting(bench.rotation, "as it lies now", standing.overhang_mm2, standing.size_mm[2])
+        rows.insert(0, asdict(now) | {"present": True})
+    return rows
 
 
 def _copies_told(session: Session) -> str:

@@ -21,6 +21,7 @@ from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
 from machine.workbench.work.folders import Received, folders_kept, remove_file
 from profiles.errors import PlanError, ProfileError, reason
+from profiles.files import lock_folder, remove_locked
 from profiles.messages import check_text, option
 from profiles.places import KINDS, kind_in
 
@@ -67,15 +68,12 @@ class Uploads:
         for number, path in enumerate(self._left):
             with suppress(OSError):
                 status = path.stat()
-                rows.append({"number": number, "name": path.name, "bytes": status.st_size, "written_s": status.st_mtime})
+                rows.append({"key": number, "name": path.name, "bytes": status.st_size, "written_s": status.st_mtime})
         return JSONResponse(rows)
 
     async def open_left(self, session: Session, request: Request) -> Response:
         """Open a copy of a file left behind, which itself stays for its day."""
-        number = request.path_params["number"]
-        if number >= len(self._left):
-            raise PlanError("no such file has been left by a workbench that was killed")
-        path = self._left[number]
+        path = self._left_file(request)
 
         async def copy_to(copy: Path) -> None:
             try:
@@ -85,6 +83,17 @@ class Uploads:
 
         return await self._open(session, path.name, copy_to)
 
+    async def remove_left(self, session: Session, request: Request) -> Response:
+        """The same removed."""
+        await asyncio.to_thread(remove_file, self._left_file(request))
+        return JSONResponse({})
+
+    def _left_file(self, request: Request) -> Path:
+        number: int = request.path_params["number"]
+        if number >= len(self._left):
+            raise PlanError("no such file has been left by a workbench that was killed")
+        return self._left[number]
+
     async def list_kept(self, session: Session, request: Request) -> Response:
         """The autosaved work of other benches, newest first; work of a newer version is refused when it is opened."""
         rows = []
@@ -92,17 +101,14 @@ class Uploads:
             try:
                 project = read_folder(folder)
             except PlanError:
-                rows.append({"kept": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
+                rows.append({"key": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
             else:
-                rows.append({"kept": folder.name, "name": project.name, "parts": project.parts, "written_s": project.written_s})
+                rows.append({"key": folder.name, "name": project.name, "parts": project.parts, "written_s": project.written_s})
         return JSONResponse(rows)
 
     async def open_kept(self, session: Session, request: Request) -> Response:
         """Open autosaved work on a bench."""
-        name = request.path_params["name"]
-        folder = next((folder for folder in folders_kept() if folder.name == name), None)
-        if folder is None:
-            raise PlanError(OPEN_ELSEWHERE)
+        folder = _kept_folder(request)
         project = read_folder(folder)
         word = f"open the work of {strftime('%H:%M', localtime(project.written_s))}"
         try:
@@ -110,6 +116,15 @@ class Uploads:
                 await session.open_folder(folder, self._with_copies(project), word)
         except OSError as error:
             raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
+        return JSONResponse({})
+
+    async def remove_kept(self, session: Session, request: Request) -> Response:
+        """The same removed."""
+        folder = _kept_folder(request)
+        lock = lock_folder(folder)
+        if lock is None:
+            raise PlanError(OPEN_ELSEWHERE)
+        await asyncio.to_thread(remove_locked, folder, lock)
         return JSONResponse({})
 
     def _with_copies(self, project: Project) -> Project:
@@ -158,6 +173,15 @@ class Uploads:
             if not taken and not waits:  # refused, or text that has been read completely
                 remove_file(path)
         return JSONResponse({})
+
+
+def _kept_folder(request: Request) -> Path:
+    """The folder of kept work that is asked for. Raises PlanError."""
+    name = request.path_params["name"]
+    folder = next((folder for folder in folders_kept() if folder.name == name), None)
+    if folder is None:
+        raise PlanError(OPEN_ELSEWHERE)
+    return folder
 
 
 async def _receive(request: Request, path: Path, name: str, most_mib: int) -> None:

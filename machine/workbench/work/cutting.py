@@ -131,6 +131,12 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
     return row
 
 
+def price_cuts(tell: Tell, bench: Bench) -> FrontRow:
+    """The row of the planes on the bench with its time and plastic. Raises PlanError where they cannot be cut."""
+    cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), front=()), prices=True)
+    return next(row for row in cut.front if row.chosen)
+
+
 def make_plan(tell: Tell, bench: Bench) -> str:
     """The plan of the bench's parts, as text."""
     return _plan_and_meshes(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)[0]

@@ -138,6 +138,7 @@ def work_of(bench: Bench) -> Project:
         locked=tuple(k for k, part in enumerate(bench.cuts or ()) if part in bench.locked),
         stops=bench.stops,
         copies=bench.copies,
+        recommended=bench.recommended,
         plate=model.plate,
         marks_in_plan=True,
         figures=figures_of(next((row for row in bench.rows if row.parts == bench.parts), None)),

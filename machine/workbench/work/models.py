@@ -10,6 +10,7 @@ import numpy as np
 from machine.pipeline import compilers
 from machine.pipeline.embedded_profile import has_settings
 from machine.pipeline.plate import places_of
+from machine.pipeline.project import STANDING
 from machine.planning.fit import Place
 from machine.workbench.bench.bench import Bench, plan_of_bench
 from machine.workbench.bench.changes import workpiece_mesh
@@ -71,17 +72,21 @@ def read_model(
 
 
 def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, ...]:
-    """The stable orientations of a model, the most promising first."""
+    """How a model stands as it is read, then the other orientations in which it rests, the most promising first."""
     compilers.wait_for(compilers.JUDGE)
-    return tuple(
+    mesh = model.mesh()
+    risky = risky_upright(mesh, profile.process.self_supporting_angle_deg)
+    as_read = Resting(STANDING, "as in the file", float(mesh.areas_mm2[risky].sum()), float(np.ptp(mesh.bounds_mm[:, 2])))
+    others = (
         Resting(
             tuple(tuple(float(value) for value in row) for row in orientation.rotation),
             side_in_words(orientation) or in_words(orientation),
             orientation.risky_mm2,
             orientation.height_mm,
         )
-        for orientation in distinct_orientations(model.mesh(), profile, for_person=True)
+        for orientation in distinct_orientations(mesh, profile, for_person=True)
     )
+    return as_read, *others
 
 
 def rest_facets(tell: Tell, model: Model) -> bytes:

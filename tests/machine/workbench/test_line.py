@@ -35,6 +35,9 @@ def test_characters_that_are_no_text_are_refused_wherever_a_command_has_them(val
     assert parsed('{"do": "demo", "name": "モデル 😀"}', 1000)["name"] == "モデル 😀"
 
 
+BEAT = -1  # an empty message
+
+
 class Page:
     """The socket of a page that takes what it is told as long as it is awake."""
 
@@ -44,7 +47,23 @@ class Page:
 
     async def send_text(self, text: str) -> None:
         await self.awake.wait()
-        self.heard.append(json.loads(text)["version"])
+        self.heard.append(json.loads(text)["version"] if text else BEAT)
+
+
+def test_a_page_that_asks_for_beats_hears_one_whenever_there_has_been_no_news_for_so_long() -> None:
+    async def run() -> Page:
+        source, page = Observable(), Page()
+        page.awake.set()
+        telling = asyncio.create_task(tell(source, lambda: {"version": source.version}, page, 0.01))  # type: ignore[arg-type]
+        while page.heard != [0, BEAT, BEAT]:
+            await asyncio.sleep(0)
+        source.notify()
+        while page.heard[-1] != 1:
+            await asyncio.sleep(0)
+        telling.cancel()
+        return page
+
+    assert asyncio.run(asyncio.wait_for(run(), 10.0)).heard == [0, BEAT, BEAT, 1]
 
 
 def test_fifty_pages_that_read_nothing_hold_up_nobody_and_hear_the_newest_when_they_read_again() -> None:

@@ -91,14 +91,14 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
         assert killed.ask("")[0] == 404
         kept = next(work for work in json.loads(running.ask("kept")[1]) if work["name"] == "tee.stl")
         assert kept["parts"] == 2
-        assert running.ask(f"kept/{kept['kept']}", "POST", Origin=f"http://127.0.0.1:{running.port}")[0] == 200
+        assert running.ask(f"kept/{kept['key']}", "POST", Origin=f"http://127.0.0.1:{running.port}")[0] == 200
         again = page.until(lambda state: state["locked"] == [True])
         assert (again["given"]["settings"], again["parts"], again["model"]["name"]) == (["process.walls=4"], 2, "tee.stl")
-        assert kept["kept"] not in [work["kept"] for work in json.loads(running.ask("kept")[1])]  # it is kept on there
+        assert kept["key"] not in [work["key"] for work in json.loads(running.ask("kept")[1])]  # it is kept on there
         (left,) = json.loads(running.ask("left")[1])
         assert (left["name"], left["bytes"]) == ("tee.stl", len(TEE))
         own = f"http://127.0.0.1:{running.port}"
-        assert running.ask(f"left/{left['number']}", "POST", Origin=own)[0] == 200
+        assert running.ask(f"left/{left['key']}", "POST", Origin=own)[0] == 200
         model = page.until(lambda state: state["model"])["model"]
         assert (model["name"], model["faces"]) == ("tee.stl", len(tee().faces))
         assert running.ask("left/1", "POST", Origin=own)[0] == 422
@@ -107,11 +107,16 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
         page.do("set", key="process.scale", value="2")  # for which it is read again
         page.until(lambda state: state["model"]["size_mm"][0] > 79)
         assert json.loads(running.ask("left")[1]) == [left]  # it stays where it was
+        assert running.ask(f"left/{left['key']}", "DELETE", Origin="http://evil.example")[0] == 403
         (file,) = (path for path in temporary.glob("tiltprint-edit-*/*/tee.stl") if path.stat().st_mtime == left["written_s"])
         file.unlink()
-        assert running.ask(f"left/{left['number']}", "POST", Origin=own)[0] == 422
+        assert running.ask(f"left/{left['key']}", "POST", Origin=own)[0] == 422
         problem = page.until(lambda state: state["problem"].startswith("tee.stl"))["problem"]
         assert problem == "tee.stl, left by a workbench that was killed, cannot be read: no such file or directory"
+        file.write_bytes(TEE)
+        assert running.ask(f"left/{left['key']}", "DELETE", Origin=own)[0] == 200
+        assert json.loads(running.ask("left")[1]) == []
+        assert not file.parent.exists()
 
 
 def test_a_page_of_a_killed_workbench_says_what_to_do_and_the_next_one_offers_its_files(
@@ -145,7 +150,14 @@ def test_a_page_of_a_workbench_that_hangs_waits_for_it(browser: Browser) -> None
         try:
             browser.value("{ window.whyUnanswered = modules['page/line'].whyUnanswered; window.why = whyUnanswered(); }")
             assert browser.value("window.why") == "lost"
+            browser.wait("document.documentElement.dataset.line === 'silent'")
+            assert browser.value("[$('notice').textContent, $('demo').matches(':disabled'), $('save').disabled]") == [
+                "tiltprint does not answer; waiting for it.",
+                True,
+                True,
+            ]
         finally:
             running.process.send_signal(signal.SIGCONT)
         assert browser.value("whyUnanswered()") == "lost"  # it answers, so a line will open
-        assert browser.value("document.documentElement.dataset.line") == "open"
+        browser.wait("document.documentElement.dataset.line === 'open' && !$('demo').matches(':disabled')")
+        assert browser.value("$('notice').hidden")

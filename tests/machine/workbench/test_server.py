@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from shlex import split
+from typing import Any
 
 import manifold3d as m3
 import numpy as np
@@ -20,6 +21,8 @@ from mdp.save import stl
 from tests.machine.running_workbench import PATIENCE_S, QUICK, Running, is_there, workbench
 from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import box, tee
+
+FOUND = ("front", "recommended", "cuts")
 
 
 @pytest.fixture(scope="module")
@@ -355,17 +358,82 @@ def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbi
         bench.send(folder / "tee.stl")
         page.do("add", normal=[1, 0, 0], offset_mm=8.0)
         page.until(lambda state: state["parts"] == 2)
+        page.do("add", normal=[0, 0, 1], offset_mm=20.0, after=1)
+        page.until(lambda state: state["parts"] == 3)
         page.do("set", key="process.walls", value="400")
         assert "Walls is 400" in page.until(lambda state: state["problem"])["problem"]
         page.do("profile", kind="machine", name="three_axis")
-        gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["problem"])
-        assert gone["parts"] == 0
-        assert "the planes were taken away, for part 2 cannot be cut off: " in gone["problem"]
+        gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["note"])
+        assert ([cut["offset_mm"] for cut in gone["cuts"]], gone["problem"]) == ([20.0], "")
+        assert gone["note"].startswith("the cut of part 3 was removed: ")
         page.do("undo")
-        page.until(lambda state: state["parts"] == 2 and state["given"]["machine"] == "generic_ac")
+        page.until(lambda state: state["parts"] == 3 and state["given"]["machine"] == "generic_ac")
         page.do("set", key="process.scale", value="2")
-        assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 2  # the planes go along
+        assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 3  # the planes go along
         page.do("undo")
+
+
+def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as_it_was_when_it_is_opened_again(
+    bench: Running, folder: Path
+) -> None:
+    (folder / "own.stl").write_bytes(stl(tee()))
+    (folder / "next.stl").write_bytes(stl(box(10.0, 10.0, 10.0)))
+    origin = f"http://127.0.0.1:{bench.port}"
+
+    def name_of(state: dict[str, Any]) -> str | None:
+        return state["model"] and str(state["model"]["name"])
+
+    def kept() -> list[dict[str, Any]]:
+        return [work for work in json.loads(bench.ask("kept")[1]) if work["name"] == "own.stl"]
+
+    with bench.line() as page:
+        bench.send(folder / "own.stl")
+        page.do("search", orient=False)
+        searched = page.until(lambda state: name_of(state) == "own.stl" and state["front"] and not state["search"])
+        assert searched["recommended"] == 2
+        before = page.state["kept"]
+        bench.send(folder / "next.stl")  # at once, before the autosave
+        opened = page.until(lambda state: name_of(state) == "next.stl")
+        assert opened["note"] == "own.stl, cut into 2 parts, is kept under Earlier work (Undo brings it back)"
+        assert opened["kept"] > before
+        page.do("undo")
+        assert page.until(lambda state: name_of(state) == "own.stl")["parts"] == 2
+        page.do("redo")
+        page.until(lambda state: name_of(state) == "next.stl")
+        (work,) = [work for work in kept() if work["parts"] == 2][-1:]
+        assert bench.ask(f"kept/{work['key']}", "POST", Origin=origin)[0] == 200
+        again = page.until(lambda state: name_of(state) == "own.stl")
+        assert {key: again[key] for key in FOUND} == {key: searched[key] for key in FOUND}
+        bench.send(folder / "next.stl")
+        page.until(lambda state: name_of(state) == "next.stl")
+        for work in kept():
+            assert bench.ask(f"kept/{work['key']}", "DELETE", Origin=origin)[0] == 200
+        assert kept() == []
+        assert bench.ask("kept/nothing", "DELETE", Origin=origin)[0] == 422
+
+
+def test_figures_and_the_list_of_orientations_follow_what_a_hand_does(bench: Running, folder: Path) -> None:
+    (folder / "hand.stl").write_bytes(stl(tee()))
+    with bench.line() as page:
+        bench.send(folder / "hand.stl")
+        page.until(lambda state: state["model"] and state["model"]["name"] == "hand.stl" and state["resting"])
+        assert [rest["words"] for rest in page.state["resting"] if rest["present"]] == ["as in the file"]
+        page.do("search", orient=False)
+        page.until(lambda state: state["front"] and not state["search"] and state["needing_mm2"] is not None)
+        whole, cut = page.state["front"]
+        assert page.state["needing_mm2"] == whole["support_area_mm2"]  # one number on both tabs
+        assert page.state["by_hand"] is None
+        (plane,) = page.state["cuts"]
+        page.do("move", part=2, normal=plane["normal"], offset_mm=plane["offset_mm"] - 5.0)
+        moved = page.until(lambda state: state["undo"] == "move a plane")
+        assert moved["by_hand"] is None  # not known yet, rather than that of the planes before
+        by_hand = page.until(lambda state: state["by_hand"])["by_hand"]
+        assert (by_hand["parts"], by_hand["planes"]) == (2, moved["cuts"])
+        assert by_hand["time_s"] != cut["time_s"]
+        page.do("turn", axis="x", deg=30)
+        turned = page.until(lambda state: state["undo"] == "turn the model" and state["overhang_mm2"] is not None)
+        (present,) = (rest for rest in turned["resting"] if rest["present"])
+        assert (present["words"], present["overhang_mm2"]) == ("as it lies now", turned["overhang_mm2"])
 
 
 def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:

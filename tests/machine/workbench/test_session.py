@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, with_front, with_profile
 from machine.workbench.session.base import hear_from
-from machine.workbench.session.commands import obey
-from machine.workbench.session.session import Session
+from machine.workbench.session.commands import obey, redo, undo
+from machine.workbench.session.session import Session, Workbench
+from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
 from machine.workbench.work.worker_pool import WorkerPools
@@ -24,7 +25,7 @@ from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
-from profiles.messages import key_name, option
+from profiles.messages import advice, option
 from profiles.profile import Profile, load
 from tests.machine.workbench.models import model
 
@@ -176,21 +177,42 @@ def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
     assert read.name.endswith(" at 2")
 
 
-def test_a_scale_that_was_set_for_a_model_is_not_that_of_the_next_one() -> None:
+SET_FOR_ONE = Given(
+    settings=("process.walls=4", "process.scale=25.4", "process.rotate_deg=[90,0,0]", "process.place_mm=[20.0, 0.0]")
+)
+
+
+@pytest.mark.parametrize("name", ["b", "a"])  # of another file, or of the same one opened again
+def test_a_model_starts_at_its_own_size_way_and_place_whatever_was_set_for_the_one_before(name: str) -> None:
     async def work(session: Session) -> None:
         async def read(task: Any, *given: Any, **more: Any) -> Any:
             return model(f"{given[1]} at {given[2].process.scale:g}") if task.__name__ == "read_model" else ()
 
         session.quick.run = read  # type: ignore[method-assign]
-        set_for_one = Given(settings=("process.walls=4", "process.scale=25.4", "process.rotate_deg=[90,0,0]"))
-        session.do("set", with_profile(session.bench, set_for_one, load(settings=set_for_one.settings)))
-        await session.open_model(Path("b"), "b")
+        session.do("set", with_profile(session.bench, SET_FOR_ONE, load(settings=SET_FOR_ONE.settings)))
+        await session.open_model(Path(name), name)
+        undo(session)
+        assert session.bench.profile.process.scale == 25.4
+        redo(session)
 
     bench = when_done(work).bench
     assert bench.model is not None
-    assert bench.model.name == "b at 1"
+    assert bench.model.name == f"{name} at 1"
     assert (bench.given.settings, bench.profile.process.walls) == (("process.walls=4",), 4)
-    assert (bench.profile.process.scale, bench.profile.process.rotate_deg) == (1.0, (0, 0, 0))
+    process = bench.profile.process
+    assert (process.scale, process.rotate_deg, process.place_mm) == (1.0, (0, 0, 0), (0.0, 0.0))
+
+
+def test_a_further_bench_has_the_settings_of_another_one_but_not_the_scale_of_its_model() -> None:
+    async def opened() -> Given:
+        workbench = Workbench(lambda pools: Session(load(), Given(), pools))
+        first = workbench.sessions[workbench.open()]
+        first.do("open a", Bench(load(settings=SET_FOR_ONE.settings), model("a"), given=SET_FOR_ONE))
+        given = workbench.sessions[workbench.open(first)].bench.given
+        await workbench.close_all()
+        return given
+
+    assert asyncio.run(opened()).settings == ("process.walls=4",)
 
 
 def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_told_later() -> None:
@@ -224,9 +246,24 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
 
     session = when_done(work)
     assert [stop.at for stop in session.bench.stops] == ["1:3"]
-    assert session.problem.startswith(
+    assert session.note.startswith(
         f"turn the model: taken away with part 2: {option('pause', '2:8.4mm')} (Undo brings it back); slicing has ended"
     )
+
+
+def test_advice_to_take_a_number_of_parts_goes_when_it_is_taken() -> None:
+    rows = (FrontRow((), 9.0, 0.0, 9.0, chosen=True), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0))
+    advised: list[list[str]] = []
+
+    async def work(session: Session) -> None:
+        session.do("find", with_front(session.bench, rows, ("no face hangs", f"2 parts would be better: {advice('parts', 2)}")))
+        for parts in (1, 2):
+            obey(session, {"do": "take", "parts": parts})
+            await settled(session)
+            advised.append(snapshot(session)["notes"])
+
+    when_done(work)
+    assert [len(notes) for notes in advised] == [2, 1]
 
 
 def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:
@@ -235,7 +272,7 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
         await asyncio.sleep(0)
         obey(session, {"do": "turn", "axis": "x", "deg": 90})
         await asyncio.sleep(0)
-        assert session.problem.startswith("slicing has ended")
+        assert session.note.startswith("slicing has ended")
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
         assert session.slicing.progress is not None
@@ -320,8 +357,9 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
         async def answer(task: Any, *given: Any, **more: Any) -> Any:
             if task.__name__ != "try_cuts":
                 return Standing((40.0, 8.0, 40.0), 0.0, "") if task.__name__ == "stand" else None
-            far = given[1].profile.process.place_mm[0] > 50.0 and any(cut.offset_mm > 20.0 for cut in given[2])
-            return Trial((), 3, "Z would go too far") if far else Trial(())
+            far = [part for part, cut in enumerate(given[2], start=2) if cut.offset_mm > 20.0]
+            is_there = given[1].profile.process.place_mm[0] > 50.0 and far
+            return Trial((), far[0], "Z would go too far") if is_there else Trial(())
 
         async def price(task: Any, bench: Bench, row: int, **more: Any) -> Any:
             return bench.rows[row]
@@ -331,13 +369,12 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
         for x in (30, 60):
             obey(session, {"do": "set", "key": "process.place_mm", "value": f"[{x}, 0]"})
             await settled(session)
-            cut.append((session.bench.parts, len(session.bench.rows), session.problem))
+            cut.append((session.bench.parts, len(session.bench.rows), session.note))
         obey(session, {"do": "undo"})
 
     cut: list[tuple[int, int, str]] = []
     session = when_done(work)
-    why = f"set {key_name('process.place_mm')}: the planes were taken away, for part 3 cannot be cut off: Z would go too far"
-    assert cut == [(3, 3, ""), (0, 2, why)]
+    assert cut == [(3, 3, ""), (2, 2, "the cut of part 2 was removed: Z would go too far (Undo brings it back)")]
     assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
 
 
@@ -352,10 +389,10 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
             session.finding.progress = Searched("stage 1", best)
             obey(session, {"do": "stop"})
             await asyncio.sleep(0)
-            told.append(session.stopped)
+            told.append(session.note)
             await settled(session)
         obey(session, {"do": "dismiss"})
-        told.append(session.stopped)
+        told.append(session.note)
 
     when_done(work)
     assert told == [
@@ -396,9 +433,9 @@ def test_a_stop_ends_the_search_at_once_though_a_command_before_it_is_still_exec
         assert is_seeking(session)
         async with session.turn:
             obey(session, {"do": "stop"})
-            assert (is_seeking(session), session.stopped) == (False, "")
+            assert (is_seeking(session), session.note) == (False, "")
 
-    assert when_done(work).stopped == "The search was stopped before it had cut anything: all is as it was."
+    assert when_done(work).note == "The search was stopped before it had cut anything: all is as it was."
 
 
 def test_a_stop_reaches_work_that_still_waits_for_its_turn() -> None:
@@ -408,7 +445,7 @@ def test_a_stop_reaches_work_that_still_waits_for_its_turn() -> None:
                 obey(session, {"do": name})
         await settled(session)
         assert (is_seeking(session), session.slicing.progress, session.slicing.number) == (False, None, 0)
-        stopped.append(session.stopped)
+        stopped.append(session.note)
         obey(session, {"do": "slice"})
 
     stopped: list[str] = []

@@ -62,7 +62,7 @@ def run(work: Coroutine[Any, Any, Any], *pools: WorkerPool) -> Any:
 async def rank(tasks: TaskQueue) -> float:
     """The height of the best orientation of a tee: 10 mm, as it lies on its face."""
     resting = await tasks.run(rank_resting, model(), PROFILE)
-    height_mm: float = resting[0].height_mm
+    height_mm: float = resting[1].height_mm
     return height_mm
 
 

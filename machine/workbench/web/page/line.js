@@ -7,33 +7,44 @@
 import { made, notice } from "../../../view/template/elements.js";
 
 export const AGAIN_MS = 1000;
+const SILENT_MS = 1500, LATE_MS = 200; // without a beat, two a second; and until what has come is heard, where the page itself was busy
 const ENDINGS = { 4404: "closed", 4403: "unpaired" }; // by the code with which the server ends a line: its bench is closed, its device let go
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
 export const LINE_TOLD = {
   open: "",
   lost: "The line to tiltprint is lost; trying again.",
+  silent: "tiltprint does not answer; waiting for it.",
   ended: "tiltprint has ended. Start it again and open the address that it tells; if it was killed, the files dropped here can be opened there.",
   replaced: "This page is of a tiltprint that has ended. Another one is here now: open the address that its terminal has told.",
   unpaired: "This device is not paired any more: load this page again to pair it by another code.",
   closed: "This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.",
 };
 
-/** A websocket below the page's address that comes back by itself: heard(what is told), and stands(a word of LINE_TOLD) whenever that changes. */
+/** A websocket below the page's address that comes back by itself: heard(what is told), and stands(a word of LINE_TOLD) whenever that changes.
+ * Where its path asks for beats it stands as silent as long as none come. */
 export function lineAt(path, heard, stands) {
-  let socket = null;
+  let socket = null, silence = 0, silent = false;
+  const listening = () => {
+    clearTimeout(silence);
+    if (silent) stands("open");
+    silent = false;
+    if (path.includes("beats")) silence = setTimeout(() => { silence = setTimeout(() => { silent = true; stands("silent"); }, LATE_MS); }, SILENT_MS);
+  };
   const open = () => {
     let opened = false;
     socket = new WebSocket(new URL(path, location.href.replace(/^http/, "ws")));
-    socket.onopen = () => { opened = true; stands("open"); };
-    socket.onmessage = ({ data }) => heard(JSON.parse(data));
+    socket.onopen = () => { opened = true; stands("open"); listening(); };
+    socket.onmessage = ({ data }) => { listening(); if (data) heard(JSON.parse(data)); };
     socket.onclose = async ({ code }) => {
+      clearTimeout(silence);
+      silent = false;
       const how = ENDINGS[code] || (opened ? "lost" : await whyUnanswered());
       stands(how);
       if (!["closed", "unpaired", "replaced"].includes(how)) setTimeout(open, AGAIN_MS);
     };
   };
   open();
-  return { isOpen: () => socket.readyState === WebSocket.OPEN, send: (command) => socket.send(JSON.stringify(command)) };
+  return { isOpen: () => socket.readyState === WebSocket.OPEN && !silent, send: (command) => socket.send(JSON.stringify(command)) };
 }
 
 /** Why no line can be opened: nobody is there, or one that does not know the page's address, which has another token at each start, or its device. */
@@ -60,7 +71,7 @@ export function openLine(follow, stands) {
       answered?.(refusal);
     }
   };
-  line = lineAt("line", heard, stands);
+  line = lineAt("line?beats", heard, stands);
 }
 
 /** A command; what becomes of it is seen by the next states. */
@@ -73,9 +84,6 @@ export function ask(command, answered) {
   asked.set(name, answered);
   send({ ...command, ask: name });
 }
-
-/** Sends a file of the person's to a bench; what is wrong with it comes back by the line, also where it is not taken to its end. */
-export const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE })}`, { method: "POST", body: file }).catch(() => {});
 
 /** A function of a key and its address that gives take() what is there, read: only what was asked for last, and once; null: nothing.
  * insists: what is not there is asked for again, as it always is where the line is lost; begin(): something is asked for. */

@@ -6,7 +6,7 @@ import { LINE_TOLD, openLine, send } from "./line.js";
 import { putNew, unitButtons, withWholeOptions } from "./lists.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
-import { facetsOf, fetchModel, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
+import { facetsOf, modelFetcher, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
 import { ringsOf } from "./model/rings.js";
 import { marksPanel } from "./parts/marks-panel.js";
 import { partsList, partsPanel } from "./parts/parts-panel.js";
@@ -26,20 +26,23 @@ import { keptLook, onState, store, subscribe, update } from "./store.js";
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
   themeSwitch((dark) => update({ dark }));
+  const fetchModel = modelFetcher(picture, () => follow(store.state));
   const follow = async (state) => {
     update({ state, turning: null });
-    await fetchModel(state.model, picture, () => follow(store.state));
+    await fetchModel(state.model);
     restoreLook();
     if (store.state.version === state.version) root.dataset.version = state.version;
   };
   openLine(follow, (how) => {
     root.dataset.line = how;
     notice(LINE_TOLD[how], "line");
+    update({ line: how });
   });
   tabsOf((tab) => update({ tab }));
   const restoreLook = keptLook(camera, picture);
   onState(tellState);
-  onState(({ stopped }) => notice(stopped, "stopped"));
+  subscribe(onlyWithLine);
+  onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
   const panels = [problemLine, elapsedTimes, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
@@ -70,9 +73,15 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
   toggle("has-model", model);
-  disable({ undo: !undo, redo: !redo });
   $("undo").ariaLabel = undo ? `undo: ${undo}` : "undo";
   $("redo").ariaLabel = redo ? `redo: ${redo}` : "redo";
+}
+
+/** What asks the bench for something cannot be pressed while there is no line to it; prints have a line of their own. */
+function onlyWithLine({ state, line }) {
+  const none = line !== "open";
+  document.querySelectorAll("#panel > section:not(#printing) fieldset").forEach((fields) => { fields.disabled = none; });
+  disable({ undo: none || !state.undo, redo: none || !state.redo, save: none, again: none, "put-near": none });
 }
 
 /** What could not be done last, for as long as it is so or until it is read. */
@@ -93,7 +102,7 @@ const WORK = {
 /** How long work has been under way, beside what it tells of itself, as soon as that is longer than a moment. */
 function elapsedTimes() {
   const begun = new Map(); // element -> {work, at}
-  const show = () => begun.forEach(({ work, at }, id) => {
+  const show = () => store.line === "open" && begun.forEach(({ work, at }, id) => {
     const seconds = (performance.now() - at) / 1000;
     $(id).dataset.elapsed = work && seconds >= MOMENT_S ? ` ${duration(seconds)}` : "";
   });

@@ -24,6 +24,7 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import FrontEnd, Notice, notices_to, say
 from machine.printing.checks import check
 from machine.printing.destination import parse_destination
+from machine.printing.history import past_prints
 from machine.printing.job import Does, End, PrintJob, Scene
 from machine.printing.serial_log import SerialLog
 from machine.printing.servers import follow
@@ -154,6 +155,8 @@ def test_whoever_dies_the_heaters_go_off(
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
     assert re.fullmatch(expected, state.sentence)
     assert Path(state.journal).is_file()
+    (last, *_) = past_prints()
+    assert (last["name"], last["outcome"]) == ("hour", "cancelled" if expected == "the print was stopped" else "failed")
 
 
 GOES_ON = "is printing hour.gcode and goes on without this program: its own page commands it"

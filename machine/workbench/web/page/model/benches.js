@@ -1,7 +1,7 @@
 // Benches: several models at once, each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
 
 import { $, button, hide, listen, made, notice, partsInWords, tell } from "../../../../view/template/elements.js";
-import { lineAt, sendFile } from "../line.js";
+import { lineAt, OWN_PAGE } from "../line.js";
 import { clock, putRows, removeButton } from "../lists.js";
 import { onNew } from "../store.js";
 
@@ -32,6 +32,21 @@ export async function takeFiles(files) {
   for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
 }
 
+/** Sends a file to a bench and shows how much of it is sent, with a button that breaks it off; what is wrong with it comes back by the line. */
+const sendFile = (file, to = "") => new Promise((done) => {
+  const request = new XMLHttpRequest(), mb = (bytes) => (bytes / 1e6).toFixed(1);
+  request.upload.onprogress = ({ loaded, total }) => {
+    hide({ sending: false });
+    Object.assign($("sending-bar"), { value: loaded, max: total });
+    tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
+  };
+  request.upload.onloadend = () => hide({ sending: true }); // it is read now, of which the state tells
+  request.onloadend = done;
+  $("sending-cancel").onclick = () => request.abort();
+  request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE })}`);
+  request.send(file);
+});
+
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
   const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
@@ -40,16 +55,16 @@ function benchRow({ number, name, parts, work }) {
 
 export function benchesPanel() {
   listen("click", { another: () => openBench() });
-  offer("kept");
+  onNew(({ kept, benches }) => [kept, benches.map(({ number, name }) => [number, name])], () => offer("kept"));
   onNew(({ benches }) => benches, (benches) => {
     hide({ benches: benches.length < 2 });
     putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
   });
 }
 
-const OFFERS = {
-  kept: ["kept-works", ({ kept, name, parts, written_s: written }) => [kept, `Work of ${moment(written)}`, name ? `${name}${parts ? `, ${partsInWords(parts)}` : ""}` : "cannot be read here"]],
-  left: ["left-files", ({ number, name, bytes, written_s: written }) => [number, name, `${Math.ceil(bytes / 1000).toLocaleString("en")} kB, ${moment(written)}`]],
+const OFFERS = { // most: entries that are listed, until all of them are asked for
+  kept: { list: "kept-works", most: 5, wordsOf: ({ parts, written_s: written }) => [parts ? partsInWords(parts) : "uncut", moment(written)] },
+  left: { list: "left-files", most: 5, wordsOf: ({ bytes, written_s: written }) => [`${Math.ceil(bytes / 1000).toLocaleString("en")} kB`, moment(written)] },
 };
 
 function moment(seconds) {
@@ -57,14 +72,20 @@ function moment(seconds) {
   return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 }
 
-/** What is there from earlier: work that was kept, or files that a workbench has left which was killed. */
+/** What is there from earlier, the newest first: work that was kept, or files that a workbench has left which was killed; at first the newest of each name. */
 export async function offer(what) {
-  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], [list, inWords] = OFFERS[what];
+  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], { list, most } = OFFERS[what];
+  const shown = most < Infinity ? found.filter(({ name }, k) => found.findIndex((one) => one.name === name) === k).slice(0, most) : found;
+  const rows = shown.map((one) => ({ id: `${one.key}`, told: JSON.stringify(one), make: () => offerRow(what, one) }));
+  const showAll = () => { OFFERS[what].most = Infinity; offer(what); }, all = { id: "/all", told: `${found.length}`, make: () => made("li", {}, button(`Show all ${found.length}`, showAll)) };
   hide({ [`${what}-field`]: !found.length });
-  $(list).replaceChildren(...found.map((one) => {
-    const [name, title, words] = inWords(one), open = () => fetch(`${what}/${encodeURIComponent(name)}`, { method: "POST" }).then(() => offer(what), () => {}); // a refusal comes by the line
-    return button("", open, {}, made("span", { text: title }), made("small", { text: words }));
-  }));
+  putRows(shown.length < found.length ? [...rows, all] : rows, $(list));
+}
+
+/** Its buttons: it is opened, or removed; a refusal comes by the line. */
+function offerRow(what, one) {
+  const name = one.name || "cannot be read here", words = OFFERS[what].wordsOf(one).join(", "), act = (method) => () => fetch(`${what}/${one.key}`, { method }).then(() => offer(what), () => {});
+  return made("li", {}, button("", act("POST"), {}, made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE")));
 }
 
 const PAIRED = "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself.";

@@ -30,13 +30,13 @@ export function modelPanel() {
   dropping();
   offer("left");
   onNew(({ rotation }) => rotation, () => TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; }));
-  onState(({ model, overhang_mm2: area }) => {
+  onState(({ model, overhang_mm2: area, needing_mm2: needing }) => {
     if (!model) return;
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
     listIn("model-notes", model.notes);
     tellTiny(model);
     tellFile(model);
-    if (area !== null) tell({ overhang: mm2(area) });
+    if (area !== null) tell({ overhang: mm2(area), needing: needing === null ? "" : `, of which ${mm2(needing)} need support` });
   });
   subscribe(tellModel);
 }

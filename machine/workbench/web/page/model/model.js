@@ -10,33 +10,27 @@ import { planesNow } from "../parts/planes.js";
 import { cornersAt, faceMet, overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 
-const MISSING = "The model has not come from tiltprint, so it is not drawn; it is asked for again with the next news.";
+const MISSING = "The model has not come from tiltprint, so it is not drawn yet; it is asked for again.";
 const MANY_FACES = 100000; // to fetch and draw them takes a moment, which is told
-let key = ""; // of the model that is there, or comes
 
-/** The triangles of the model on the bench, where they are others; again(): called where it may come a little later. */
-export async function fetchModel(model, picture, again) {
-  if ((model?.key || "") === key) return;
-  key = model?.key || "";
-  update({ triangles: null, seen: null });
-  let triangles = null;
-  if (model?.drawn) {
-    if (model.faces > MANY_FACES) notice(`${model.faces.toLocaleString("en")} faces are on their way into the picture …`, "model");
-    const answer = await fetch(`model/${model.key}`).catch(() => null), content = answer?.status === 200 ? await answer.arrayBuffer().catch(() => null) : null;
-    if (key !== model.key) return;
-    if (!content) {
-      key = ""; // the next state asks again, as that of a line that is back
-      picture?.show(null);
-      if (answer?.status !== 204) return notice(MISSING, "model");
-      return void setTimeout(() => { if (!key) again(); }, AGAIN_MS); // another model lies there by now
-    }
-    triangles = trianglesFrom(content);
-  }
-  notice("", "model");
-  picture?.show(triangles);
-  update({ triangles });
-  picture?.fit();
-  document.documentElement.dataset.shown = key;
+/** A function that fetches the triangles of a model where they are others than those that are there; again(): asks once more. */
+export function modelFetcher(picture, again) {
+  const begin = () => {
+    const faces = store.state.model?.faces || 0;
+    notice(faces > MANY_FACES ? `${faces.toLocaleString("en")} faces are on their way into the picture …` : "", "model");
+    update({ triangles: null, seen: null });
+  };
+  const take = (triangles, key) => {
+    const missing = key && !triangles;
+    if (missing) setTimeout(again, AGAIN_MS);
+    notice(missing ? MISSING : "", "model");
+    picture?.show(triangles);
+    update({ triangles });
+    picture?.fit();
+    document.documentElement.dataset.shown = missing ? "" : key;
+  };
+  const fetchTriangles = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true, begin });
+  return (model) => fetchTriangles(model?.drawn ? model.key : "", `model/${model?.key}`);
 }
 
 /** The model as it stands, or a hand turns it: the figure of what overhangs is the server's as soon as nothing moves. */
@@ -50,7 +44,7 @@ export function modelOf(picture) {
       stood = how;
       const found = overhanging(triangles, rotation[2], limit, platform);
       red = found.red;
-      if (turning || area === null) tell({ overhang: mm2(found.area) });
+      if (turning || area === null) tell({ overhang: mm2(found.area), needing: "" });
       const stands = standingBy(rotation, triangles.vertices, lift), [least, most] = stands.box;
       picture?.stand(stands);
       update({ seen: { size_mm: sub(most, least) } });
@@ -147,9 +141,9 @@ export function thumbnailsOf(picture) {
     const now = JSON.stringify([resting, laid]), drawn = triangles && picture, views = laid && drawn ? [["as it stood", laid.before], ["as it lies now", laid.after]] : [];
     if (now === told && triangles === model) return;
     [told, model] = [now, triangles];
-    $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area }) => {
+    $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area, present }) => {
       const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
-      return button("", lay, {}, thumbnail(drawn, rotation), made("span", { text: words }), made("small", { text: mm2(area) }));
+      return button("", lay, { ariaPressed: String(present) }, thumbnail(drawn, rotation), made("span", { text: words }), made("small", { text: mm2(area) }));
     }));
     hide({ laid: !views.length });
     $("laid").replaceChildren(...views.map(([words, rotation]) => made("figure", {}, thumbnail(drawn, rotation), made("figcaption", { text: words }))));

@@ -16,7 +16,7 @@ export function partsPanel() {
     update({ row: null });
     Object.assign($("front"), { max: front.length - 1, value: place, disabled: front.length < 2 });
     marksUnder(front, recommended);
-    tellRow(front[place]);
+    tellRow(front.find((row) => row.parts === parts) || { parts, planes: null });
     listIn("front-notes", notes);
     hide({ recommended: !recommended });
   };
@@ -49,7 +49,7 @@ export function partsPanel() {
     tell({ "search-told": search ? search.text : "" });
     toggle("no-cuts", !parts);
   });
-  onNew(({ front, parts, recommended, cuts, priced, notes }) => [front, parts, recommended, cuts, priced, notes], ([front]) => {
+  onNew(({ front, parts, recommended, cuts, priced, notes, by_hand: own }) => [front, parts, recommended, cuts, priced, notes, own], ([front]) => {
     if (!front.length) {
       held = null;
       if (store.row) update({ row: null });
@@ -68,15 +68,16 @@ function marksUnder(front, recommended) {
 }
 
 function tellRow(row) {
-  const { recommended, parts, cuts, priced } = store.state;
-  const byHand = row.parts === parts && !alike(row.planes, cuts);
-  const orDash = (value, told) => (value !== null ? told(value) : priced ? "–" : "worked out anew …"), best = row.parts === recommended;
+  const { recommended, parts, cuts, priced, by_hand: own } = store.state;
+  const byHand = row.parts === parts && !alike(row.planes, cuts), best = row.parts === recommended;
+  const figures = byHand ? own || {} : row, unknown = byHand && !own ? "…" : priced ? "–" : "worked out anew …";
+  const figure = (key, told) => (Number.isFinite(figures[key]) ? told(figures[key]) : unknown);
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
-    ["parts", `${row.parts}${byHand ? ", changed by hand since; this is how they were found" : best ? ` (recommended: ${row.why})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
-    ["seams", `${row.seam_mm.toFixed(0)} mm`], ["stairs", mm2(row.stairs_mm2)], ["takes about", orDash(row.time_s, roughly)],
-    ["plastic", orDash(row.filament_mm, (long) => `${(long / 1000).toFixed(1)} m`)],
+    ["parts", `${row.parts}${byHand ? ", changed by hand since" : best ? ` (recommended: ${row.why})` : ""}`], ["area to support", figure("support_area_mm2", mm2)],
+    ["seams", figure("seam_mm", (long) => `${long.toFixed(0)} mm`)], ["stairs", figure("stairs_mm2", mm2)], ["takes about", figure("time_s", roughly)],
+    ["plastic", figure("filament_mm", (long) => `${(long / 1000).toFixed(1)} m`)],
   ]);
 }
 
