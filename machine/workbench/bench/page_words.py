@@ -46,7 +46,7 @@ PHRASES = {
     "machine of those": "take a machine of those under Settings",
     "least offset": "the offset must be at least {} mm",
     "offset": "the offset is {} mm",
-    "thin": "{}",
+    "page": "{}",
     "one part": "take 1 under In how many parts",
     "settings": "Settings",
     "": "",
