@@ -1,5 +1,6 @@
 """Frozen: the base of all validated values of a profile, and the declaration of their keys."""
 
+import re
 from collections.abc import Callable, Iterable
 from enum import IntEnum
 from functools import partial
@@ -52,7 +53,10 @@ UNITS = (  # ending of a key's name -> unit on a page
     ("_n", "N"),
     ("_px", "px"),
     ("_bytes", "bytes"),
+    *((ending, "%") for ending in ("_share", "_density", "flow", "_overlap", "_bulge", "seam_gap", "_weld_factor", "_saving")),
+    *((ending, "%") for ending in ("fan", "fan_least", "fan_bridge", "fan_infill_bridge", "least_gain", "_gain_preferred")),
 )
+PERCENT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)) ?%")
 
 
 class Effect(IntEnum):
@@ -99,6 +103,13 @@ class Frozen(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
+    def _percentage(cls, value: Any, info: ValidationInfo) -> Any:
+        """Read a percentage, as "20%", for a key whose value is a share."""
+        written = PERCENT.fullmatch(value) if isinstance(value, str) and unit_of(str(info.field_name)) == "%" else None
+        return float(f"{written[1]}e-2") if written else value
+
+    @field_validator("*", mode="before")
+    @classmethod
     def _no_truth_as_number(cls, value: Any, info: ValidationInfo) -> Any:
         """Refuse true and false where pydantic would read 1 and 0."""
         if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
@@ -124,9 +135,9 @@ def may_be_left_out(annotation: Any) -> bool:
 
 
 def unit_of(key: str) -> str:
-    """The unit of a key's value as shown on a page; "" if it has none.
+    """The unit of a key's value as shown on a page; "" if it has none. A share from 0 to 1 is shown in %.
 
-    >>> unit_of("machine.tilt.acceleration_deg_s2"), unit_of("process.walls")
-    ('°/s²', '')
+    >>> unit_of("machine.tilt.acceleration_deg_s2"), unit_of("process.infill_density"), unit_of("process.walls")
+    ('°/s²', '%', '')
     """
     return next((unit for ending, unit in UNITS if key.endswith(ending)), "")

@@ -207,13 +207,13 @@ class Machine(Frozen):
         "is full and clean, mm; 0: none, or the start block has one itself",
     )
     nozzle_limit_c: float = advanced("Hottest nozzle", "maximum temperature", gt=0, le=600, effect=Effect.NONE)(
-        300.0, "greatest nozzle temperature, deg C"
+        300.0, "greatest nozzle temperature, °C"
     )
     nozzle_heating_c_s: float = rare("Heating of the nozzle", "heat-up rate", gt=0, le=50, effect=Effect.PRICES)(
-        1.5, "how fast the nozzle gets hotter when it is near the heat of printing, deg C/s: by it waiting is estimated"
+        1.5, "how fast the nozzle gets hotter when it is near the heat of printing, °C/s: by it waiting is estimated"
     )
     bed_limit_c: float = advanced("Hottest bed", "maximum temperature heatbed", ge=0, le=300, effect=Effect.NONE)(
-        120.0, "greatest bed temperature, deg C; 0: no heated bed"
+        120.0, "greatest bed temperature, °C; 0: no heated bed"
     )
     thumbnails_px: list[tuple[Pixels, Pixels]] = advanced(
         "Pictures in the G-code", "thumbnails preview", max_length=4, effect=Effect.NONE

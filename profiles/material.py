@@ -8,7 +8,7 @@ class Material(Frozen):
 
     name: str = rare("Name of the material", "filament", effect=Effect.NONE)(..., "what people call it")
     diameter_mm: float = simple("Filament diameter", ge=1, le=4)(1.75, "filament diameter, mm")
-    density_g_cm3: float = advanced("Density", "filament weight grams", gt=0, le=10, effect=Effect.NONE)(1.24, "density, g/cm3")
+    density_g_cm3: float = advanced("Density", "filament weight grams", gt=0, le=10, effect=Effect.NONE)(1.24, "density, g/cm³")
     price_per_kg: float | None = simple("Price per kilogram", "filament cost spool money", ge=0, le=1e6, effect=Effect.NONE)(
         None, "what a kilogram costs, so that reports tell what a print costs; absent: they do not"
     )
@@ -16,22 +16,22 @@ class Material(Frozen):
         "", "what the price is counted in, as EUR; stands behind it in reports"
     )
     nozzle_c: float = simple("Nozzle temperature", "hotend extruder printing heat", ge=150, le=450, effect=Effect.NONE)(
-        ..., "nozzle temperature, deg C"
+        ..., "nozzle temperature, °C"
     )
     first_layer_nozzle_c: float = simple(
         "First layer nozzle temperature", "initial layer hotend extruder heat", ge=150, le=450, effect=Effect.NONE
-    )(..., "nozzle temperature of the first layer on the plate, deg C")
+    )(..., "nozzle temperature of the first layer on the plate, °C")
     homing_nozzle_c: float = advanced("Nozzle temperature while homing", "preheat ooze hotend", ge=0, le=450, effect=Effect.NONE)(
-        150.0, "nozzle while the machine homes and the bed heats, deg C: nothing may ooze at 150"
+        150.0, "nozzle while the machine homes and the bed heats, °C: nothing may ooze at 150"
     )
     standby_c: float | None = advanced(
         "Nozzle temperature while paused", "standby idle hotend", ge=0, le=450, effect=Effect.NONE
-    )(None, "nozzle while a print is paused, deg C; left out: as hot as it prints")
+    )(None, "nozzle while a print is paused, °C; left out: as hot as it prints")
     bed_c: float = simple("Bed temperature", "heatbed build plate heat", ge=0, le=200, effect=Effect.NONE)(
-        ..., "bed temperature, deg C; 0: bed off"
+        ..., "bed temperature, °C; 0: bed off"
     )
     fan: float = simple("Part fan, at most", "cooling fan speed maximum", ge=0, le=1, effect=Effect.NONE)(
-        ..., "part fan in layers that take least_layer_time_s or less, 0 to 1"
+        ..., "part fan in layers that take least_layer_time_s or less"
     )
     fan_least: float = simple("Part fan, at least", "cooling fan speed minimum", ge=0, le=1, effect=Effect.NONE)(
         0.35, "part fan in layers that take fan_layer_time_s or more, at most fan; between, in between"
@@ -56,9 +56,9 @@ class Material(Frozen):
         "tensile strength across layers, MPa; PLA printed well reaches 34, 3D Print. Addit. Manuf. 2020; ordinary prints and "
         "other filaments bond less",
     )
-    cold_weld_factor: float = rare("Strength on cold plastic, as a share", "tensile bond weld", gt=0, le=1, effect=Effect.FRONT)(
+    cold_weld_factor: float = rare("Strength on cold plastic", "tensile bond weld", gt=0, le=1, effect=Effect.FRONT)(
         0.6,
-        "factor on interlayer_strength_mpa where a part stands on plastic that has cooled: an assumption, no such joint has been "
+        "share of interlayer_strength_mpa where a part stands on plastic that has cooled: an assumption, no such joint has been "
         "measured; strength across layers is 25 to 50 % below that along them, but 75 to 90 % with fibres or long times between "
         "layers, Duty and others, Solid Freeform Fabrication 2018",
     )
@@ -90,7 +90,7 @@ class Material(Frozen):
         "M572; absent: what the firmware has",
     )
     volumetric_limit_mm3_s: float = advanced("Most plastic melted", "maximum volumetric speed flow limit", gt=0, le=200)(
-        ..., "most plastic the hot end melts, mm3/s"
+        ..., "most plastic the hot end melts, mm³/s"
     )
 
     @property

@@ -52,7 +52,7 @@ class Search(Frozen):
     )
     cut_mm2: float = advanced("What a cut costs", "fewer parts penalty", ge=0, le=10000)(
         10.0,
-        "what a cut costs beside its seam: one more turn, one more joint that can fail, mm2; a cut that saves less than its seam "
+        "what a cut costs beside its seam: one more turn, one more joint that can fail, mm²; a cut that saves less than its seam "
         "and this is not made",
     )
     stair_weight: float = advanced("Stairs count", "staircase layer lines stepping quality", ge=0, le=10)(
@@ -64,24 +64,24 @@ class Search(Frozen):
     second_mm2: float = advanced("What a second costs", "print time penalty", ge=0, le=1000)(
         0.1,
         "what a second of printing counts in the choice between numbers of parts and orientations: so much surface that a seam "
-        "or support blemishes, mm2 (1 cm2 is worth 1000 s); 0: time is free, as it is without support",
+        "or support blemishes, mm² (1 cm² is worth 1000 s); 0: time is free, as it is without support",
     )
     metre_mm2: float = advanced("What a metre of filament costs", "plastic waste penalty", ge=0, le=1e5)(
         100.0,
-        "what a metre of filament counts there, mm2 (as 1000 s do: support has to be removed again); 0: it is free, as it is "
+        "what a metre of filament counts there, mm² (as 1000 s do: support has to be removed again); 0: it is free, as it is "
         "without support",
     )
     hidden_seam_share: float = rare("Hidden cuts count", gt=0, le=1)(
         0.25,
         "how much a seam counts deep in a crease or neck or out of sight, as a share of what it counts across a smooth surface "
-        "in plain sight; 1: the same everywhere",
+        "in plain sight; 100 %: the same everywhere",
     )
     feature_weight: float = rare("Cuts across bores count", "holes", ge=1, le=1000)(
         4.0, "how many times a seam counts across a bore, where a ridge spoils a fit; 1: as elsewhere"
     )
     feature_mm2: float = rare("What a cut askew through a bore costs", "holes", ge=0, le=1e5)(
         500.0,
-        "what it costs beside its seam that a cut passes askew through a bore, which then holds and guides nothing, mm2; one "
+        "what it costs beside its seam that a cut passes askew through a bore, which then holds and guides nothing, mm²; one "
         "across its axis leaves it round and costs nothing",
     )
     unsupportable_weight: float = rare("Overhangs with nothing below count", "supports", ge=1, le=1000)(
@@ -98,13 +98,13 @@ class Search(Frozen):
         True, "the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added"
     )
     least_volume_share: float = advanced("Smallest part", "minimum volume", ge=0, lt=1)(
-        0.02, "criterion IV: a part has at least this share of the model's volume (published: 0.1)"
+        0.02, "criterion IV: a part has at least this share of the model's volume (published: 10 %)"
     )
     preferred_volume_share: float = rare("Smallest part that is preferred", "minimum volume", ge=0, lt=1)(
         0.1, "criterion IV as a preference: the classic ranking takes parts of at least this share of the volume first"
     )
     least_interface_mm2: float = advanced("Smallest face a part stands on", "minimum area", ge=0, le=1e6)(
-        4.0, "least area that a part, and each of its pieces that is no fragment, stands on, mm2"
+        4.0, "least area that a part, and each of its pieces that is no fragment, stands on, mm²"
     )
     nozzle_load_n: float = rare("Push of the nozzle", "strength force", ge=0, le=1000)(
         5.0,
@@ -135,7 +135,7 @@ class Search(Frozen):
         0.002, "a cut must make at least this share of the risky area safe, faces that stand on the build plate not counted"
     )
     least_gain_preferred: float = rare("Least share a preferred cut makes safe", ge=0, le=1)(
-        1e-4, "the same for parts of the preferred volume in the classic ranking, which may be many (published: 0.0001)"
+        1e-4, "the same for parts of the preferred volume in the classic ranking, which may be many (published: 0.01 %)"
     )
     platform_radius_mm: float | None = rare("Radius that planes must clear", gt=0)(
         None, "criterion III: radius of the disc that every plane must clear; absent: the model's footprint"

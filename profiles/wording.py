@@ -11,11 +11,13 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from profiles.frozen import unit_of
 from profiles.messages import key_name, phrase
 
 LONGEST_VALUE = 60
 KEY = re.compile(r"\b[a-z][a-z0-9]*_\w+")
 ONE_OF, NAME_OF = re.compile(r"\^\[(\w+)\]\$"), re.compile(r"\^\[([^\]]+)\]\*\$")
+DECIMAL_COMMA = re.compile(r"\d+,\d+")
 KINDS = (("A-Za-z", "letters"), ("0-9", "digits"))
 
 
@@ -58,7 +60,7 @@ def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> st
             return f"{key_name(f'{key}.{word}')}{_with_marks(text[len(word) :], key, fields)}"
         return f"{key_name(key)}: {_with_marks(text, key, fields)}"
     if problem["type"] == "extra_forbidden":
-        near = nearest(key, [name for name, _ in keys(root, prefix)])
+        near = nearest(key, [name for name, _ in sorted(keys(root, prefix), key=_rareness)])
         return f"{key} is not a key of a profile" + (
             f": did you mean {key_name(near)}?" if near else f" ({phrase('settings', '`profiles show`')} lists them)"
         )
@@ -68,8 +70,30 @@ def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> st
     field = _field(root, steps)
     while steps and isinstance(steps[-1], int) and problem["type"] == "missing":
         steps, key = steps[:-1], key.rpartition(".")[0]
+    if field and unit_of(key) == "%":
+        return f"{key_name(key)} is {_share_problem(problem['input'], field)}"
     expected = allowed(field) if field else "a table of keys"
     return f"{key_name(key)} is {_shown(problem['input'])}: it must be {expected}"
+
+
+def _share_problem(given: Any, field: FieldInfo) -> str:
+    """The value of a share and what it must be: a number for a file or an option, a percentage for the page."""
+    number, meant = given if isinstance(given, float | int) else None, ""
+    most = next(most for rule in field.metadata for name in ("le", "lt") if (most := _bound(rule, name)))
+    if isinstance(given, str) and DECIMAL_COMMA.fullmatch(given.strip()):
+        number = float(given.strip().replace(",", "."))
+        meant = f": write {number:g}"
+    elif number is not None and most < number <= 100.0 * most:
+        meant = f": write {number:g}%"
+    terminal = f"{_shown(given)}: it must be {allowed(field)} or a percentage{meant}"
+    shown = _shown(given) if number is None else f"{100.0 * number:.6g} %"
+    return phrase("page", terminal, f"{shown}: it must be a percentage{_range(field.metadata, 100.0)}")
+
+
+def _rareness(entry: tuple[str, FieldInfo]) -> bool:
+    """Whether not everybody needs a key."""
+    extra: Any = entry[1].json_schema_extra
+    return (extra or {}).get("level") != "simple"
 
 
 def _with_marks(text: str, table: str, fields: Collection[str]) -> str:
@@ -78,11 +102,13 @@ def _with_marks(text: str, table: str, fields: Collection[str]) -> str:
 
 
 def nearest(key: str, known: list[str]) -> str | None:
-    """The known key most similar to a mistyped one: in its table by its last word, else in any table."""
+    """The known key most similar to a mistyped one: one in its table that begins with it, or is like its last word, else in any
+    table."""
     table, _, word = key.rpartition(".")
     same = {name.rpartition(".")[2]: name for name in known if name.rpartition(".")[0] == table}
     every = {name.rpartition(".")[2]: name for name in known}
-    return next((names[close[0]] for names in (same, every) if (close := get_close_matches(word, names, 1, 0.7))), None)
+    begun = next((name for last, name in same.items() if last.startswith(f"{word}_")), None)
+    return begun or next((names[close[0]] for names in (same, every) if (close := get_close_matches(word, names, 1, 0.7))), None)
 
 
 def _field(root: type[BaseModel], steps: tuple[str | int, ...]) -> FieldInfo | None:
@@ -158,8 +184,10 @@ def _list(item: Any, metadata: list[Any]) -> str:
     return f"a list of{needed} pairs of {number}"
 
 
-def _range(metadata: list[Any]) -> str:
-    bounds = {name: value for rule in metadata for name in ("ge", "gt", "le", "lt") if (value := _bound(rule, name)) is not None}
+def _range(metadata: list[Any], scale: float = 1.0) -> str:
+    bounds = {
+        name: scale * value for rule in metadata for name in ("ge", "gt", "le", "lt") if (value := _bound(rule, name)) is not None
+    }
     low = f" from {bounds['ge']:g}" if "ge" in bounds else f" above {bounds['gt']:g}" if "gt" in bounds else ""
     high = f" to {bounds['le']:g}" if "le" in bounds else f" and below {bounds['lt']:g}" if "lt" in bounds else ""
     return low + (f" and{high.replace(' to', ' up to')}" if low.startswith(" above") and high.startswith(" to") else high)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from machine.pipeline.requests import MOST_COPIES, ModelRequest
-from machine.planning.stops import parts_in_words
+from machine.planning.stops import check_stop_parts, parts_in_words
 from mdp.directions.orientation import motion_between
 from mdp.mesh import Mesh
 from mdp.model_file import plan_beside
@@ -24,7 +24,9 @@ from profiles.profile import Profile, with_part_settings
 def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
     """The request for each model of a plate, with the plan that names it. Raises PlanError."""
     models = list(dict.fromkeys((request.model, *request.beside)))
-    each = {name: replace(request, model=name, beside=(), plans=()) for name in models}
+    alone = len(models) == 1 and not (request.copies > 1 and request.profile.process.complete_objects)
+    stops = request.stops if alone else ()  # else they count the parts of all
+    each = {name: replace(request, model=name, beside=(), plans=(), stops=stops) for name in models}
     names = [own.name for own in each.values()]
     if request.profile.parts and len(models) > 1:
         part = request.profile.parts[0]
@@ -119,9 +121,17 @@ def check_modifiers(profile: Profile, modifiers: Sequence[Modifier], where: str)
             raise PlanError(f"{where}: " + "; ".join(f"modifier {number}: {problem}" for problem in problems))
 
 
-def check_parts_named(profile: Profile, parts: int) -> None:
-    """Raise ProfileError for settings of parts that do not exist."""
+def check_parts_possible(request: ModelRequest, given: PlanFile | None, profile: Profile) -> None:
+    """Raise ProfileError or SliceError before the search for settings or stops of parts that it cannot make."""
+    planes = () if given is None else given.row(request.parts) if request.plan and request.parts else given.parts
+    most = len(planes) + 1 if request.plan else max(len(planes) + 1, request.parts or profile.search.most_parts)
+    check_parts_named(profile, most, at_most=True)
+    check_stop_parts(request.stops, most, at_most=True)
+
+
+def check_parts_named(profile: Profile, parts: int, at_most: bool = False) -> None:
+    """Raise ProfileError for settings of parts that do not exist. at_most: `parts` is the most there can be."""
     for settings in profile.parts:
         if settings.part > parts:
-            there = parts_in_words(parts)
-            raise ProfileError(f"part {settings.part} is not there to have {settings.in_words}: the parts are {there}")
+            there = parts_in_words(parts, at_most)
+            raise ProfileError(f"{option('part', settings.part)}: there is no part {settings.part}, {there}")

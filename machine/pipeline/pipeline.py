@@ -19,6 +19,7 @@ from machine.pipeline.given_plan import (
     check_modifiers,
     check_number,
     check_parts_named,
+    check_parts_possible,
     read_given_plan,
     request_of_each,
     with_file_marks,
@@ -31,7 +32,7 @@ from machine.pipeline.requests import ModelRequest, check_copies
 from machine.planning.fit import check_parts, check_standing, lifted, standing_at
 from machine.planning.moves import MachineProgram
 from machine.planning.plan import has_purge, plan
-from machine.planning.stops import Stop
+from machine.planning.stops import Stop, check_stop_heights
 from machine.program import Program
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import set_on_plate
@@ -95,6 +96,7 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     """Decompose one of the models by itself."""
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)
+    check_parts_possible(request, given, profile)
     if to_build:
         check_blocks(profile)
     began = perf_counter()
@@ -189,6 +191,7 @@ def build(
     """
     parts = decomposition.parts
     check_blocks(profile)
+    check_stop_heights(stops, [float(np.ptp(part.mesh.vertices @ part.direction)) for part in parts], profile)
     with naming_parts(parts):
         check_parts(parts, profile)
     decomposition = standing_at(decomposition, profile.process.place_mm)

@@ -9,6 +9,7 @@ from profiles.errors import SliceError
 from profiles.messages import advice
 
 if TYPE_CHECKING:
+    from profiles.profile import Profile
     from slicer.paths import SlicedPart
 
 WRITTEN = re.compile(r"(\d{1,6}):(?:(\d{1,6})|(\d{1,6}(?:\.\d{1,6})?)mm)")
@@ -48,18 +49,29 @@ def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ..
     return tuple(stops)
 
 
-def parts_in_words(count: int) -> str:
-    """The numbers of parts: "1 to 3"."""
-    return "1 alone" if count == 1 else f"1 to {count}"
+def parts_in_words(count: int, at_most: bool = False) -> str:
+    """Which parts there are: "the parts are 1 to 3". at_most: `count` is the most there can be."""
+    return "there is only part 1" if count == 1 else f"the parts are 1 to {count}{' at most' * at_most}"
 
 
-def check_stop_parts(stops: Sequence[Stop], count: int) -> None:
-    """Raise SliceError for a stop in a part that does not exist. count: number of parts."""
+def check_stop_parts(stops: Sequence[Stop], count: int, at_most: bool = False) -> None:
+    """Raise SliceError for a stop in a part that does not exist. count: the number of parts, at_most: the most there can be."""
     for stop in stops:
         if stop.part > count:
-            raise SliceError(
-                f"{advice(stop.option, stop.at)}: there is no part {stop.part}, the parts are {parts_in_words(count)}"
-            )
+            there = parts_in_words(count, at_most)
+            raise SliceError(f"{advice(stop.option, stop.at)}: there is no part {stop.part}, {there}")
+
+
+def check_stop_heights(stops: Sequence[Stop], heights_mm: Sequence[float], profile: "Profile") -> None:
+    """Raise SliceError for a stop in a part, or at a layer or height, that cannot exist. heights_mm: greatest height of each
+    part."""
+    check_stop_parts(stops, len(heights_mm))
+    for stop in stops:
+        process, height_mm = profile.of_part(stop.part).process, heights_mm[stop.part - 1]
+        most = int(height_mm / min(process.least_layer_height_mm, *(getattr(process, key) for key in process.heights))) + 1
+        if (stop.layer or 0) > most or (stop.height_mm or 0.0) >= height_mm:
+            layers = "" if stop.layer is None else f" and has at most {most} layers"
+            raise SliceError(f"{advice(stop.option, stop.at)}: part {stop.part} is at most {height_mm:.3g} mm high{layers}")
 
 
 def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:
@@ -80,4 +92,4 @@ def _layer_of(stop: Stop, sliced: Sequence["SlicedPart"]) -> int:
     for number, layer in enumerate(piece.layers, start=1):
         if layer.z_mm - layer.height_mm >= (stop.height_mm or 0.0) - 1e-6:
             return number
-    raise SliceError(f"{advice(stop.option, stop.at)}: part {stop.part} is only {piece.layers[-1].z_mm:g} mm high")
+    raise SliceError(f"{advice(stop.option, stop.at)}: part {stop.part} is only {piece.layers[-1].z_mm:.3g} mm high")

@@ -276,7 +276,7 @@ def _reason_text(problem: Problem, node: Node, plane: Plane, limits: Bounds, rea
             text = "a piece of it would float: nothing printed before lies below it"
         case Reason.FRAGILE:
             visible = f"{sliver_mm:.2g}" if sliver_mm >= 1e-4 else "less than 0.001"
-            sliver = f"its plane would leave a sliver {phrase('thin', f'{sliver_mm:.2g}', visible)} mm thin"
+            sliver = f"its plane would leave a sliver {phrase('page', f'{sliver_mm:.2g}', visible)} mm thin"
             text = f"{sliver}: {limits.fragile_mm:g} is the least ({key_name('search.fragile_mm')})"
         case Reason.KEEP:
             number = problem.zones.crossed(plane)

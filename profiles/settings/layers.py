@@ -121,7 +121,7 @@ class Shell(Frozen):
     solid_below_mm2: float = advanced("Solid infill in places below", "solid infill threshold area minimum sparse", ge=0, le=1e6)(
         70.0,
         "places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more than the "
-        "plastic saved, mm2",
+        "plastic saved, mm²",
     )
     gap_least_mm: float = advanced("Shortest gap fill", "filter out tiny gaps gap fill enabled", ge=0, le=1000)(
         0.0, "gap fill shorter than this is left out, which saves travels; 1000 leaves out all gap fill, mm"
@@ -183,7 +183,7 @@ class Infill(Frozen):
         simple("Infill pattern", "fill pattern sparse lightning")(
             "grid",
             "pattern of the sparse infill: cubic and gyroid are equally stiff all ways, lightning only holds what is "
-            "solid above it; a density of 1 is always solid",
+            "solid above it; 100 % is always solid",
         )
     )
     infill_angle_deg: float = advanced("Infill angle", "fill direction", ge=0, le=360)(

@@ -14,7 +14,7 @@ MIDDLE = (0.0, 0.0)
 class Support(Frozen):
     """Overhangs, bridges and support."""
 
-    overhang_share: float = rare("Share on plastic below which a wall overhangs", "overhangs threshold", ge=0, le=1)(
+    overhang_share: float = rare("Walls overhang with less on plastic than", "overhangs threshold", ge=0, le=1)(
         0.5, "walls with less than this share of their width on plastic below count as overhanging"
     )
     bridge_longest_mm: float | None = advanced(
@@ -30,7 +30,7 @@ class Support(Frozen):
         "below; the crown of a level hole is 0.7 of its diameter wide, mm",
     )
     bridge_flow: float = advanced("Bridge flow", "bridge flow ratio bridging", ge=0.3, le=2)(
-        1.0, "factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
+        1.0, "factor on extruded volume of bridges; 100 %: as much plastic as the layer has room for"
     )
     bridge_angle_deg: float = advanced("Bridge angle", "bridging angle override direction", ge=0, le=360)(
         0.0, "direction of the lines of bridges in the part's frame; 0: that in which they sag least, 180: along x, deg"
@@ -106,12 +106,12 @@ class Support(Frozen):
     )
     support_foot_density: float = rare("Density of the foot", "supports first layer density", gt=0, le=1)(
         0.85,
-        "share of the support's first layer on the build plate that is filled; at 0.85 or more its lines are so close together "
+        "share of the support's first layer on the build plate that is filled; at 85 % or more its lines are so close together "
         "that everything on it has plastic beneath",
     )
     support_least_mm2: float = advanced(
         "Smallest place that is supported", "supports minimum area remove small overhangs", ge=0, le=1000, effect=Effect.FRONT
-    )(1.0, "a hanging place smaller than this, seen from above, holds itself, mm2")
+    )(1.0, "a hanging place smaller than this, seen from above, holds itself, mm²")
 
     @property
     def bridge_mm(self) -> float:
@@ -178,8 +178,8 @@ class Interface(Frozen):
     )
     interface_flow: float = advanced("Flow of the first layer on plastic", "bond weld extrusion multiplier", ge=0.5, le=1.5)(
         1.1,
-        "factor on extruded volume of a part's first layer on plastic, of the room between its tip and the part below: 1.10 "
-        "fills the pores, 1.15 overfills (Scientific Reports, doi s41598-025-26253-0, fig. 14)",
+        "factor on extruded volume of a part's first layer on plastic, of the room between its tip and the part below: 110 % "
+        "fills the pores, 115 % overfills (Scientific Reports, doi s41598-025-26253-0, fig. 14)",
     )
     interface_line_width_mm: float | None = advanced(
         "Line width of the first layer on plastic", "bond weld extrusion width", ge=0.1, le=4
@@ -192,7 +192,7 @@ class Interface(Frozen):
     )
     interface_temperature_add_c: float = simple("Hotter on plastic by", "bond weld temperature adhesion strength", ge=0, le=50)(
         10.0,
-        "how much hotter a part's layers on plastic are printed, deg C; asked for before the table turns and waited for after "
+        "how much hotter a part's layers on plastic are printed, °C; asked for before the table turns and waited for after "
         "it. A bond welds as long as it is hot, seconds (Ai and Vogt, doi s40964-022-00275-w); heat above the glass transition "
         "added 15 % in PA-CF (PMC7284967)",
     )
@@ -254,7 +254,7 @@ class Interface(Frozen):
         "are no more than most_pins",
     )
     most_pins: int = advanced("Most pins of a part", "dowels pegs connectors", ge=1, le=1000)(
-        9, "pins of a part at most: each takes 10 to 45 s and 40 to 75 mm3, mostly for the walls round it and its floor"
+        9, "pins of a part at most: each takes 10 to 45 s and 40 to 75 mm³, mostly for the walls round it and its floor"
     )
 
     @model_validator(mode="before")

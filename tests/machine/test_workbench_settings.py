@@ -67,6 +67,21 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: set a part'")
 
 
+def test_a_percentage_is_typed_as_everyone_does_and_a_comma_is_a_decimal_point(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "percent.stl", stl(tee()))
+    browser.click("#tab-settings")
+    field = "document.querySelector('[data-key=\"process.infill_density\"] input')"
+    browser.wait(f"{field} && {field}.value === '20'")
+    for typed, setting in (("12,5", "12.5%"), ("35 %", "35%")):
+        browser.value(f"{field}.select(), {field}.focus()")
+        for key in typed:
+            browser.key(key)
+        browser.value(f"{field}.dispatchEvent(new Event('change'))")
+        browser.wait(f"$('command-line').textContent.includes('--set process.infill_density={setting} ')")
+    browser.click("#reset-settings")
+    browser.wait("!$('command-line').textContent.includes('infill_density')")
+
+
 def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile_they_belong_to(
     browser: Browser, bench: Running
 ) -> None:
@@ -167,7 +182,7 @@ def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_a
     put(browser, "material.nozzle_c", 222)
     browser.wait(changed("material.nozzle_c"))
     assert browser.value(row) == before
-    put(browser, "process.infill_density", 1)
+    put(browser, "process.infill_density", 100)
     browser.wait(f"{changed('process.infill_density')} && !$('front-told').textContent.includes('worked out anew')")
     after = browser.value(row)
     assert after[:4] == before[:4]

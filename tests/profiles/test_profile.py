@@ -75,6 +75,12 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
     assert re.match(r"(a|one|true|\")", allowed(field))  # type: ignore[arg-type]
 
 
+def test_a_share_is_also_read_as_a_percentage() -> None:
+    profile = load(settings=["process.infill_density=35%", "material.flow=102.5 %", "search.least_gain_preferred=0.02%"])
+    assert (profile.process.infill_density, profile.material.flow, profile.search.least_gain_preferred) == (0.35, 1.025, 2e-4)
+    assert refusal("process.walls=20%") == 'process.walls is "20%": it must be a whole number from 0 to 50'
+
+
 @pytest.mark.parametrize(
     ("setting", "sentence"),
     [
@@ -85,7 +91,7 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
         ("process.layer_height_mm=nan", "process.layer_height_mm is nan: it must be a number from 0.02 to 2"),
         ("process.scale=0", "process.scale is 0: it must be a number above 0 and up to 100000"),
         ("process.bridge_longest_mm=0", "process.bridge_longest_mm is 0: it must be a number from 1 to 100"),
-        ("search.least_volume_share=1", "search.least_volume_share is 1: it must be a number from 0 and below 1"),
+        ("search.least_volume_share=1", "search.least_volume_share is 1: it must be a number from 0 and below 1 or a percentage"),
         ("process.walls=2.5", "process.walls is 2.5: it must be a whole number from 0 to 50"),
         ("process.walls=true", "process.walls is true: it must be a whole number from 0 to 50"),
         ("process.walls=many", 'process.walls is "many": it must be a whole number from 0 to 50'),
@@ -134,7 +140,16 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
             'machine.head.boxes=[{name="fan",min_mm=[0,0,0]}]',
             "machine.head.boxes.0.max_mm is missing: a list of three numbers is expected",
         ),
-        ("process.interface_overlap=1", "process.interface_overlap is 1: it must be a number from 0 to 0.9"),
+        ("process.interface_overlap=-1", "process.interface_overlap is -1: it must be a number from 0 to 0.9 or a percentage"),
+        (
+            "process.infill_density=20",
+            "process.infill_density is 20: it must be a number from 0 to 1 or a percentage: write 20%",
+        ),
+        (
+            "process.infill_density=0,35",
+            'process.infill_density is "0,35": it must be a number from 0 to 1 or a percentage: write 0.35',
+        ),
+        ("process.infill=20%", "process.infill is not a key of a profile: did you mean process.infill_density?"),
         (
             "process.outer_wall_line_width_mm=2",
             "process.outer_wall_line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm",

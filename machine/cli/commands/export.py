@@ -78,7 +78,7 @@ def draw_layer(sliced: Sequence[SlicedPart], part: int, layer: int) -> bytes:
         if piece.index == part:
             return layer_svg(piece, layer).encode()
     there = parts_in_words(max(p.index for p in sliced))
-    raise OutputError(f"--layer {part}:{layer}: there is no part {part}, the parts are {there}")
+    raise OutputError(f"--layer {part}:{layer}: there is no part {part}, {there}")
 
 
 def save(request: ModelRequest, out: Path) -> int:

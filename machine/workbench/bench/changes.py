@@ -5,14 +5,14 @@ Each takes a bench with a model and the page's arguments, and raises PlanError i
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import radians
+from math import hypot, radians
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from machine.pipeline.requests import MOST_COPIES
-from machine.planning.stops import parse_stops
+from machine.planning.stops import check_stop_heights, parse_stops
 from machine.workbench.bench.bench import Bench, laid_down, with_cuts, with_rotation
 from machine.workbench.bench.part_settings import with_part_setting, without_part_settings
 from machine.workbench.bench.values import Direction, Mm, Point, Rotation, check_number
@@ -87,9 +87,17 @@ def add_stop(bench: Bench, *, kind: Literal["pause", "filament_change"], at: str
     (stop,) = parse_stops([at], []) if kind == "pause" else parse_stops([], [at])
     if stop in bench.stops:
         return bench
+    check_stop_heights([stop], max(bench.parts, 1) * [_most_height_mm(bench)], bench.profile)
     if len(bench.stops) >= MOST_STOPS:
         raise PlanError(f"there are {len(bench.stops)} pauses: {MOST_STOPS} are allowed")
     return replace(bench, stops=tuple(sorted((*bench.stops, stop), key=lambda stop: stop.change)))
+
+
+def _most_height_mm(bench: Bench) -> float:
+    """The most that a part may be high: the height of an uncut model as it is read, else the diagonal of its box."""
+    assert bench.model is not None
+    lying = bench.turned is not None or bench.cuts
+    return (hypot(*bench.model.size_mm) if lying else bench.model.size_mm[2]) + bench.profile.search.pedestal_mm
 
 
 def remove_stop(bench: Bench, *, number: int) -> Bench:

@@ -48,6 +48,7 @@ PHRASES = {
     "offset": "the offset is {} mm",
     "thin": "{}",
     "protected": "protected area {}",
+    "page": "{}",
     "one part": "take 1 under In how many parts",
     "settings": "Settings",
     "": "",

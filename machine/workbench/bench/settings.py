@@ -165,7 +165,7 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
             "about": about or _sentence(matter),
             "meaning": field.description or "",
             "optional": may_be_left_out(field.annotation),
-            **_kind(schema[name], values[name]),
+            **_kind(schema[name], values[name], unit_of(name)),
         }
 
 
@@ -176,9 +176,9 @@ def _schema(model: type[Frozen]) -> dict[str, Any]:
     return properties
 
 
-def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
-    """Input field for a value. kind: `number`, `integer`, `boolean`, `choice`; `numbers`: separated by commas; `text`: one line;
-    `block`: lines of G-code; `rows`: a list or a table as TOML."""
+def _kind(schema: dict[str, Any], value: Any, unit: str) -> dict[str, Any]:
+    """How a page has a value typed or chosen, a share as a percentage. kind: `number`, `integer`, `boolean`, `choice`; `numbers`:
+    several with commas between; `text`: a line of it; `block`: lines of G-code; `rows`: a list or a table as TOML."""
     way = next(way for way in schema.get("anyOf", [schema]) if way.get("type") != "null")
     kind = "choice" if "enum" in way else str(way.get("type"))
     numbers = kind == "array" and all(item.get("type") in ("number", "integer") for item in way.get("prefixItems", [{}]))
@@ -189,6 +189,8 @@ def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
     elif kind in ("array", "object"):
         kind, value = "rows", rows_text(value)
     least, most = (next((way[word] for word in words if word in way), None) for words in BOUNDS)
+    if unit == "%":
+        least, most, value = (None if number is None else float(f"{100.0 * number:.12g}") for number in (least, most, value))
     return {"kind": kind, "least": least, "most": most, "choices": way.get("enum", []), "value": value}
 
 

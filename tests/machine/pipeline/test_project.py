@@ -287,7 +287,7 @@ def test_a_project_whose_archive_has_entries_for_folders_opens() -> None:
 @pytest.mark.usefixtures("folder")
 def test_a_pause_before_a_part_that_does_not_exist_is_not_saved(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["save", "tee.stl", *FAST, "--parts", "1", "--as-is", "--pause", "2:5", "-o", "tee.3mf"]) == 1
-    assert "--pause 2:5: there is no part 2, the parts are 1 alone" in capsys.readouterr().err
+    assert "--pause 2:5: there is no part 2, there is only part 1" in capsys.readouterr().err
     assert not Path("tee.3mf").exists()
 
 

@@ -65,6 +65,7 @@ def test_an_error_keeps_its_marks_where_another_message_holds_it() -> None:
     (["process.layer_height_mm=0.5"], "Layer height is 0.5 mm: at most 0.9 of Line width"),
     (["machine.tilt.limits_deg=[5, 3]"], "Tilt axis: Range is [5.0, 3.0]"),
     (["process.infill_pattern=infill_density"], 'Infill pattern is "infill_density"'),
+    (["process.infill_density=200%"], "Infill density is 200 %: it must be a percentage from 0 to 100"),
     (["process.infil_density=1"], "did you mean Infill density?"),
     (["material.nozzle_c=900"], "Nozzle"),
 ])  # fmt: skip

@@ -343,11 +343,17 @@ def test_copies_and_pauses_are_the_command_line_s_and_their_sentences_name_field
         assert page.until(lambda state: state["problem"])["problem"].startswith(
             "2-3 under Copies and pauses: PART:LAYER or PART:HEIGHTmm is expected"
         )
+        page.do("add_stop", kind="pause", at="9:1")
+        sentence = "9:1 under Copies and pauses: there is no part 9, there is only part 1"
+        assert page.until(lambda state: state["problem"] == sentence)
+        page.do("add_stop", kind="pause", at="1:99999")
+        sentence = "1:99999 under Copies and pauses: part 1 is at most 4 mm high and has at most 51 layers"
+        assert page.until(lambda state: state["problem"] == sentence)
         page.do("add", normal=[0, 0, 1], offset_mm=2.0)
         page.until(lambda state: state["parts"] == 2 and not state["problem"])
         page.do("slice")
-        sentence = "1:2.4mm under Copies and pauses: part 1 is only 2 mm high"  # both copies are sliced in their parts
-        assert page.until(lambda state: state["problem"])["problem"] == sentence
+        sentence = "1:2.4mm under Copies and pauses: part 1 is at most 2 mm high"  # both copies are sliced in their parts
+        assert page.until(lambda state: state["problem"] == sentence)
         bench.send(folder / "box.stl")
         page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
 

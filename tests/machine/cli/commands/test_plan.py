@@ -79,7 +79,14 @@ def test_settings_of_a_part_are_kept_in_the_plan_and_change_what_is_written(
     assert "process = {infill_density = 0.5}" in Path("parts/plan.toml").read_text()
     assert "process = {walls = 1}" in Path("parts/plan.toml").read_text()
     assert main(["decompose", "box.stl", "--plan", "box.toml", "--part", "3:walls=4", *FAST]) == 1
-    assert "part 3 is not there to have walls = 4: the parts are 1 to 2" in capsys.readouterr().err
+    assert "--part 3: there is no part 3, the parts are 1 to 2" in capsys.readouterr().err
+    for wrong, sentence in (
+        (("--part", "9:walls=4", "--parts", "2"), "--part 9: there is no part 9, the parts are 1 to 2 at most"),
+        (("--pause", "13:1"), "--pause 13:1: there is no part 13, the parts are 1 to 12 at most"),
+        (("--pause", "1:99999", "--plan", "box.toml"), "--pause 1:99999: part 1 is at most "),
+    ):
+        assert main(["export", "box.stl", "-o", "no.gcode", *wrong, *FAST]) == 1
+        assert sentence in capsys.readouterr().err
 
 
 def test_modifiers_of_a_plan_are_printed_and_kept_in_the_plan(folder: Path) -> None:

@@ -11,6 +11,13 @@ const KINDS = ["machine", "material", "process"];
 const KIND_OF = { machine: "machine", material: "material", process: "process", search: "process" };
 const kept = keptInTab("settings", { level: "simple", folded: [] });
 
+/** A comma in a field of one number is a decimal point: browsers drop it, and 0,35 would become 035. */
+function decimalComma(event) {
+  if (event.target.type !== "number" || !event.data?.includes(",")) return;
+  event.preventDefault();
+  document.execCommand("insertText", false, event.data.replace(",", "."));
+}
+
 export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   const explained = new Set();
@@ -79,6 +86,7 @@ export function settingsPanel() {
     })];
     $("settings-part").replaceChildren(...optionsOf([...names.entries()], part() < names.length ? part() : 0));
   };
+  addEventListener("beforeinput", decimalComma);
   listen("input", { "search-settings": list });
   listen("change", { "settings-part": () => { wrongs.clear(); fetchAll(); } });
   listen("click", {
@@ -161,7 +169,7 @@ const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [mad
 /** wrong: {text, typed}, what was refused last; set(key, value, typed) asks for a value, null: as it was; again(): called when a person
  * leaves what was typed in, for what has been told meanwhile; explained: the keys whose meaning is shown. */
 function settingRow(setting, { wrong, set, again, explained }) {
-  const { key, label, unit, kind, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
+  const { key, label, unit, kind, value, changed, placeholders = [] } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
   const meaning = made("small", { text: meaningOf(setting), id: `meaning-${key}`, hidden: !explained.has(key) });
   const refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
   input.setAttribute("aria-describedby", meaning.id);
@@ -184,7 +192,7 @@ function settingRow(setting, { wrong, set, again, explained }) {
   };
   row.dataset.key = key;
   input.addEventListener("input", () => { row.dataset.typing = kind; });
-  input.addEventListener("change", () => { set(key, typedIn(input, kind, optional), kind === "boolean" ? input.checked : input.value); left(); });
+  input.addEventListener("change", () => { set(key, typedIn(input, setting), kind === "boolean" ? input.checked : input.value); left(); });
   input.addEventListener("blur", () => { if (left()) again(); });
   return row;
 }
@@ -213,10 +221,10 @@ function inputOf({ kind, choices, least, most }, value) {
 }
 
 /** What a person has typed or chosen, as --set takes it; null, for nothing where there must be something: as the profile has it. */
-function typedIn(input, kind, optional) {
+function typedIn(input, { kind, optional, unit }) {
   if (kind === "boolean") return `${input.checked}`;
   const text = kind === "block" ? input.value : input.value.trim();
   if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // which TOML reads, too
   if (!text) return optional ? "" : null;
-  return kind === "numbers" ? `[${text}]` : text;
+  return kind === "numbers" ? `[${text}]` : unit === "%" ? `${text}%` : text;
 }
