@@ -62,7 +62,35 @@ function showJournals(journals, before) {
 const offer = (name, now, rows) => $(`${name}s-found`).replaceChildren(...rows.map(([value, title, words]) => made("label", { className: "port" },
   made("input", { type: "radio", name, value, checked: value === now }), made("span", {}, made("b", { text: title }), made("small", { text: words })))));
 
-const STOP_KEY = "e";
+const STOP_KEY = "e", HOLD_MS = 600, TWICE_MS = 1000;
+
+/** Hears the key of the emergency stop in a window: held down, which the button shows, or pressed twice, for a single press may be a slip. */
+function stopKey(stop) {
+  let timer = 0, pressedAt = -Infinity;
+  const release = () => {
+    clearTimeout(timer);
+    delete $("emergency").dataset.held;
+  };
+  const finish = () => {
+    release();
+    stop();
+  };
+  const press = (event) => {
+    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || needsKey(event) || $("emergency").hidden) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (event.repeat) return;
+    const now = performance.now(), twice = now - pressedAt < TWICE_MS;
+    pressedAt = now;
+    if (twice) return finish();
+    $("emergency").dataset.held = true;
+    timer = setTimeout(finish, HOLD_MS);
+  };
+  return (window) => {
+    window.addEventListener("keydown", press, true);
+    for (const end of ["keyup", "blur"]) window.addEventListener(end, release);
+  };
+}
 
 export function printPanel() {
   let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
@@ -141,16 +169,10 @@ export function printPanel() {
     listen("blur", { [id]: letGo });
     listen("change", { [id]: () => { letGo(); toldTo({ do: id, percent: numberIn(id) }); } });
   }
-  const stop = () => stops.press(Number($("emergency").dataset.print));
+  const stop = () => stops.press(Number($("emergency").dataset.print)), hearKey = stopKey(stop);
   listen("click", { emergency: stop });
-  const byKey = (event) => {
-    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || needsKey(event) || $("emergency").hidden) return;
-    event.preventDefault();
-    event.stopPropagation();
-    stop();
-  };
-  addEventListener("keydown", byKey, true);
-  $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
+  hearKey(window);
+  $("print-page").addEventListener("load", () => hearKey($("print-page").contentWindow));
   onNew(({ sliced }) => sliced && [sliced.key, sliced.stale], () => { unforce(); problem(""); }); // what was found of others
   onState(({ lacking: { slices: why } }) => {
     disable({ check: Boolean(why) });
