@@ -107,7 +107,7 @@ def print_(
 
     PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT, or a print server: octoprint:HOST, moonraker:HOST,
     duet:HOST, to which the program is handed over first. The printer is asked who it is before anything moves.
-    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e e emergency stop. Ctrl-C cancels safely.
+    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, u d Z offset, e e emergency stop; Ctrl-C cancels.
     """
     from machine.cli.commands.print import print_model
 

@@ -96,6 +96,7 @@ class PrintStatus:
     at: Mapping[str, float] = field(default_factory=dict)  # where the axes stand, by their letters, mm and deg
     feed_percent: float = 100.0
     flow_percent: float = 100.0
+    z_offset_mm: float = 0.0  # by which the tip is higher than programmed, along the tool
     message: str = ""  # the newest word to the person watching
     warning: str = ""  # what that person must know from now on, beside every message; "" when there is none
     heat_age_s: float = 0.0  # since the temperatures were reported

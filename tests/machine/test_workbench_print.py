@@ -143,6 +143,8 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
 
         browser.open(sliced.address)  # loaded again it still commands its print
         browser.wait(f"{PRINTING} === 'printing' && !$('run-commands').hidden && $('held').hidden")
+        browser.click("[data-babystep='0.05']")
+        browser.wait("$('offset-told').textContent === '+0.05 mm'")
 
         second_page.command("take")
         browser.wait("!$('held').hidden && $('run-commands').hidden")

@@ -17,6 +17,7 @@ from machine.link.print_state import AWAY, PrintState, PrintStatus
 from machine.notices import say
 
 STEP_PERCENT = 10.0
+STEP_MM = 0.01
 LOOK_S = 0.05
 HINT_S = 10.0  # a question that was not answered by then is void
 ALONE_S = 2.0  # where nobody can press a key, a second interrupt is waited for so long
@@ -141,6 +142,8 @@ _ACTS: dict[str, Callable[[Keyboard], None]] = {
     "q": lambda board: board._explain(),
     "+": lambda board: board._faster(STEP_PERCENT),
     "-": lambda board: board._faster(-STEP_PERCENT),
+    "u": lambda board: board._control.ask(Command.BABYSTEP, STEP_MM),
+    "d": lambda board: board._control.ask(Command.BABYSTEP, -STEP_MM),
     "]": lambda board: board._more(STEP_PERCENT),
     "[": lambda board: board._more(-STEP_PERCENT),
 }

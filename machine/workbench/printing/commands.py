@@ -169,6 +169,7 @@ OF_PRINT: dict[str, Callable[..., None]] = {
     "resume": RunningPrint.resume,
     "feed": RunningPrint.feed,
     "flow": RunningPrint.flow,
+    "babystep": RunningPrint.babystep,
     "by_hand": RunningPrint.by_hand,
 }
 COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()} | {

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import Field
 
 from machine.crash import bug_in_words
-from machine.link.pending_commands import Command
+from machine.link.pending_commands import MOST_OFFSET_MM, Command
 from machine.link.print_state import PrintState, follows
 from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
@@ -25,6 +25,7 @@ MAIN = "from machine.workbench.printing.process import main; main()"
 EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
 LEAVE_S = 5.0  # so long a print that is not to go on has to let go of its port
 Percent = Annotated[int, Field(ge=0, le=10_000)]
+Babystep = Annotated[float, Field(ge=-MOST_OFFSET_MM, le=MOST_OFFSET_MM, allow_inf_nan=False)]
 HandWord = Annotated[HandDoes, Field(strict=False)]  # a text in JSON
 DIED = "the process that printed has ended before the print was done"
 
@@ -129,6 +130,10 @@ class RunningPrint:
     def flow(self, *, percent: Percent) -> None:
         """Set the flow, in per cent of the programmed one."""
         self.say((Command.FLOW, float(percent)))
+
+    def babystep(self, *, by_mm: Babystep) -> None:
+        """Raise the tip along the tool by so many mm, below 0 lower it; on a table that tilts the tool is machine Z, too."""
+        self.say((Command.BABYSTEP, by_mm))
 
     def by_hand(self, *, does: HandWord, axis: str = "", by_mm: float = 0.0, keep_heat: bool = False) -> None:
         """Have a printer in hand do something. Raises PrinterError for one that is not in hand."""

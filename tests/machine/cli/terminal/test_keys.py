@@ -99,6 +99,10 @@ def test_the_feed_goes_in_steps(keys: str, percent: list[float]) -> None:
     assert asked(*keys) == [PendingCommand(Command.FEED, value) for value in percent]
 
 
+def test_u_and_d_shift_z_by_a_hundredth_of_a_millimetre() -> None:
+    assert asked("u", "d") == [PendingCommand(Command.BABYSTEP, 0.01), PendingCommand(Command.BABYSTEP, -0.01)]
+
+
 def test_steps_begin_at_what_the_program_has_set() -> None:
     control = Control()
     board = Keyboard(control)

@@ -6,7 +6,7 @@ import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
 import { putNew, withWholeOptions } from "../lists.js";
 import { onNew, onState, update } from "../store.js";
 import { followIn } from "./print-frame.js";
-import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
+import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
 
 /** What is chosen of a list whose last entry is another one, typed. */
 function chosenOr(name, typed) {
@@ -114,6 +114,7 @@ export function printPanel() {
     mine = new Set(state.prints.filter((job) => job.holder === OWN_PAGE).map((job) => job.number));
     showPorts(state, before);
     showJournals(state.journals, before.journals);
+    showHistory(state.history);
     showWhich(state.prints, chosen);
     showPrint(print(), commands());
     follow();
@@ -158,6 +159,7 @@ export function printPanel() {
     cancel: () => { sure(true); $("go-on").focus(); }, "go-on": () => sure(false), begin: askToNotify,
   });
   onData("print", ({ print: name }) => { sure(false); toldTo({ do: name }); }, $("run"));
+  onData("babystep", ({ babystep }) => toldTo({ do: "babystep", by_mm: Number(babystep) }), $("run"));
   webcamPanel(print);
   handPanel((asked) => toldTo({ do: "by_hand", ...asked }));
   listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });

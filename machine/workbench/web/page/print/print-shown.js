@@ -1,7 +1,7 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
 
-import { $, duration, hide, listen, onData, optionsOf, tell } from "../../../../view/template/elements.js";
-import { clock, listIn, putNew, tellIn } from "../lists.js";
+import { $, duration, hide, listen, onData, optionsOf, roughly, rowOf, tell } from "../../../../view/template/elements.js";
+import { clock, listIn, putNew, putTable, tellIn } from "../lists.js";
 import { keptInTab } from "../store.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
@@ -111,11 +111,23 @@ export function showProgress(print) {
     [over ? "took" : "so far", duration(progress.elapsed_s)],
     !over && progress.left_s != null && ["done at", clock(Date.now() / 1000 + progress.left_s)],
   ].filter(Boolean));
+  tell({ "offset-told": `${progress.z_offset_mm > 0 ? "+" : ""}${progress.z_offset_mm} mm` });
   for (const [id, percent] of [["feed", progress.feed_percent], ["flow", progress.flow_percent]]) {
     if ($(id).dataset.held) continue;
     $(id).value = percent;
     tell({ [`${id}-told`]: `${Math.round(percent)} %` });
   }
+}
+
+const PAST = ["print", "outcome", "time", "filament", "begun"];
+/** What is told of a print of before, in this order. */
+export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun }) => [
+  name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`,
+  new Date(1000 * begun).toLocaleString([], { dateStyle: "short", timeStyle: "short" })];
+
+export function showHistory(prints = []) {
+  hide({ "history-field": !prints.length });
+  putTable($("history"), prints, PAST, () => prints.map((print) => rowOf(pastCells(print))));
 }
 
 /** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
