@@ -431,7 +431,7 @@ def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.Monke
         watched.follow(now)
         browser.open(watched.address)
         browser.wait("Number(document.getElementById('position').value) === 40")
-        assert text(browser, "live").startswith(f"printing 50 % · line {line} · nozzle 210 of 210 °C")
+        assert text(browser, "live").startswith(f"printing, 50 % · line {line} · nozzle 210 of 210 °C")
         assert "as last known" not in text(browser, "live")
         assert {address.rsplit("/", 1)[1] for address in browser.requests} == {"", "state"}
         assert browser.complaints == []

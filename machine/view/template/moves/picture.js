@@ -168,10 +168,8 @@ const COARSE_SHARE = 0.6; // of the canvas' width and height, drawn while all mo
 
 /** Has the card compile all programs while the page reads the print. */
 export function compileAll(gl) {
-  const pairs = [
-    [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
-  ];
-  pairs.forEach((pair) => programOf(gl, ...pair));
+  const beads = [[BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR]], others = [[SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT]];
+  [...beads, ...others].forEach((pair) => programOf(gl, ...pair));
 }
 
 /** {canvas, ask, moved, rowAt}: the picture of the scene, drawn whenever a bell rings. */
@@ -272,8 +270,6 @@ const countRows = (ranges) => ranges.reduce((sum, range) => sum + range.endRow -
 
 /** What the canvas shows, kept on paper: WebGL's own is empty by the time that pages are laid out. */
 function keepPicture(canvas) {
-  const picture = $("picture");
-  picture.width = canvas.width;
-  picture.height = canvas.height;
+  const picture = Object.assign($("picture"), { width: canvas.width, height: canvas.height });
   picture.getContext("2d").drawImage(canvas, 0, 0);
 }

@@ -46,7 +46,7 @@ export function sceneOf(print, bells) {
     bells.ring("layers");
   };
   /** The highest layer drawn: the print is shown at its end. */
-  scene.chooseHigh = (place) => { if (scene.layers().length) scene.go(scene.layers()[clamp(place, 0, scene.layers().length - 1)].last); };
+  scene.chooseHigh = (place) => scene.go(scene.layers()[clamp(place, 0, scene.layers().length - 1)]?.last ?? scene.row);
   /** The lowest one; the highest is never below it. */
   scene.chooseLow = (place) => {
     if (place > scene.high) scene.chooseHigh(place);

@@ -8,7 +8,7 @@ import { clamp } from "../picture/math.js";
 const PLAYING = [1, 5, 20, 100, 300, 1000];
 const USUAL = 100;
 
-/** {start, stop, toggle, playing, go(row), step(rows)}: the latter two stop the playing. */
+/** {stop, toggle, playing, go(row), step(rows)}: the latter two stop the playing. */
 export function courseOf(print, scene, bells) {
   const { rows, header } = print, position = $("position"), total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
   position.max = Math.max(rows.count - 1, 0);
@@ -39,21 +39,16 @@ function playerOf(scene, bells, total) {
     bells.ring("moving");
     if (next >= total) player.stop(); else requestAnimationFrame(step);
   };
-  const show = () => {
+  player.toggle = () => {
+    player.playing = !player.playing;
     $("play").textContent = player.playing ? "❚❚" : "▶";
     $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
     bells.ring("look");
-  };
-  player.start = () => {
-    if (player.playing) return;
-    if (scene.time() >= total) scene.goToTime(0);
-    player.playing = true;
+    if (player.playing && scene.time() >= total) scene.goToTime(0);
     before = performance.now();
     requestAnimationFrame(step);
-    show();
   };
-  player.stop = () => { if (player.playing) { player.playing = false; show(); } };
-  player.toggle = () => (player.playing ? player.stop() : player.start());
+  player.stop = () => { if (player.playing) player.toggle(); };
   player.go = (row) => {
     player.stop();
     scene.go(row);
