@@ -4,7 +4,7 @@
 import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, sayIn, tell } from "../../../../view/template/elements.js";
 import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
 import { putNew, withWholeOptions } from "../lists.js";
-import { onNew, onState, update } from "../store.js";
+import { onNew, onState, store, update } from "../store.js";
 import { followIn } from "./print-frame.js";
 import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
 
@@ -136,8 +136,9 @@ export function printPanel() {
     showBar(running(), print());
   }, 1000);
   const where = () => ({ port: port(), baud: numberIn("baud"), sim_speed: numberIn("sim-speed") });
-  const check = () => {
-    send({ do: "check", ...where(), send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
+  /** gcode: the key of an open G-code file, else the bench is printed. */
+  const check = (gcode = "") => {
+    send({ do: "check", ...where(), gcode, send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
     unforce();
   };
   /** To the print, checked at once where its printer is known and free, for a check moves and heats nothing. */
@@ -152,7 +153,7 @@ export function printPanel() {
     "journal-typed": () => { $("journal-other").checked = true; },
   });
   listen("click", {
-    check, "verdict-print": toPrint, "bar-print": toPrint, "ask-ports": () => send({ do: "ports", baud: where().baud }),
+    check: () => check(store.state.gcode?.key), "look-gcode": () => update({ looking: "gcode" }), "verdict-print": toPrint, "bar-print": toPrint, "ask-ports": () => send({ do: "ports", baud: where().baud }),
     hand: () => { send({ do: "hand", ...where() }); unforce(); },
     "follow-server": () => send({ do: "follow", port: port() }),
     "go-on-with": () => send({ do: "go_on", ...where(), journal: chosenOr("journal", "journal-typed"), machine: $("rest-machine").value.trim() }),
@@ -175,8 +176,15 @@ export function printPanel() {
   listen("click", { emergency: stop });
   hearKey(window);
   $("print-page").addEventListener("load", () => hearKey($("print-page").contentWindow));
-  onNew(({ sliced }) => sliced && [sliced.key, sliced.stale], () => { unforce(); problem(""); }); // what was found of others
-  onState(({ lacking: { slices: why } }) => {
+  onNew(({ sliced, gcode }) => [sliced?.key, sliced?.stale, gcode?.key], () => { unforce(); problem(""); }); // what was found of others
+  onNew(({ gcode }) => gcode, (gcode) => {
+    hide({ "gcode-line": !gcode });
+    if (gcode) $("tab-printing").click();
+    if (gcode || store.looking === "gcode") update({ looking: gcode ? "gcode" : false });
+    tell({ "gcode-told": gcode ? `${gcode.name} is open, and printed in place of the bench. ${gcode.told}.` : "" });
+  });
+  onState(({ gcode, lacking: { slices } }) => {
+    const why = gcode ? "" : slices;
     disable({ check: Boolean(why) });
     sayIn("unsliced", why && `Nothing to print: ${why}.`);
     follow();
@@ -208,20 +216,17 @@ function stopsAsked(prints, send, isOpen) {
     if (stopped().length ? !stopped().some(going) : isOpen()) return;
     say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
   };
-  const ask = (number) => {
-    if (prints().some((job) => going(job) && job.number === number)) asked.add(number);
-    send({ do: "emergency", print: number });
-    if (!isOpen()) doubt();
-    clearTimeout(late);
-    late = setTimeout(doubt, ANSWER_MS);
-  };
   listen("click", { "stop-noted": () => { if (!stopped().some(going)) asked = new Set(); say(""); } });
   return {
-    /** number: of a print. */
-    press: (number) => {
-      const now = performance.now();
-      pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
-      ask(pressed.number);
+    /** named: the number of a print. */
+    press: (named) => {
+      const now = performance.now(), number = now - pressed.at < SAME_PRESS_MS ? pressed.number : named;
+      pressed = { number, at: now };
+      if (prints().some((job) => going(job) && job.number === number)) asked.add(number);
+      send({ do: "emergency", print: number });
+      if (!isOpen()) doubt();
+      clearTimeout(late);
+      late = setTimeout(doubt, ANSWER_MS);
     },
     /** One has waited too long for a line, or its print is not there any more. */
     expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },

@@ -119,7 +119,6 @@ export function showProgress(print) {
   }
 }
 
-const PAST = ["print", "outcome", "time", "filament", "begun"];
 /** What is told of a print of before, in this order. */
 export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun }) => [
   name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`,
@@ -127,7 +126,7 @@ export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun })
 
 export function showHistory(prints = []) {
   hide({ "history-field": !prints.length });
-  putTable($("history"), prints, PAST, () => prints.map((print) => rowOf(pastCells(print))));
+  putTable($("history"), prints, ["print", "outcome", "time", "filament", "begun"], () => prints.map((print) => rowOf(pastCells(print))));
 }
 
 /** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
@@ -192,23 +191,20 @@ const EVERY_MS = 2000;
  * the page loads nothing from elsewhere. */
 export function webcamPanel(print) {
   let shown = "", asking = false;
-  const forget = () => {
-    hide({ "webcam-line": true });
+  const show = (address) => {
+    hide({ "webcam-line": !address });
+    if (address) $("webcam").src = address;
     if (shown) URL.revokeObjectURL(shown);
-    shown = "";
+    shown = address;
   };
   setInterval(async () => {
     const job = print();
-    if (!job?.webcam || job.over) return forget();
+    if (!job?.webcam || job.over) return show("");
     if (asking || document.hidden || $("printing").hidden) return;
     asking = true;
     const answer = await fetch(`prints/${job.number}/webcam`).catch(() => null), picture = answer?.ok ? await answer.blob().catch(() => null) : null;
     asking = false;
-    if (!picture || print()?.number !== job.number) return forget();
-    const before = shown;
-    $("webcam").src = shown = URL.createObjectURL(picture);
-    if (before) URL.revokeObjectURL(before);
-    hide({ "webcam-line": false });
+    show(picture && print()?.number === job.number ? URL.createObjectURL(picture) : "");
   }, EVERY_MS);
 }
 
