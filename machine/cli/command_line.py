@@ -108,8 +108,8 @@ def print_(
     """Print models or a G-code file on a printer or a simulated one.
 
     PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT, or a print server: octoprint:HOST, moonraker:HOST,
-    duet:HOST, which receives the program first. The printer is identified before anything moves.
-    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
+    duet:HOST, to which the program is handed over first. The printer is asked who it is before anything moves.
+    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, u d Z offset, e e emergency stop; Ctrl-C cancels.
     """
     from machine.cli.commands.print import print_model
 

@@ -70,6 +70,7 @@ class Dialect:
     progress: str = ""  # {} percent, {} minutes left
     acceleration: str = ""  # {} of strokes, {} of travels, mm/s2
     pressure_advance: str = ""  # {} of the extruder, s
+    babystep: str = ""  # {} mm up in machine Z during a print, coordinates as before: along the tool, whatever the table's pose
     pause: str = "M0"  # waits for the user
     filament_change: str = "M0"  # as pause, with the firmware's actions for a filament change
     layer: str = ""  # {} layer of all layers, from 1

@@ -68,6 +68,7 @@ STEPPERS = Dialect(
     progress="M73 P{} R{}",
     acceleration="SET_VELOCITY_LIMIT ACCEL={}",  # M204 P T would use the smaller of the two for all moves
     pressure_advance="SET_PRESSURE_ADVANCE ADVANCE={}",
+    babystep="SET_GCODE_OFFSET Z_ADJUST={} MOVE=1",
     pause="PAUSE",
     filament_change="PAUSE",
     layer="SET_PRINT_STATS_INFO CURRENT_LAYER={}",

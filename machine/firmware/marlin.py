@@ -51,6 +51,7 @@ DIALECT = Dialect(
     progress="M73 P{} R{}",
     acceleration="M204 P{} T{}",
     pressure_advance="M900 K{}",
+    babystep="M290 Z{}",
     filament_change="M600",
     parts="M486 T{parts}",
     part_begin="M486 S{index}",

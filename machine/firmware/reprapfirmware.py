@@ -53,6 +53,7 @@ DIALECT = Dialect(
     progress="M73 P{} R{}",
     acceleration="M204 P{} T{}",
     pressure_advance="M572 D0 S{}",
+    babystep="M290 R1 Z{}",
     pause="M226",
     filament_change="M600",
     parts="M486 T{parts}",

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import inf
 
+from machine.firmware import dialect_of
 from machine.gcode.modes import ModalState, axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
@@ -58,6 +59,7 @@ class Feed:
         self.history = LineHistory(planner=self._planner)
         self._bounds = PrintedBounds(machine) if machine is not None else None
         self.pending = PendingCommands(self.modal.axes, limit, control)
+        self.pending.babystep = "" if machine is None else dialect_of(machine).babystep
         # A bed that cannot be heated has room temperature.
         most_c = (inf, inf) if machine is None else (machine.nozzle_limit_c, machine.bed_limit_c or inf)
         self.reports = PrinterReports(start_s, most_c)
@@ -74,6 +76,8 @@ class Feed:
         """Feed the program from its beginning, or from the resume point of an interrupted print, to the final barrier."""
         exchange = self.exchange
         self.started, self.history = True, self._new_history()
+        if not exchange.connection.greeting.capabilities.get("BABYSTEPPING", True):
+            self.pending.babystep = ""
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send(f"M155 S{REPORT_S}")
         for line, command in self._commands(lines):
@@ -337,6 +341,7 @@ class Feed:
                 state=PrintState.PAUSING if pausing else self.state,
                 file_line=history.acknowledged,
                 feed_percent=feed_percent, flow_percent=self.pending.flow_percent,
+                z_offset_mm=self.pending.z_offset_mm,
                 message=self.pending.message or self._trouble or self.reports.waiting or self._silence(),
                 warning=self._warned,
             )

@@ -20,6 +20,7 @@ from profiles.errors import LocalProtocolError
 MOST_AT_ONCE = 16  # requests taken per turn: a flood of requests must not hold up the print
 # Marlin allows 10 to 999 per cent; beyond 300 the planner starves, beyond 200 the extruder slips.
 FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
+MOST_OFFSET_MM = 2.0  # the whole Z offset of a print: what is farther off wants homing anew
 
 
 class Command(Enum):
@@ -31,6 +32,7 @@ class Command(Enum):
     EMERGENCY_STOP = auto()
     FEED = auto()  # value: per cent of the programmed feed rates
     FLOW = auto()  # value: per cent of the programmed filament
+    BABYSTEP = auto()  # value: mm by which the tip goes up from here on, along the tool: machine Z, however the table is tilted
     LINE = auto()  # text: a line of G-code from the user
 
 
@@ -83,6 +85,8 @@ class PendingCommands:
     lines: deque[str] = field(default_factory=deque)  # to be sent between those of the program
     feed_percent: float = 100.0
     flow_percent: float = 100.0
+    babystep: str = ""  # the firmware's command for {} mm; "": it has none
+    z_offset_mm: float = 0.0
     message: str = ""  # why the newest request was refused
 
     def poll(self, state: PrintState, now_s: float) -> None:
@@ -116,6 +120,8 @@ class PendingCommands:
             self.pause_s = None
         elif command is Command.LINE:
             self._queue_line(request.text, state)
+        elif command is Command.BABYSTEP:
+            self._shift(request.value)
         else:
             self._override(command, request.value)
 
@@ -143,13 +149,21 @@ class PendingCommands:
     def undo_overrides(self) -> list[str]:
         """Commands that reset the overrides, which the firmware would keep for the next print."""
         pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
-        return [f"{name} S100" for name, value in pairs if value != 100.0]
+        undone = [f"{name} S100" for name, value in pairs if value != 100.0]
+        return [*undone, self.babystep.format(f"{-self.z_offset_mm:.3f}")] if self.z_offset_mm else undone
 
     def _queue_line(self, text: str, state: PrintState) -> None:
         why = line_refusal(text, self.axes, state is PrintState.PAUSED, self.limit)
         self.message = "" if why is None else f"not sent: {text.strip()[:40]!r}: {why}"
         if why is None:
             self.lines.append(command_of(text, "the command", self.limit))
+
+    def _shift(self, by_mm: float) -> None:
+        wanted_mm = round(self.z_offset_mm + by_mm, 3)
+        self.message = offset_refusal(wanted_mm, self.babystep) or ""
+        if not self.message:
+            self.z_offset_mm = wanted_mm
+            self.lines.append(self.babystep.format(f"{by_mm:.3f}"))
 
     def _override(self, command: Command, value: float) -> None:
         feed = command is Command.FEED
@@ -167,6 +181,14 @@ def percent_refusal(value: float, bounds: tuple[float, float]) -> str | None:
     """Why a percentage is refused; None when it is allowed."""
     low, high = bounds
     return None if low <= value <= high else f"{value:g} % is not possible: {low:g} to {high:g} % are allowed"
+
+
+def offset_refusal(wanted_mm: float, babystep: str) -> str | None:
+    """Why a Z offset cannot be had, None when it can. babystep: the firmware's command for it."""
+    if not babystep:
+        return "no Z offset: this firmware cannot shift Z during a print (Marlin needs BABYSTEPPING)"
+    allowed = f"{-MOST_OFFSET_MM:g} to {MOST_OFFSET_MM:g} mm are allowed"
+    return None if abs(wanted_mm) <= MOST_OFFSET_MM else f"a Z offset of {wanted_mm:.3g} mm is not possible: {allowed}"
 
 
 def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:

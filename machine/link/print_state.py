@@ -100,6 +100,7 @@ class PrintStatus:
     at: Mapping[str, float] = field(default_factory=dict)  # positions of the axes by their letters, mm and deg
     feed_percent: float = 100.0
     flow_percent: float = 100.0
+    z_offset_mm: float = 0.0  # by which the tip is higher than programmed, along the tool
     message: str = ""  # the newest message to the user
     warning: str = ""  # a lasting warning to the user, besides the messages; "" for none
     heat_age_s: float = 0.0  # since the temperatures were reported

@@ -5,6 +5,7 @@ from dataclasses import replace
 from time import monotonic
 
 from machine.dryrun.dryrun import Timeline
+from machine.firmware import dialect_of
 from machine.gcode.line_text import read_line
 from machine.link.pending_commands import CancelledError
 from machine.link.print_state import PrintState, PrintStatus, ProgramPosition, last_known
@@ -102,7 +103,8 @@ class ServerPrinter:
         self, file: str, name: str, progress: "ReportedProgress", scene: Scene, running: PrintStatus | None = None
     ) -> End:
         """Start a file, or follow a running print, and report how it ended. name: for the user."""
-        server, person = self.server, self.person
+        server, person, profile = self.server, self.person, self._job.profile
+        babystep = server.babystep or ("" if profile is None else dialect_of(profile.machine).babystep)
         with person.show(scene) as tell:
             tell(None)
             try:
@@ -114,6 +116,7 @@ class ServerPrinter:
                     control=person.commands,
                     left=person.left,
                     running=running,
+                    babystep=babystep,
                 ).run()
             except KeyboardInterrupt:
                 say("ended at once: whether the print has been cancelled is not known, look at the printer")

@@ -21,7 +21,7 @@ CAPABILITIES = (
     "SERIAL_XON_XOFF BINARY_FILE_TRANSFER EEPROM VOLUMETRIC AUTOREPORT_POS AUTOREPORT_TEMP PROGRESS PRINT_JOB AUTOLEVEL Z_PROBE "
     "SOFTWARE_POWER EMERGENCY_PARSER HOST_ACTION_COMMANDS SDCARD REPORTING MOTION_MODES ARCS BABYSTEPPING CHAMBER_TEMPERATURE"
 )
-THERE = ("PRINT_JOB", "SOFTWARE_POWER", "HOST_ACTION_COMMANDS", "ARCS")  # besides those that depend on the build
+THERE = ("PRINT_JOB", "SOFTWARE_POWER", "HOST_ACTION_COMMANDS", "ARCS", "BABYSTEPPING")  # besides those that depend on the build
 ENDSTOP_MM = 0.01
 
 
@@ -307,6 +307,13 @@ def _override_flow(board: Board, order: Order) -> Work:
     return None
 
 
+def _babystep(board: Board, order: Order) -> Work:
+    """M290, SET_GCODE_OFFSET: the axis Z moves, what the firmware takes for its coordinate does not."""
+    by_mm = order.words.get("Z", 0.0) if order.name == "M290" else float(order.values.get("Z_ADJUST", 0.0))
+    board.motion.shift_z(by_mm, board.now_s)
+    return None
+
+
 def _heater(board: Board, order: Order) -> Heater:
     """The heater of M104, M109, M568, M140 or M190."""
     return board.nozzle if order.name in ("M104", "M109", "M568") else board.bed
@@ -514,6 +521,7 @@ COMMANDS: dict[str, Command] = {  # besides G0 and G1, which wait for a free blo
     "M211": _setting(_limit),
     "M220": _override_feed,
     "M221": _override_flow,
+    "M290": _babystep,
     "M302": _allow_cold,
     "M400": lambda board, order: wait_for_moves(board),
     "M409": _setting(),
@@ -523,6 +531,7 @@ COMMANDS: dict[str, Command] = {  # besides G0 and G1, which wait for a free blo
     **dict.fromkeys(("M17", "M73", "M117", "M486", "M572", "M665", "M876", "M900", "T0"), _nothing),
     "MANUAL_STEPPER": _turn,
     "PROBE": _probe_by_macro,
+    "SET_GCODE_OFFSET": _babystep,
     "SET_HEATER_TEMPERATURE": _heat_by_macro,
     "TEMPERATURE_WAIT": _wait_by_macro,
     "TURN_OFF_HEATERS": _heaters_off,

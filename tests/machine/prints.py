@@ -14,7 +14,7 @@ from tests.machine.browser import Browser
 from tests.machine.firefox import Firefox
 from tests.machine.running_workbench import PATIENCE_S, Running
 
-# Every control of the page and of the page of the print in it gets an e; what would be sent is heard and goes nowhere.
+# Every control of the page and of the page of the print in it gets an e twice; what would be sent is heard and goes nowhere.
 LETTER_E = """(() => {
   let stops = 0;
   const send = WebSocket.prototype.send, kinds = [new Set(), new Set()];
@@ -22,8 +22,9 @@ LETTER_E = """(() => {
   for (const page of [document, $('print-page').contentDocument])
     for (const field of page.querySelectorAll('input, textarea, select, button')) {
       const before = stops;
-      field.dispatchEvent(new page.defaultView.KeyboardEvent('keydown', { key: 'e', bubbles: true, cancelable: true }));
-      kinds[stops - before].add(field.type);
+      for (const press of [1, 2])
+        field.dispatchEvent(new page.defaultView.KeyboardEvent('keydown', { key: 'e', bubbles: true, cancelable: true }));
+      kinds[Math.min(stops - before, 1)].add(field.type);
     }
   WebSocket.prototype.send = send;
   return kinds.map((each) => [...each].sort());

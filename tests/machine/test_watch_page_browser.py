@@ -47,11 +47,11 @@ def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_
         browser.wait(f"{LIVE}.startsWith('paused')")
         browser.click("[data-order=resume]")
         browser.wait(f"{LIVE}.startsWith('printing') && !document.querySelector('[data-order=pause]').hidden")
-        browser.click("#stop")
+        browser.click("#cancel")
         browser.click("#go-on")
-        browser.wait("$('stop-surely').hidden")
-        browser.click("#stop")
-        browser.click("[data-order=stop]")
+        browser.wait("$('sure').hidden")
+        browser.click("#cancel")
+        browser.click("[data-order=cancel]")
         assert process.wait(PATIENCE_S) == 130
         assert browser.complaints == []
 

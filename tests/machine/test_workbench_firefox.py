@@ -220,6 +220,7 @@ def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(fir
         assert firefox.value(PRINTING) != "over"
         firefox.value("$('feed').focus()")  # a slider, which takes no letter
         firefox.key("e")
+        firefox.key("e")
         firefox.wait(f"{PRINTING} === 'over' && $('emergency').hidden")
         assert "emergency stop: the printer has halted" in firefox.value("$('stop-words').textContent")
         firefox.click("#stop-noted")

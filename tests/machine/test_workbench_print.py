@@ -141,6 +141,11 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.click("#pause")
         browser.wait(f"{PRINTING} === 'printing'")
 
+        browser.open(sliced.address)  # loaded again it still commands its print
+        browser.wait(f"{PRINTING} === 'printing' && !$('run-commands').hidden && $('held').hidden")
+        browser.click("[data-babystep='0.05']")
+        browser.wait("$('offset-told').textContent === '+0.05 mm'")
+
         second_page.command("take")
         browser.wait("!$('held').hidden && $('run-commands').hidden")
         assert "Another page has taken over" in browser.value("$('notice').textContent")
@@ -169,6 +174,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.value(f"{VIEW}.querySelector('button').focus()")
         sliced.process.send_signal(signal.SIGSTOP)  # the workbench hangs while somebody presses the key
         try:
+            browser.key("e")
             browser.key("e")
             browser.wait("$('stop-words').textContent === \"THE STOP IS NOT CONFIRMED: use the machine's own switch.\"")
             assert browser.value("$('stop-words').checkVisibility()")

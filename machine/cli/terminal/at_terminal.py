@@ -27,7 +27,7 @@ WORD_LENGTH = 200  # of one message: a lost connection takes two lines to descri
 COLOURS = dict.fromkeys((PrintState.PRINTING, PrintState.FINISHING), "green") | dict.fromkeys(
     (*AWAY, PrintState.RESUMING), "yellow"
 )
-KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? more"
+KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  u d Z offset  e e emergency stop  ? more"
 EXIT_CODES = {PrintState.DONE: 0, PrintState.DECLINED: 1, PrintState.CANCELLED: 130, PrintState.LEFT: 130}
 
 
@@ -206,7 +206,8 @@ def _heat(status: PrintStatus) -> Text:
         if now_c is not None
     ]
     overrides = [f"feed {status.feed_percent:.0f} %", f"flow {status.flow_percent:.0f} %"]
-    return _phrases_line([*old, *phrases, *overrides])
+    shifted = [f"Z offset {status.z_offset_mm:+g} mm"] if status.z_offset_mm else []
+    return _phrases_line([*old, *phrases, *overrides, *shifted])
 
 
 def _bar(status: PrintStatus) -> RenderableType:

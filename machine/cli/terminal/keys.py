@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from math import inf
 from time import monotonic
 from types import MappingProxyType
 from typing import Any
@@ -16,13 +17,16 @@ from machine.link.print_state import PrintState, PrintStatus
 from machine.notices import say
 
 STEP_PERCENT = 10.0
+STEP_MM = 0.01
 LOOK_S = 0.05
 HINT_S = 10.0  # a question expires after this time
 ALONE_S = 2.0  # time for a second interrupt if no keys can be pressed
 SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
 CANCELLING = "cancel this print? c or y: the server ends it; any other key: go on"
 LEAVING = "the print goes on without this program. c or Ctrl-C: cancel it, l: leave it printing; any other key: go on following"
-MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e stops the machine at once (M112)"
+MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e twice stops the machine at once (M112)"
+STOP = "emergency stop: e once more within a second (M112, the machine halts)"
+STOP_S = 1.0  # the second press of the emergency stop comes within it: a single one may be a slip
 SEQUENCE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O[A-Z])")  # arrow and function keys, whose letters are not keys
 BEGUN = re.compile(rb"\x1b(\[[0-9;]*|O)?$")  # a slow line may split a sequence
 SAME = {"=": "+", "_": "-", "?": "q"}
@@ -39,6 +43,7 @@ class Keyboard:
         self._hint, self._hint_until_s = "", 0.0
         self._sure = self._leaving = False  # open questions
         self._left = self._cancelled = False
+        self._stop_until_s = -inf  # a second e until then is the emergency stop
         self._deadline_s: float | None = None  # of the question that Ctrl-C asked
         self._state, self._feed, self._flow = PrintState.PRINTING, 100.0, 100.0
         self._reported = (100.0, 100.0)
@@ -62,8 +67,7 @@ class Keyboard:
         sure, self._sure = self._sure and bool(self.hint), False
         self._tell("")
         if key == "e":
-            self._tell("emergency stop")
-            self._control.ask(Command.EMERGENCY_STOP)
+            self._stop()
         elif sure:
             self._answer(key)
         elif act := _ACTS.get(key):
@@ -95,6 +99,15 @@ class Keyboard:
             self._left = True
         elif key == "c" or (key == "y" and not leaving):
             self._cancel_now()
+
+    def _stop(self) -> None:
+        """The emergency stop at the second of two presses; a key that is held down repeats itself."""
+        if self._now_s() <= self._stop_until_s:
+            self._tell("emergency stop")
+            self._control.ask(Command.EMERGENCY_STOP)
+        else:
+            self._stop_until_s = self._now_s() + STOP_S
+            self._tell(STOP)
 
     def _cancel(self) -> None:
         self._sure = True
@@ -129,6 +142,8 @@ _ACTS: dict[str, Callable[[Keyboard], None]] = {
     "q": lambda board: board._explain(),
     "+": lambda board: board._faster(STEP_PERCENT),
     "-": lambda board: board._faster(-STEP_PERCENT),
+    "u": lambda board: board._control.ask(Command.BABYSTEP, STEP_MM),
+    "d": lambda board: board._control.ask(Command.BABYSTEP, -STEP_MM),
     "]": lambda board: board._more(STEP_PERCENT),
     "[": lambda board: board._more(-STEP_PERCENT),
 }

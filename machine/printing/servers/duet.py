@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from machine.firmware.reprapfirmware import DIALECT
 from machine.link.identification import Answer, Kind
 from machine.link.pending_commands import Command
 from machine.link.print_state import AWAY, PrintState, PrintStatus
@@ -46,6 +47,8 @@ ORDERS = {Command.PAUSE: "M25", Command.RESUME: "M24", Command.CANCEL: "M25", Co
 
 class Duet(PrintServer):
     """A Duet as a PrintServer."""
+
+    babystep = DIALECT.babystep
 
     def __init__(self, address: Server, key: str = "", ca_file: Path | None = None, tell: Tell | None = None) -> None:
         super().__init__(address, key, ca_file, tell)

@@ -12,7 +12,15 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
-from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
+from machine.link.pending_commands import (
+    FEED_PERCENT,
+    FLOW_PERCENT,
+    Command,
+    Control,
+    PendingCommand,
+    offset_refusal,
+    percent_refusal,
+)
 from machine.link.print_state import PrintState, PrintStatus, last_known
 from machine.link.protocol.events import Temperature
 from machine.printing.servers.server import PrintServer
@@ -31,10 +39,10 @@ OnStatus = Callable[[PrintStatus, str], None]  # with a message for the user, ""
 
 @dataclass(eq=False)
 class Follower:
-    """Starts a file on a server and follows its print to the end: call run() once.
+    """Has a file printed that a server holds, and follows that to its end: run() once.
 
-    size: of the file, bytes, 0: unknown; left(): whether the user has left. running: active status of a print that is already
-    running and is not to be started.
+    size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
+    the server is at already, which is not to be started. babystep: its firmware's command for {} mm, "": not known.
     """
 
     server: PrintServer
@@ -44,6 +52,7 @@ class Follower:
     control: Control
     left: Callable[[], bool]
     running: PrintStatus | None = None
+    babystep: str = ""
 
     def __post_init__(self) -> None:
         # Status, error of a later request, and time of the newest answer: the polling thread replaces them together.
@@ -59,6 +68,7 @@ class Follower:
         self._shown: tuple[PrintStatus | None, str] = (None, "")
         self._shown_s = 0.0
         self._percents: dict[Command, float] = {}  # ordered values: not every server reports them
+        self._offset_mm = 0.0  # asked for so far
 
     def run(self) -> PrintState:
         """Follow the print to DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
@@ -193,6 +203,10 @@ class Follower:
         if command in (Command.FEED, Command.FLOW):
             self._message = percent_refusal(value, FEED_PERCENT if command is Command.FEED else FLOW_PERCENT) or ""
             return None if self._message else partial(self._set_percent, command, value)
+        if command is Command.BABYSTEP:
+            wanted_mm = round(self._offset_mm + value, 3)
+            self._message = offset_refusal(wanted_mm, self.babystep) or ""
+            return None if self._message else partial(self._shift, value)
         if command is Command.CANCEL:
             return self._cancel
         return partial(self.server.order, command) if command in (Command.PAUSE, Command.RESUME) else None
@@ -212,7 +226,12 @@ class Follower:
         self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
         self._percents[command] = value
 
+    def _shift(self, by_mm: float) -> None:
+        self.server.command(self.babystep.format(f"{by_mm:.3f}"))
+        self._offset_mm = round(self._offset_mm + by_mm, 3)
+
     def _with_percents(self, status: PrintStatus) -> PrintStatus:
+        status = replace(status, z_offset_mm=self._offset_mm)
         if self.server.tells_percents:
             return status
         feed, flow = (self._percents.get(command, 100.0) for command in (Command.FEED, Command.FLOW))

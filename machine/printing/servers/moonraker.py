@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from machine.firmware.klipper import AXES as KLIPPER_AXES
 from machine.link.identification import Answer, Kind
 from machine.link.pending_commands import Command
 from machine.link.print_state import PrintState, PrintStatus
@@ -44,6 +45,7 @@ class Moonraker(PrintServer):
     key_header = "X-Api-Key"
     key_refused = (401,)
     tells_percents = True
+    babystep = KLIPPER_AXES.babystep
 
     def greet(self) -> Identity:
         """Its version; axes, limits, steppers and commands if its Klipper is ready."""

@@ -31,7 +31,7 @@ FRAMED = {"Content-Security-Policy": "frame-ancestors 'none'"}
 ORDERS = {
     "pause": Command.PAUSE,
     "resume": Command.RESUME,
-    "stop": Command.CANCEL,
+    "cancel": Command.CANCEL,
     "emergency": Command.EMERGENCY_STOP,
 }
 

@@ -34,7 +34,7 @@ PHRASES = {
     "again": "try it again",
     "another baud rate": "try another baud rate",
     "another plate": "another can be taken below",
-    "compiling": "getting ready (only the first run needs to)",
+    "compiling": "",
     "for all": "set it for all parts",
     "force": "tick Go on all the same to print it nevertheless",
     "found by the search": "leave the part out of the plan and have it found by Find the others",

@@ -17,7 +17,7 @@ from machine.dryrun.dryrun import dry_run
 from machine.dryrun.findings import KnownFindings
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
-from machine.notices import Notice, marked_line, plain_line
+from machine.notices import Notice, Report, marked_line, plain_line
 from machine.pipeline import compilers
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import Server
@@ -226,6 +226,14 @@ class AtPage:
             self._add(Notice(notice.text.rstrip(), forced=True))
         self._lines.extend(line for line in notice.text.split("\n") if line.strip())
         self.tell(said=tuple(self._lines))
+
+    @contextmanager
+    def progress(self) -> Iterator[Report]:
+        """The progress of work before the print, told only while it lasts."""
+        try:
+            yield lambda text, share=None: self.tell(said=(*self._lines, marked_line(text)))
+        finally:
+            self.tell(said=tuple(self._lines))
 
     def _add(self, check: Notice) -> None:
         self._checks = (*self._checks, check)

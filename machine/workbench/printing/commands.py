@@ -71,27 +71,36 @@ async def check(
     sim_speed: float = 0.0,
     force: bool = False,
     send_only: bool = False,
+    gcode: str = "",
 ) -> None:
-    """Check and prepare a print of the bench's slices. send_only: a print server only stores the file."""
+    """Check and prepare a print of the slices on the page's bench. send_only: a print server is only to keep the file; gcode: the
+    key of the G-code file that is open there, to be printed in their place."""
     destination = _destination(port, baud, sim_speed)
     if send_only:
         destination = parse_server_address(destination.name)
-    page.prints.begin(page.name, await in_loop(page.benches, job_of(page.session, destination, force, not send_only)))
+    page.prints.begin(page.name, await in_loop(page.benches, job_of(page.session, destination, force, not send_only, gcode)))
 
 
-async def job_of(session: Session, destination: Destination, force: bool, starts: bool = True) -> PrintJob:
-    """A job for the slices of a bench. Runs in the sessions' event loop without a pause, so that it is consistent.
+async def job_of(session: Session, destination: Destination, force: bool, starts: bool = True, gcode: str = "") -> PrintJob:
+    """Make a job of the slices on a bench, or of the G-code file open there that has a key. Runs in the sessions' event loop
+    without a pause, so that all of it is of one moment. What is known before a printer is asked is refused here.
 
-    force: ignore errors of the dry run. Raises PlanError if the slices are missing or outdated, PrinterError for a machine that
-    cannot print there, MoveError if the dry run found errors.
+    force: go past errors of the dry run. Raises PlanError where there are no slices of what lies there now, PrinterError for a
+    machine that cannot print there, MoveError where the dry run found errors.
     """
     if session.closed:
         raise PlanError("this bench is not open any more: print from another one")
-    check_need(session, Need.MODEL)
-    slices = session.slicing.needed()
-    bench, sliced = slices.bench, slices.sliced
-    assert bench.model is not None
-    name, known = bench.model.name, sliced.known
+    if gcode:
+        if session.gcode is None or session.gcode.key != gcode:
+            raise PlanError("this G-code file is not open any more: open it again")
+        sliced = session.gcode
+        name = sliced.cost.name
+    else:
+        check_need(session, Need.MODEL)
+        slices = session.slicing.needed()
+        assert slices.bench.model is not None
+        name, sliced = slices.bench.model.name, slices.sliced
+    known = sliced.known
     check_destination(destination, known.profile.machine)
     if not force:  # the print itself reports errors that force overrides
         refuse_errors(sliced.errors, force=False)
@@ -166,6 +175,7 @@ OF_PRINT: dict[str, Callable[..., None]] = {
     "resume": RunningPrint.resume,
     "feed": RunningPrint.feed,
     "flow": RunningPrint.flow,
+    "babystep": RunningPrint.babystep,
     "by_hand": RunningPrint.by_hand,
 }
 COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()} | {

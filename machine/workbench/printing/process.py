@@ -39,7 +39,7 @@ def main() -> None:
     reporter = StateReporter(answers, first_state(job))
     person = AtPage(reporter, job.cut_off)
     Thread(target=listen, args=(asked, lambda words: person.hear(*words), person.leave), daemon=True).start()
-    with notices_to(FrontEnd(person.hear_notice)):
+    with notices_to(FrontEnd(person.hear_notice, person.progress)):
         end, forcible = carry_out(job, person)
     reporter.tell(state=end.state, sentence=end.sentence, forcible=forcible, stop_given=person.has_stopped())
     reporter.close()

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from machine.crash import bug_in_words
-from machine.link.pending_commands import Command
+from machine.link.pending_commands import MOST_OFFSET_MM, Command
 from machine.link.print_state import PrintState, follows
 from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
@@ -24,6 +24,7 @@ MAIN = "from machine.workbench.printing.process import main; main()"
 EMERGENCY_S = 5.0  # for the print's own process, which tries for 2.5 s to stop the printer, before the server does it
 LEAVE_S = 5.0  # for a declined print to release its port
 Percent = Annotated[int, Field(ge=0, le=10_000)]
+Babystep = Annotated[float, Field(ge=-MOST_OFFSET_MM, le=MOST_OFFSET_MM, allow_inf_nan=False)]
 HandWord = Annotated[HandDoes, Field(strict=False)]  # a string in JSON
 DIED = "the process that printed has ended before the print was done"
 
@@ -125,6 +126,10 @@ class RunningPrint:
     def flow(self, *, percent: Percent) -> None:
         """Set the flow, percent of the programmed one."""
         self.say((Command.FLOW, float(percent)))
+
+    def babystep(self, *, by_mm: Babystep) -> None:
+        """Raise the tip along the tool by so many mm, below 0 lower it; on a table that tilts the tool is machine Z, too."""
+        self.say((Command.BABYSTEP, by_mm))
 
     def by_hand(self, *, does: HandWord, axis: str = "", by_mm: float = 0.0, keep_heat: bool = False) -> None:
         """Send a command of manual control. Raises PrinterError if the printer is not under manual control."""

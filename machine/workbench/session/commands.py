@@ -119,12 +119,13 @@ ACTS: dict[str, Callable[..., Any]] = {
     "demo": Session.open_demo,
     "unit": Session.open_in_unit,
     "plate": Session.open_plate,
+    "close_gcode": Session.close_gcode,
 }
 FUNCTIONS: dict[str, Callable[..., Any]] = {name: change for name, (change, _) in CHANGES.items()} | EDITS | MARKINGS | ACTS
 COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()}
 LONG = ("search", "slice", "compare")  # `stop` ends these, even if they still wait for their turn
 NEEDS = {"compare": Need.SLICES} | dict.fromkeys(
-    ("demo", "unit", "dismiss", "undo", "redo", "set", "reset", "profile"), Need.NOTHING
+    ("demo", "unit", "close_gcode", "dismiss", "undo", "redo", "set", "reset", "profile"), Need.NOTHING
 )  # all others require a model
 
 

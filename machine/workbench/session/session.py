@@ -11,7 +11,7 @@ from weakref import finalize
 from machine.pipeline.embedded_profile import settings_inside
 from machine.pipeline.given_plan import with_plan_settings
 from machine.pipeline.project import Project, unpack
-from machine.pipeline.requests import PLACING, Given
+from machine.pipeline.requests import PLACING, Given, ModelRequest
 from machine.workbench.bench.bench import (
     Bench,
     History,
@@ -35,6 +35,7 @@ from machine.workbench.session.planes import PlaneTrials, Readiness, removed_in_
 from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled, read_model
+from machine.workbench.work.slices import Sliced, open_gcode
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.model_file import locate, plan_beside
 from mdp.pose import turned_by
@@ -76,6 +77,7 @@ class Session(SessionBase):
         self.keeping = Keeping(self)
         self.benches: list[dict[str, Any]] = []
         self.unscaled: OfUnknownUnit | None = None
+        self.gcode: Sliced | None = None  # a file that a page has sent
         self.settings_note = ("", "")
         self._to_begin: dict[object, str] = {}  # names of queued commands that begin long work
 
@@ -123,6 +125,21 @@ class Session(SessionBase):
     async def _replace(self, word: str, bench: Bench) -> None:
         """Take other work onto the bench, after what lies there is kept."""
         self.do(word, bench, await self.keeping.put_away())
+
+    async def open_gcode(self, path: Path, name: str) -> None:
+        """Dry-run a G-code file, to be looked at and printed whatever lies on the bench. Raises UserError."""
+        request = ModelRequest(str(path), self.bench.profile.of_all_parts)
+        with self.waiting(f"reading {name}"):
+            opened = await self.quick.run(open_gcode, request, self.new_file(), self.new_file())
+        self.close_gcode()
+        self.gcode = opened
+
+    def close_gcode(self) -> None:
+        """Forget the G-code file that is open, if one is."""
+        if self.gcode is not None:
+            _remove_files(self.gcode.page, self.gcode.gcode)
+        self.gcode = None
+        self.notify()
 
     async def open_in_unit(self, *, unit: str) -> None:
         """Open the model whose unit was unknown, scaled by the chosen unit. Raises UserError."""

@@ -28,7 +28,6 @@ from machine.workbench.bench.settings import export_command, file_stem, settings
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.base import hear_from, in_loop
 from machine.workbench.session.commands import Need, check_need
-from machine.workbench.session.long_work import Slices
 from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session, Workbench
 from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
@@ -37,7 +36,7 @@ from machine.workbench.web.snapshot import marks_key
 from machine.workbench.web.uploads import Uploads
 from machine.workbench.work.cutting import make_folder, make_pictures, make_plan, make_project
 from machine.workbench.work.models import mark_faces, rest_facets
-from machine.workbench.work.slices import share_page
+from machine.workbench.work.slices import Sliced, share_page
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
@@ -77,15 +76,15 @@ def _made_file(word: str, task: Callable[..., None], kind: str, ending: str) -> 
 
 
 async def print_page(session: Session, request: Request) -> Response:
-    """The page of the last slices as `view` writes it, with its own content security policy."""
-    slices = _slices(session, request)
-    return _gone() if slices is None else FileResponse(slices.sliced.page, media_type="text/html")
+    """The page of the last slices, or of a G-code file, as `view` writes it, with its own content security policy in it."""
+    sliced = _sliced(session, request)
+    return _gone() if sliced is None else FileResponse(sliced.page, media_type="text/html")
 
 
 async def print_text(session: Session, request: Request) -> Response:
-    """The G-code of the last slices for display, whatever the dry run found."""
-    slices = _slices(session, request)
-    return _gone() if slices is None else FileResponse(slices.sliced.gcode, media_type="text/plain")
+    """The same as G-code to look at, whatever the dry run found."""
+    sliced = _sliced(session, request)
+    return _gone() if sliced is None else FileResponse(sliced.gcode, media_type="text/plain")
 
 
 async def print_walls(session: Session, request: Request) -> Response:
@@ -116,10 +115,11 @@ async def gcode(session: Session, request: Request) -> Response:
     return FileResponse(sliced.gcode, headers=_saved_as(f"{file_stem(session.bench)}.gcode"), media_type="text/plain")
 
 
-def _slices(session: Session, request: Request) -> Slices | None:
-    """The last slices, if they have the requested key."""
-    slices = session.slicing.latest()
-    return slices if slices is not None and slices.sliced.key == request.path_params["key"] else None
+def _sliced(session: Session, request: Request) -> Sliced | None:
+    """The last slices, or the G-code file that is open, where they are those that are asked for."""
+    slices, key = session.slicing.latest(), request.path_params["key"]
+    there = [session.gcode, None if slices is None else slices.sliced]
+    return next((sliced for sliced in there if sliced is not None and sliced.key == key), None)
 
 
 def _gone() -> Response:

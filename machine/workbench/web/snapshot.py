@@ -135,6 +135,18 @@ def _sliced(session: Session) -> dict[str, Any] | None:
     }
 
 
+def _gcode(session: Session) -> dict[str, Any] | None:
+    """The G-code file that is open: its name, and whether it can be printed, in a sentence."""
+    file = session.gcode
+    if file is None:
+        return None
+    profile, note = file.known.profile, file.cost.message
+    tried = f"; {note}, so it was tried for {profile.machine.name} as under Settings" if note else ""
+    verdict = verdict_of(file.findings, profile, 0.0, out_of_date=False)["text"].removesuffix(" below")
+    figures = f"{duration(file.time_s)}, {file.filament_mm / 1000.0:.2f} m of filament"
+    return {"key": file.key, "name": file.cost.name, "told": f"{verdict}; {figures}{tried}"}
+
+
 def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles; small enough to be sent as a whole at every change."""
     bench, history, search = session.bench, session.history, session.finding.progress
@@ -165,6 +177,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "resting": _resting(session),
         "search": None if search is None else {"text": search.text, "planes": planes},
         **slices_state(session),
+        "gcode": _gcode(session),
         "front": [front_record(row) for row in bench.rows],
         "by_hand": session.by_hand.result and front_record(session.by_hand.result),
         "parts": bench.parts,

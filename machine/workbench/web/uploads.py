@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from machine.pipeline.project import Project, is_project, read_folder
-from machine.pipeline.requests import Given
+from machine.pipeline.requests import GCODE_SUFFIXES, Given
 from machine.workbench.access.limits import DEVICE, check_model_name, check_plan, check_profile
 from machine.workbench.bench.settings import named
 from machine.workbench.session.keeping import OPEN_ELSEWHERE
@@ -163,6 +163,8 @@ class Uploads:
             async with session.turn:
                 if is_project(path):
                     await session.open_project(path, name, taken_over)
+                elif path.suffix.lower() in GCODE_SUFFIXES:
+                    await session.open_gcode(path, name)
                 elif path.suffix.lower() != TEXT_SUFFIX:
                     await session.open_model(path, name)
                     taken = True

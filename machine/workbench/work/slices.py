@@ -13,6 +13,8 @@ from machine.pipeline.choice import as_turned
 from machine.pipeline.comparison import in_one_part, in_parts
 from machine.pipeline.pipeline import build
 from machine.pipeline.plate import on_one_plate
+from machine.pipeline.programs import load_program
+from machine.pipeline.requests import ModelRequest
 from machine.planning.fit import standing_at
 from machine.program import Alternative
 from machine.view.page import print_page, with_comparison
@@ -21,6 +23,7 @@ from machine.workbench.work.cutting import PLAN_NAME, cut_bench
 from mdp.decomposition import Decomposition, Part
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats
+from profiles.errors import GcodeError
 from profiles.profile import Profile
 from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import SlicingProgress
@@ -134,6 +137,28 @@ def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
         values["filament_mm"],
         known_findings(program.lines, profile, program.run.findings),
         in_parts(program, profile),
+    )
+
+
+def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sliced:
+    """A G-code file, dry-run as `view` and `print` do it, written to these files; the machine is that which it tells itself, else
+    that of the request. Raises GcodeError."""
+    loaded = load_program(request)
+    program, profile = loaded.program, loaded.profile
+    if not len(program.run.program.line):
+        raise GcodeError(f"{request.name} holds no move: there is nothing to show")
+    content = ("\n".join(program.lines) + "\n").encode("utf-8", "replace")
+    page.write_bytes(print_page(request.name, program, profile, known=loaded.machine_known))
+    gcode.write_bytes(content)
+    values, note = summary(program.run), "" if loaded.machine_known else "it does not tell its machine"
+    return Sliced(
+        page,
+        gcode,
+        sha256(content).hexdigest()[:16],
+        values["time_s"],
+        values["filament_mm"],
+        known_findings(program.lines, profile, program.run.findings),
+        Alternative(request.name, "", 1, message=note),
     )
 
 

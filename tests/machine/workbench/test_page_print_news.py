@@ -62,3 +62,15 @@ def test_a_warning_stands_beside_the_state_on_the_tab_and_in_the_bar_of_every_ta
         " return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
     )
     assert told == [f"printing, 50 % · {lost}", f"box at sim: printing, 50 % · {lost}", f"box: printing: {lost}"]
+
+
+@needs_node
+def test_earlier_prints_are_listed_with_outcome_time_and_filament_where_there_are_any() -> None:
+    done = "{ name: 'box', outcome: 'done', begun: 0, seconds: 5400, filament_m: 1.25 }"
+    killed = "{ name: 'tee', outcome: 'failed', begun: 0, seconds: null, filament_m: null }"
+    cells = on_fake_page(f"return [{done}, {killed}].map((past) => modules['print/print-shown'].pastCells(past).slice(0, 4));")
+    assert cells == [["box", "done", "1h 30m", "1.3 m"], ["tee", "failed", "–", "–"]]
+    shown = "$('history-field').hidden, $('history').children.length"
+    told = "fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [], history: "
+    assert on_fake_page(f"{PAGE} {told}[] }}); return [{shown}];") == [True, 0]
+    assert on_fake_page(f"{PAGE} {told}[{done}] }}); return [{shown}];") == [False, 2]

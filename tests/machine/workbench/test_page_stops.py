@@ -24,17 +24,35 @@ TWO_PRINTS = """
     "{ tagName: 'INPUT', type: 'number' }",
 ])  # fmt: skip
 def test_a_letter_e_that_the_field_in_focus_needs_stops_nothing(target: str) -> None:
-    assert on_fake_page(f"{TWO_PRINTS} fake.press('e', {target}); return fake.sent();") == []
+    assert on_fake_page(f"{TWO_PRINTS} fake.press('e', {target}); fake.wait(700); return fake.sent();") == []
 
 
 @needs_node
 @pytest.mark.parametrize("target", ["{ tagName: 'BODY' }", "{ tagName: 'BUTTON' }", "{ tagName: 'INPUT', type: 'range' }"])
 def test_the_key_e_stops_the_print_that_the_button_names_and_no_other(target: str) -> None:
-    assert on_fake_page(f"{TWO_PRINTS} fake.press('e', {target}); return fake.sent();") == [{"do": "emergency", "print": 2}]
+    held = f"fake.press('e', {target}); fake.wait(600);"
+    assert on_fake_page(f"{TWO_PRINTS} {held} return fake.sent();") == [{"do": "emergency", "print": 2}]
     looked_at = "$('which').value = 1; $('which').fire('change');"
-    acts = f"fake.press('e', {target})", "$('emergency').fire('click')"
+    acts = held, "$('emergency').fire('click')"
     by_key, by_button = (on_fake_page(f"{TWO_PRINTS} {looked_at} {act}; return fake.sent();") for act in acts)
     assert by_key == by_button == [{"do": "emergency", "print": 1}]
+
+
+@needs_node
+def test_a_slip_on_the_key_e_stops_nothing() -> None:
+    slip = "fake.press('e'); fake.wait(500); fake.press('e', {}, 'keyup');"
+    assert on_fake_page(f"{TWO_PRINTS} {slip} fake.wait(2000); return fake.sent();") == []
+    assert on_fake_page(f"{TWO_PRINTS} {slip} fake.wait(600); {slip} return fake.sent();") == []
+    lost = "fake.press('e'); fake.press('', {}, 'blur'); fake.wait(2000);"
+    assert on_fake_page(f"{TWO_PRINTS} {lost} return fake.sent();") == []
+
+
+@needs_node
+def test_the_key_e_pressed_twice_within_a_second_stops_and_shows_that_it_is_held() -> None:
+    twice = "fake.press('e'); fake.press('e', {}, 'keyup'); fake.wait(400); fake.press('e');"
+    assert on_fake_page(f"{TWO_PRINTS} {twice} return fake.sent();") == [{"do": "emergency", "print": 2}]
+    held = "[fake.press('e'), $('emergency').dataset.held, fake.wait(600), $('emergency').dataset.held ?? false]"
+    assert on_fake_page(f"{TWO_PRINTS} return {held}.filter((value) => value !== undefined);") == [True, False]
 
 
 LINE_LOST = f"""{TWO_PRINTS}

@@ -158,7 +158,7 @@ export function beadsOf(gl, shapes, path) {
     verticals: texture(gl, gl.RG16I, gl.RG_INTEGER, gl.SHORT, path.verticals, 2),
     colours: texture(gl, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4 * path.texels), 4),
   };
-  const boxes = boxesOfRuns(path);
+  const seenRuns = runsOf(path);
   const paint = (colours) => {
     gl.bindTexture(gl.TEXTURE_2D, textures.colours);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, path.texels / TEXELS, gl.RGBA, gl.UNSIGNED_BYTE, colours);
@@ -171,11 +171,10 @@ export function beadsOf(gl, shapes, path) {
       gl.bindTexture(gl.TEXTURE_2D, held);
     });
     const units = Object.fromEntries(Object.keys(textures).map((name, unit) => [name, unit]));
-    const roundness = clamp(pixels / CLOSE_PIXELS - 0.25, 0, 1);
-    drawing().draw({ ...units, toClip, toEye, eye, roundness, picking, last: moving.slot, share: moving.share, corners }, () => {
+    drawing().draw({ ...units, toClip, toEye, eye, roundness: clamp(pixels / CLOSE_PIXELS - 0.25, 0, 1), picking, last: moving.slot, share: moving.share, corners }, () => {
       for (const { first, end, tint } of ranges) {
         program.set({ tint });
-        for (const [from, behind] of boxes.seen(toClip, first, end)) {
+        for (const [from, behind] of seenRuns(toClip, first, end)) {
           program.set({ first: from });
           gl.drawElements(gl.TRIANGLES, (behind - from) * indices, gl.UNSIGNED_INT, 0);
         }
@@ -188,18 +187,13 @@ export function beadsOf(gl, shapes, path) {
 const WIDEST_MM = 2;
 const widened = ([least, most]) => [least.map((x) => x - WIDEST_MM), most.map((x) => x + WIDEST_MM)];
 
-/** The room that every AT_ONCE slots take; seen(): [from, behind] of those runs that may be in the picture. */
-function boxesOfRuns({ slots, points }) {
-  const boxes = [];
-  for (let from = 0; from < slots; from += AT_ONCE)
-    boxes.push(widened(bounds(points.subarray(3 * from, 3 * Math.min(from + AT_ONCE, slots) + 3))));
-  const seen = (toClip, first, end) => {
-    const runs = [];
-    for (let k = Math.floor(first / AT_ONCE); k * AT_ONCE < end; k++)
-      if (inPicture(toClip, boxes[k])) runs.push([Math.max(first, k * AT_ONCE), Math.min(end, (k + 1) * AT_ONCE)]);
-    return runs;
-  };
-  return { seen };
+/** A function of a view and slots that gives [from, behind] of those runs of AT_ONCE slots that may be in the picture. */
+function runsOf({ slots, points }) {
+  const boxes = Array.from({ length: Math.ceil(slots / AT_ONCE) }, (_, k) => (
+    widened(bounds(points.subarray(3 * k * AT_ONCE, 3 * Math.min((k + 1) * AT_ONCE, slots) + 3)))));
+  return (toClip, first, end) => boxes
+    .map((box, k) => [Math.max(first, k * AT_ONCE), Math.min(end, (k + 1) * AT_ONCE), box])
+    .filter(([from, behind, box]) => from < behind && inPicture(toClip, box));
 }
 
 /** Whether a box may be in the picture: not all of its corners lie beyond the same edge. */

@@ -7,10 +7,9 @@ const SLOW_MS = 50;
 const LONG_MS = 600; // a whole picture that takes longer is preceded by a coarse one also where only a choice has changed
 const TOLD_MS = 1500; // and of one that takes longer it is told how far it is
 const PIECE_MS = 120; // of a whole picture at a time: so long may a hand wait
-const LEAST = 5000; // beads in a piece
+const LEAST = 5000; // beads in a piece, and in a print whose first picture is a coarse one: how fast pictures come is not known yet
 const STILL_MS = 180;
-const AT_FIRST = 100000; // beads, before it is known how fast pictures come
-const COARSE_ROWS = 120000; // of so many rows every second layer makes a quick picture
+const COARSE_ROWS = 30000; // of so many rows every second layer makes a quick picture
 const COARSEST = 32;
 
 /** {ask, moved}: ask() after any change, moved() whenever eye or slider move. Pictures never pile up: each waits for the card. */
@@ -18,12 +17,12 @@ export function paceOf(gl, painter, count) {
   const { dataset } = document.documentElement;
   let state = "idle", timer = 0; // the timer runs while eye or slider move
   let stale = false, hasty = false, unbegun = false; // changed since; by a movement; only a coarse picture is there
-  let level = 2 ** Math.max(Math.ceil(Math.log2(count / COARSE_ROWS)), 1), piece = AT_FIRST / 4, spent = 0, whole = { ms: 0, rows: 1 };
+  let level = 2 ** Math.max(Math.ceil(Math.log2(count / COARSE_ROWS)), 1), piece = LEAST, spent = 0, whole = { ms: 0, rows: 1 };
   const tell = (now) => { state = dataset.picture = now; };
   const expectedMs = () => whole.ms * Math.max(painter.rows() / whole.rows, 1);
   const slow = () => {
-    if (!whole.ms || !hasty) return count > AT_FIRST && (!whole.ms || expectedMs() > LONG_MS);
-    return expectedMs() > SLOW_MS;
+    if (hasty && whole.ms) return expectedMs() > SLOW_MS;
+    return count > LEAST && (!whole.ms || expectedMs() > LONG_MS);
   };
   const draw = () => {
     if (stale && slow()) {
@@ -42,22 +41,23 @@ export function paceOf(gl, painter, count) {
     dataset.firstMs ||= performance.now().toFixed(0);
     if (!fine) {
       dataset.coarseMs = took.toFixed(0);
+      notice("", "drawing");
       level = took > SLOW_MS ? Math.min(level * 2, COARSEST) : took < SLOW_MS / 5 ? Math.max(level / 2, 2) : level;
       return;
     }
     spent += took;
     piece = Math.max(Math.ceil(piece * clamp(PIECE_MS / Math.max(took, 1), 0.5, 2)), LEAST);
-    const left = painter.left(), rows = painter.rows();
+    const { left, rows } = painter.progress();
     if (!left) {
-      whole = { ms: spent, rows: Math.max(rows, 1) };
+      whole = { ms: spent, rows };
       dataset.pictureMs = spent.toFixed(0);
       dataset.wholeMs ||= performance.now().toFixed(0);
     }
-    notice(left && expectedMs() + spent > TOLD_MS ? `Drawing every move: ${Math.floor(100 * (1 - left / Math.max(rows, 1)))} %` : "", "drawing");
+    notice(left && expectedMs() + spent > TOLD_MS ? `Drawing every move: ${Math.floor(100 * (1 - left / rows))} %` : "", "drawing");
   };
   const next = () => {
     if (stale) return queue();
-    if (!unbegun && !painter.left()) return tell("idle");
+    if (!unbegun && !painter.progress().left) return tell("idle");
     if (timer) tell("waiting"); else queue();
   };
   const begin = () => {

@@ -168,10 +168,8 @@ const COARSE_SHARE = 0.6; // of the canvas' width and height, drawn while all mo
 
 /** Has the card compile all programs while the page reads the print. */
 export function compileAll(gl) {
-  const pairs = [
-    [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
-  ];
-  pairs.forEach((pair) => programOf(gl, ...pair));
+  const beads = [[BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR]], others = [[SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT]];
+  [...beads, ...others].forEach((pair) => programOf(gl, ...pair));
 }
 
 /** {canvas, ask, moved, rowAt}: the picture of the scene, drawn whenever a bell rings. */
@@ -213,14 +211,18 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
 /** Draws coarse and at once, coarse(k), or fine and piece by piece, begin() and step(beads) until it is done(). */
 function painterOf(gl, print, scene, camera, showMarkers) {
   const { canvas } = gl, painter = { stage: null, shown: null };
-  let frames = null, seen = null, left = [];
-  const look = (share) => ({ size: sizeOf(canvas, share), seen: viewOf(print, scene, camera, sizeOf(canvas, share), density() * share) });
-  const show = (frame, now) => {
-    if (outgrown(canvas)) [canvas.width, canvas.height] = sizeOf(canvas);
+  let frames = null, fine = null, left = [];
+  const look = (share) => {
+    const size = sizeOf(canvas, share), seen = viewOf(print, scene, camera, size, density() * share);
+    return { size, whole: sizeOf(canvas), seen, rows: Math.max(countSlots(seen.ranges), 1) };
+  };
+  /** whole: the size of the canvas when the picture was begun: smooth edges are shown at that size alone. */
+  const show = (frame, { seen, whole }) => {
+    if (whole.join() !== [canvas.width, canvas.height].join()) [canvas.width, canvas.height] = whole;
     frame.show();
-    painter.shown = now;
-    showMarkers(now.work.toClip, canvas);
-    document.documentElement.dataset.drawn = countRows(now.ranges);
+    painter.shown = seen;
+    showMarkers(seen.work.toClip, canvas);
+    document.documentElement.dataset.drawn = countRows(seen.ranges);
   };
   painter.build = () => {
     painter.stage = stageOf(gl, print, scene.dark);
@@ -235,24 +237,23 @@ function painterOf(gl, print, scene, camera, showMarkers) {
     frames.moving.begin(...now.size);
     if (scene.beads() && painter.stage.beads) paintCoarse(painter.stage, print, now.seen, k);
     paintRest(painter.stage, print, scene, now.seen);
-    show(frames.moving, now.seen);
+    show(frames.moving, now);
   };
   painter.begin = () => {
-    const now = look(1);
-    seen = now.seen;
-    left = scene.beads() && painter.stage.beads ? [...seen.ranges] : [];
-    frames.still.begin(...now.size);
+    fine = look(1);
+    left = scene.beads() && painter.stage.beads ? [...fine.seen.ranges] : [];
+    frames.still.begin(...fine.size);
   };
   painter.step = (beads) => {
     const [pieces, rest] = firstOf(left, beads);
     frames.still.bind();
-    if (pieces.length) painter.stage.beads.draw(seen.beads, pieces, seen.moving);
+    if (pieces.length) painter.stage.beads.draw(fine.seen.beads, pieces, fine.seen.moving);
     left = rest;
     if (left.length) return;
-    paintRest(painter.stage, print, scene, seen);
-    show(frames.still, seen);
+    paintRest(painter.stage, print, scene, fine.seen);
+    show(frames.still, fine);
   };
-  painter.left = () => left.reduce((sum, { first, end }) => sum + end - first, 0);
+  painter.progress = () => ({ left: countSlots(left), rows: fine ? fine.rows : 1 });
   painter.slotUnder = (event) => {
     if (!scene.beads()) return -1;
     const [x, y] = placeOn(canvas, event), { width, height } = canvas;
@@ -264,12 +265,11 @@ function painterOf(gl, print, scene, camera, showMarkers) {
 /** Which faces are red: what another row of the front leaves risky is not known face by face. */
 const redOf = ({ risky, tried }) => (tried && risky === "printed" ? "none" : risky);
 
+const countSlots = (ranges) => ranges.reduce((sum, { first, end }) => sum + end - first, 0);
 const countRows = (ranges) => ranges.reduce((sum, range) => sum + range.endRow - range.firstRow, 0);
 
 /** What the canvas shows, kept on paper: WebGL's own is empty by the time that pages are laid out. */
 function keepPicture(canvas) {
-  const picture = $("picture");
-  picture.width = canvas.width;
-  picture.height = canvas.height;
+  const picture = Object.assign($("picture"), { width: canvas.width, height: canvas.height });
   picture.getContext("2d").drawImage(canvas, 0, 0);
 }

@@ -95,14 +95,11 @@ function pathOf(rows, chain) {
 
 /** Rows at which something stands to be marked: where an outer wall begins, where filament is pulled back, pushed forward. */
 function marksOf(rows) {
-  const wall = rows.types.map((name) => WALLS.test(name));
-  const seams = [], retracts = [], primes = [];
+  const wall = rows.types.map((name) => WALLS.test(name)), seams = [], retracts = [], primes = [];
   for (let i = 0; i < rows.count; i++) {
-    const kind = rows.kind[i];
-    if (kind === KIND.extrude) {
-      const follows = i > 0 && rows.kind[i - 1] === KIND.extrude && rows.type[i - 1] === rows.type[i];
-      if (wall[rows.type[i]] && !follows) seams.push(i);
-    } else if (kind === KIND.retract) retracts.push(i);
+    const kind = rows.kind[i], follows = i > 0 && rows.kind[i - 1] === kind && rows.type[i - 1] === rows.type[i];
+    if (kind === KIND.extrude && wall[rows.type[i]] && !follows) seams.push(i);
+    else if (kind === KIND.retract) retracts.push(i);
     else if (kind === KIND.prime) primes.push(i);
   }
   return { seams, retracts, primes };

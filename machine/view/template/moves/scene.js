@@ -1,7 +1,7 @@
 // Scene: what the person has chosen to see; the only state that the page keeps.
 
 import { add, carried, clamp, countUpTo, length, mix } from "../picture/math.js";
-import { chainOf, layerOf, placeAt } from "./rows.js";
+import { chainOf, placeAt } from "./rows.js";
 
 export function sceneOf(print, bells) {
   const { rows, header } = print, last = Math.max(rows.count - 1, 0);
@@ -13,22 +13,21 @@ export function sceneOf(print, bells) {
     on: { beads: true, travels: false, retractions: false, seams: false, machine: header.machine.known, planes: false, directions: false, findings: true },
   };
   scene.layers = () => (scene.part === null ? rows.layers : rows.layers.filter((layer) => layer.part === scene.part));
-  /** Show the print after a share of a row. */
+  /** The layers between which all is drawn, places in the list. */
+  const limit = (low, high) => {
+    const before = [scene.low, scene.high];
+    scene.high = clamp(high, 0, Math.max(scene.layers().length - 1, 0));
+    scene.low = clamp(low, 0, scene.high);
+    if (before.join() !== [scene.low, scene.high].join()) bells.ring("layers");
+  };
+  /** Show the print after a share of a row; the highest layer drawn is the one that it has reached. */
   scene.go = (row, share = 1) => {
     scene.row = clamp(Math.round(row), 0, last);
     scene.share = share;
     if (rows.count) scene.place = placeAt(rows, scene.row, share);
+    limit(scene.low, scene.layers().findLastIndex(({ first }) => first <= scene.row));
     bells.ring("row");
   };
-  /** The end of a layer some layers away. */
-  scene.goLayer = (by) => {
-    if (!rows.layers.length) return;
-    const now = layerOf(rows, scene.row), complete = now >= 0 && scene.row === rows.layers[now].last;
-    const next = now + (by < 0 && !complete ? 0 : by) + (by > 0 && !complete ? -1 : 0);
-    scene.go(rows.layers[clamp(next, 0, rows.layers.length - 1)].last);
-  };
-  /** What the print has reached with a layer, where it is before that: so that the layer is seen. */
-  scene.goTo = ({ last: end }) => { if (scene.row < end) scene.go(end); };
   scene.goToLine = (line) => scene.go(countUpTo(rows.line, line) - 1);
   scene.time = () => {
     if (!rows.count) return 0;
@@ -42,8 +41,16 @@ export function sceneOf(print, bells) {
   };
   scene.choosePart = (index) => {
     scene.part = index;
-    [scene.low, scene.high] = [0, Math.max(scene.layers().length - 1, 0)];
+    scene.low = 0;
+    scene.go(Math.max(scene.row, scene.layers().at(-1)?.last ?? 0)); // all of it is printed
     bells.ring("layers");
+  };
+  /** The highest layer drawn: the print is shown at its end. */
+  scene.chooseHigh = (place) => scene.go(scene.layers()[clamp(place, 0, scene.layers().length - 1)]?.last ?? scene.row);
+  /** The lowest one; the highest is never below it. */
+  scene.chooseLow = (place) => {
+    if (place > scene.high) scene.chooseHigh(place);
+    limit(place, scene.high);
   };
   scene.beads = () => scene.on.beads && !scene.tried;
   /** Look at the cuts of another row of the front; null: at what was made. */
@@ -55,11 +62,6 @@ export function sceneOf(print, bells) {
   scene.standFor = (part) => {
     scene.place = restingPlace(header, part);
     bells.ring("row");
-  };
-  scene.chooseLayers = (low, high) => {
-    const most = Math.max(scene.layers().length - 1, 0);
-    [scene.low, scene.high] = [clamp(Math.min(low, high), 0, most), clamp(Math.max(low, high), 0, most)];
-    bells.ring("layers");
   };
   return scene;
 }
@@ -92,7 +94,7 @@ function chosenRows(rows, { layers, low, high, others }) {
   const list = layers(), last = list.length - 1;
   if (last < 0) return [[0, rows.count, false]];
   if (list.length === rows.layers.length)
-    return [[low === 0 ? 0 : list[low].first, high === last ? rows.count : list[high].last + 1, false]];
+    return [[low === 0 ? 0 : list[low].first, high === last ? rows.count : list[high + 1].first, false]];
   const chosen = [[list[low].first, list[high].last + 1, false]];
   return others === "hide" ? chosen : [...chosen, [0, list[0].first, true], [list[last].last + 1, rows.count, true]];
 }

@@ -12,17 +12,17 @@ const TURN_STEP_DEG = 3;
 /** Drawing, for ranges of rows, of the ways of all that move and lay nothing; turns of the table are arcs. */
 export function waysOn(gl, { rows, path, chain }) {
   const places = [], colours = [], row = [], p = path.points; // row: of each pair of places, rising
-  const pair = (i, a, b) => {
-    const colour = WAYS[rows.kind[i]] || PLAIN_WAY;
-    places.push(a[0], a[1], a[2], b[0], b[1], b[2]);
-    for (let k = 0; k < 8; k++) colours.push(colour[k & 3]);
-    row.push(i);
-  };
   for (let i = 0; i < rows.count; i++) {
     if (rows.kind[i] === KIND.extrude) continue;
     const s = 3 * path.slot(i), first = [p[s], p[s + 1], p[s + 2]], end = [p[s + 3], p[s + 4], p[s + 5]];
     const way = rows.kind[i] === KIND.rotate ? arcOf(rows, i, chain) : [first, end];
-    for (let k = 1; k < way.length; k++) if (length(sub(way[k], way[k - 1])) > 0) pair(i, way[k - 1], way[k]);
+    const colour = WAYS[rows.kind[i]] || PLAIN_WAY;
+    for (let k = 1; k < way.length; k++) {
+      if (!length(sub(way[k], way[k - 1]))) continue;
+      places.push(...way[k - 1], ...way[k]);
+      colours.push(...colour, ...colour);
+      row.push(i);
+    }
   }
   const lines = linesOf(gl, { places: new Float32Array(places), colours: new Uint8Array(colours) });
   return { draw: (seen, firstRow, endRow) => lines.draw(seen, { range: [firstRow, endRow].map((edge) => 2 * countUpTo(row, edge - 1)) }) };
@@ -77,9 +77,8 @@ export function marksOn(gl, marked, path, { fill, shape, larger = 0 }) {
   const places = new Float32Array(3 * marked.length);
   marked.forEach((row, k) => places.set(path.points.subarray(3 * path.slot(row), 3 * path.slot(row) + 3), 3 * k));
   const points = cornersOn(gl, programOf(gl, MARK_VERTEX, MARK_FRAGMENT), { place: [places, 3] });
-  const draw = ({ toClip }, firstRow, endRow, size, lift) => {
+  return { draw: ({ toClip }, firstRow, endRow, size, lift) => {
     const first = countUpTo(marked, firstRow - 1), end = countUpTo(marked, endRow - 1);
     if (end > first) points.draw({ toClip, size: size + larger, lift, fill, shape }, () => gl.drawArrays(gl.POINTS, first, end - first));
-  };
-  return { draw };
+  } };
 }

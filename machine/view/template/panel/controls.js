@@ -48,10 +48,8 @@ function typeBoxes({ rows }, scene, bells) {
   });
 }
 
-const TITLES = { kind: "kind of line", layer: "layer time" }; // where the title is not the word itself
-
 export function showLegend({ rows, header }, { mode, tried }, legend) {
-  const title = tried ? `as ${partsInWords(tried.parts)}` : (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "");
+  const title = tried ? `as ${partsInWords(tried.parts)}` : $("colour-by").selectedOptions[0].text + (legend ? `, ${legend.unit}` : "");
   const parts = tried ? tried.colours.map((colour, k) => [colour, `${k + 1}`]) : header.parts.map(({ colour, index }) => [colour, index ? `${index}` : "the file"]);
   const entries = swatches(mode === "kind" && !tried ? kindEntries(rows) : parts);
   $("legend").replaceChildren(made("b", { text: title }), ...(legend && !tried ? scaleOf(legend) : entries));

@@ -52,10 +52,10 @@ export function follow(scene, player) {
   ask();
 }
 
-/** The buttons, which do what keys in the terminal do; a stop is asked about once more, an emergency stop is not. */
+/** The buttons, which do what keys in the terminal do; a cancel is asked about once more, an emergency stop is not. */
 function orders() {
-  const sure = (asked) => hide({ "stop-surely": !asked, stop: asked });
-  listen("click", { stop: () => sure(true), "go-on": () => sure(false) });
+  const sure = (asked) => hide({ sure: !asked, cancel: asked });
+  listen("click", { cancel: () => sure(true), "go-on": () => sure(false) });
   onData("order", async ({ order }) => {
     sure(false);
     const answer = await fetch(`order/${order}`, { method: "POST" }).catch(() => null);
@@ -66,7 +66,7 @@ function orders() {
 function liveTold(told) {
   const heat = (name, value, target) => value != null && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
   return [
-    told.share ? `${told.state} ${Math.floor(100 * told.share)} %` : told.state,
+    told.share ? `${told.state}, ${Math.floor(100 * told.share)} %` : told.state,
     told.file_line && `line ${told.file_line}`,
     heat("nozzle", told.nozzle_c, told.nozzle_target_c),
     heat("bed", told.bed_c, told.bed_target_c),

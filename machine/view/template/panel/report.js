@@ -37,11 +37,7 @@ function lineOf(row, idle, choose) {
   const label = made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `taken: ${row.why}` })] : []));
   const line = rowOf([label, ...FRONT.map(([, of]) => of(row))]);
   line.className = idle ? "idle" : "";
-  line.addEventListener("click", (event) => {
-    if (line.cells[0].contains(event.target) || mark.checked) return;
-    mark.click();
-    mark.focus();
-  });
+  line.onclick = ({ target }) => { if (!line.cells[0].contains(target)) label.click(); };
   return line;
 }
 

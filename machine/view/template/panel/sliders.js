@@ -8,7 +8,7 @@ import { clamp } from "../picture/math.js";
 const PLAYING = [1, 5, 20, 100, 300, 1000];
 const USUAL = 100;
 
-/** {start, stop, toggle, playing, go(row), step(rows)}: the latter two stop the playing. */
+/** {stop, toggle, playing, go(row), step(rows)}: the latter two stop the playing. */
 export function courseOf(print, scene, bells) {
   const { rows, header } = print, position = $("position"), total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
   position.max = Math.max(rows.count - 1, 0);
@@ -39,21 +39,16 @@ function playerOf(scene, bells, total) {
     bells.ring("moving");
     if (next >= total) player.stop(); else requestAnimationFrame(step);
   };
-  const show = () => {
+  player.toggle = () => {
+    player.playing = !player.playing;
     $("play").textContent = player.playing ? "❚❚" : "▶";
     $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
     bells.ring("look");
-  };
-  player.start = () => {
-    if (player.playing) return;
-    if (scene.time() >= total) scene.goToTime(0);
-    player.playing = true;
+    if (player.playing && scene.time() >= total) scene.goToTime(0);
     before = performance.now();
     requestAnimationFrame(step);
-    show();
   };
-  player.stop = () => { if (player.playing) { player.playing = false; show(); } };
-  player.toggle = () => (player.playing ? player.stop() : player.start());
+  player.stop = () => { if (player.playing) player.toggle(); };
   player.go = (row) => {
     player.stop();
     scene.go(row);
@@ -73,14 +68,11 @@ function paintStrip(strip, parts, count) {
 
 export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
   const press = (id) => () => $(id).click();
-  const layer = (by) => (event) => {
-    if (event.shiftKey) scene.chooseLayers(Math.min(scene.low + by, scene.high), scene.high);
-    else scene.chooseLayers(Math.min(scene.low, scene.high + by), scene.high + by);
-  };
+  const layer = (by) => ({ shiftKey }) => (shiftKey ? scene.chooseLow(scene.low + by) : scene.chooseHigh(scene.high + by));
   const keys = {
     ...viewKeys(camera, look), " ": () => player.toggle(), ",": () => player.step(-1), ".": () => player.step(1),
     "[": layer(-1), "]": layer(1), "{": layer(-1), "}": layer(1),
-    PageUp: () => scene.goLayer(1), PageDown: () => scene.goLayer(-1), Home: () => scene.go(0), End: () => scene.go(Infinity),
+    PageUp: layer(1), PageDown: layer(-1), Home: () => scene.go(0), End: () => scene.go(Infinity),
     t: press("show-travels"), s: press("show-seams"), m: press("show-machine"), b: press("show-beads"),
     r: () => { $("frame").value = scene.riding ? "machine" : "workpiece"; $("frame").dispatchEvent(new Event("change")); },
     f: fit, d: () => chooseTheme(!scene.dark), "?": () => $("help").showModal(),
@@ -90,15 +82,11 @@ export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
 }
 
 export function layerSliders({ header: { parts } }, scene, bells) {
-  const limits = {
-    low: (value) => scene.chooseLayers(value, Math.max(value, scene.high)),
-    high: (value) => scene.chooseLayers(Math.min(value, scene.low), value),
-  };
+  const limits = { low: scene.chooseLow, high: scene.chooseHigh };
   const typed = (end, field, of) => () => {
     const { value } = $(`layer-${end}-${field}`);
     if (value === "" || !Number.isFinite(Number(value))) return show();
-    limits[end](nearestLayer(scene.layers(), numberIn(`layer-${end}`), Number(value), of));
-    return scene.goTo(scene.layers()[scene[end]]);
+    return limits[end](nearestLayer(scene.layers(), numberIn(`layer-${end}`), Number(value), of));
   };
   for (const end of Object.keys(limits)) {
     listen("input", { [`layer-${end}`]: ({ target }) => limits[end](Number(target.value)) });
@@ -158,9 +146,7 @@ export function layerTimes(scene, bells) {
     return Math.round(clamp(share, 0, 1) * Math.max(scene.layers().length - 1, 0));
   };
   const go = (event) => {
-    const place = point(event);
-    scene.chooseLayers(Math.min(scene.low, place), place);
-    scene.goTo(scene.layers()[place]);
+    scene.chooseHigh(point(event));
     bells.ring("moving");
   };
   canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); go(event); });

@@ -89,8 +89,7 @@ export function placeOn(canvas, { clientX, clientY }) {
 export function handle(canvas, camera, { changed, pressed }) {
   const fingers = new Map();
   let path = 0;
-  const mean = (k) => [...fingers.values()].reduce((sum, place) => sum + place[k] / fingers.size, 0);
-  const middle = () => [mean(0), mean(1)];
+  const middle = () => [0, 1].map((k) => [...fingers.values()].reduce((sum, place) => sum + place[k] / fingers.size, 0));
   const spread = () => {
     const [a, b] = [...fingers.values()];
     return b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : 0;

@@ -40,9 +40,7 @@ export function rotated(axis, angle) {
 /** The inverse of a rotation with a shift. */
 export function undone(m) {
   const back = [m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, 0, 0, 0, 1];
-  const shift = carried(back, [m[12], m[13], m[14]]);
-  back[12] = -shift[0]; back[13] = -shift[1]; back[14] = -shift[2];
-  return back;
+  return [...back.slice(0, 12), ...scaled(turned(back, m.slice(12, 15)), -1), 1];
 }
 
 export const turned = (m, v) => [
@@ -54,8 +52,7 @@ export const carried = (m, v) => add(turned(m, v), [m[12], m[13], m[14]]);
 
 /** A place on the screen, each coordinate -1..1, and its distance w; w <= 0 lies behind the eye. */
 export function projected(m, v) {
-  const w = m[3] * v[0] + m[7] * v[1] + m[11] * v[2] + m[15];
-  const p = carried(m, v);
+  const w = m[3] * v[0] + m[7] * v[1] + m[11] * v[2] + m[15], p = carried(m, v);
   return [p[0] / w, p[1] / w, p[2] / w, w];
 }
 

@@ -73,22 +73,18 @@ function plateCorners({ radius_mm: radius, size_mm: size, thickness_mm: thick })
   return revolved([[0, -thick], [radius, -thick], [radius, 0], [0, 0]], 96);
 }
 
-/** Rings and spokes, by which a turn of the plate is seen; a longer stroke marks the workpiece's +x. */
+/** A grid, or rings and spokes, by which a turn of the plate is seen; a longer stroke marks the workpiece's +x. */
 function plateLines({ radius_mm: radius, size_mm: size }, line, edge) {
-  const step = radius > 120 ? 50 : radius > 40 ? 20 : 10, z = 0.05, pieces = [];
+  const step = radius > 120 ? 50 : radius > 40 ? 20 : 10, z = 0.05, [a, b] = size ? size.map((side) => side / 2) : [radius, radius];
+  const rim = size ? [[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]] : circle(radius, z, 96), inner = [];
   if (size) {
-    const [a, b] = [size[0] / 2, size[1] / 2], rows = [];
-    for (let x = -Math.floor(a / step) * step; x <= a; x += step) rows.push([x, -b, z], [x, b, z]);
-    for (let y = -Math.floor(b / step) * step; y <= b; y += step) rows.push([-a, y, z], [a, y, z]);
-    const rim = chained([[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]]);
-    pieces.push({ corners: rows, colour: line }, { corners: [...rim, [0, 0, z], [a, 0, z]], colour: edge });
-    return pieces;
+    for (let x = -Math.floor(a / step) * step; x <= a; x += step) inner.push([x, -b, z], [x, b, z]);
+    for (let y = -Math.floor(b / step) * step; y <= b; y += step) inner.push([-a, y, z], [a, y, z]);
+  } else {
+    for (let r = step; r < radius; r += step) inner.push(...chained(circle(r, z, 96)));
+    inner.push(...circle(radius, z, 12).flatMap((place) => [scaled(place, step / radius), place]));
   }
-  for (let r = step; r < radius; r += step) pieces.push({ corners: chained(circle(r, z, 96)), colour: line });
-  const spokes = circle(radius, z, 12).flatMap((place) => [scaled(place, step / radius), place]);
-  pieces.push({ corners: spokes, colour: line }, { corners: chained(circle(radius, z, 96)), colour: edge });
-  pieces.push({ corners: [[0, 0, z], [radius, 0, z]], colour: edge });
-  return pieces;
+  return [{ corners: inner, colour: line }, { corners: [...chained(rim), [0, 0, z], [a, 0, z]], colour: edge }];
 }
 
 export function headOf({ silhouette_mm: silhouette, boxes }, colour, edge) {
@@ -171,20 +167,15 @@ export function beside(direction) {
   return [a, cross(direction, a)];
 }
 
-/** The disc of a cut, 72 corners about its middle. */
-function discOf({ normal, centre_mm: centre, radius_mm: radius }) {
-  const [a, b] = beside(normal);
-  return circle(radius * 1.12, 0, 72).map(([u, v]) => add(centre, add(scaled(a, u), scaled(b, v))));
-}
-
 export const based = (parts) => parts.filter((part) => part.base && part.direction && part.base.radius_mm > 0);
 
 /** Discs where the parts are cut, their rims, and an arrow along each part's direction: as many corners a part. */
 export function planesOf(parts, colourOf) {
   const discs = [], rims = [];
   for (const part of based(parts)) {
-    const disc = discOf(part.base), colour = [...colourOf(part), 255];
-    discs.push({ corners: disc.flatMap((place, k) => [part.base.centre_mm, place, disc[(k + 1) % disc.length]]), colour });
+    const { normal, centre_mm: centre, radius_mm: radius } = part.base, [a, b] = beside(normal), colour = [...colourOf(part), 255];
+    const disc = circle(radius * 1.12, 0, 72).map(([u, v]) => add(centre, add(scaled(a, u), scaled(b, v))));
+    discs.push({ corners: disc.flatMap((place, k) => [centre, place, disc[(k + 1) % disc.length]]), colour });
     rims.push({ corners: chained(disc), colour });
   }
   return { discs: trianglesOf(discs), rims: trianglesOf(rims) };

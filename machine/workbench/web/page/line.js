@@ -5,6 +5,7 @@
 // the line in model/benches.js: the paired devices', DEVICE_COMMANDS in web/line.py. A button with data-do or data-print gives the NAME alone.
 
 import { made, notice } from "../../../view/template/elements.js";
+import { keptInTab } from "./store.js";
 
 export const AGAIN_MS = 1000;
 const SILENT_MS = 1500, LATE_MS = 200; // without a beat, two a second; and until what has come is heard, where the page itself was busy
@@ -51,9 +52,12 @@ export function lineAt(path, heard, stands) {
 export const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
   ({ status }) => ({ 403: "unpaired", 404: "replaced" }[status] || "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
 
-let line = null, asked = new Map(), count = 0; // asked: what is called when a command is answered, by its name
-/** This page's name, which no other one has; a page that is not encrypted has no randomUUID. */
-export const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
+let line = null, asked = new Map(), count = Date.now(); // count: beyond that of the page before a reload; asked: what is called when a command is answered, by its name
+const kept = keptInTab("page", { name: "" });
+/** This page's name, which no other one has, not even a copy of its tab: a reload alone hands it on, and with it the command of its prints. */
+export const OWN_PAGE = kept.now.name || crypto.getRandomValues(new Uint32Array(3)).join("-"); // a page that is not encrypted has no randomUUID
+kept.keep({ name: "" });
+addEventListener("pagehide", () => kept.keep({ name: OWN_PAGE }));
 
 /** A state as this page tells it: what others were refused is theirs to see. */
 function toldHere(state) {

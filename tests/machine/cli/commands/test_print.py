@@ -75,7 +75,7 @@ def test_ctrl_c_at_the_screen_ends_safely_and_gives_the_terminal_back(hours: str
 def test_the_emergency_key_stops_the_machine_and_the_log_is_named(hours: str) -> None:
     with Person(*print_of(hours)) as person:
         person.see("layer 1 of 1")
-        person.press("e")
+        person.press("ee")
         person.see("all that was sent and received is in ")
         person.see("tiltprint: emergency stop: the printer has halted")
         assert person.end() == 1

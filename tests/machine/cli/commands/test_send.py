@@ -208,7 +208,7 @@ def test_the_emergency_key_halts_the_printer_behind_a_server() -> None:
         job.steps = 10_000
         with Person(*print_of(address)) as person:
             person.see("so far")
-            person.press("e")
+            person.press("ee")
             person.see(f"tiltprint: emergency stop: {address} has taken it; restart the printer before the next print")
             assert person.end() == 1
     assert job.commands == ["M112"]

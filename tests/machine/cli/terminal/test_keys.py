@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from machine.cli.terminal import keys as keys_module
-from machine.cli.terminal.keys import ALONE_S, CANCELLING, HINT_S, LEAVING, MORE, SURE, Keyboard, can_type, typing
+from machine.cli.terminal.keys import ALONE_S, CANCELLING, HINT_S, LEAVING, MORE, STOP, STOP_S, SURE, Keyboard, can_type, typing
 from machine.link.pending_commands import Command, Control, PendingCommand
 from machine.link.print_state import PrintState, PrintStatus
 from tests.machine.peers import PATIENCE_S
@@ -43,8 +43,6 @@ def hint_after(*keys: str) -> str:
     (" ", "printing", Command.PAUSE),
     (" ", "paused", Command.RESUME),
     (" ", "pausing", Command.RESUME),
-    ("e", "printing", Command.EMERGENCY_STOP),
-    ("E", "paused", Command.EMERGENCY_STOP),
 ])  # fmt: skip
 def test_a_key_asks_for_its_wish_at_once(key: str, state: str, wish: Command) -> None:
     assert asked(key, state=state) == [PendingCommand(wish)]
@@ -76,7 +74,18 @@ def test_the_question_goes_away_with_the_answer() -> None:
 
 
 def test_an_emergency_stop_is_never_an_answer_to_a_question() -> None:
-    assert asked("c", "e") == [PendingCommand(Command.EMERGENCY_STOP)]
+    assert asked("c", "e", "e") == [PendingCommand(Command.EMERGENCY_STOP)]
+
+
+def test_an_emergency_stop_is_two_presses_within_a_second() -> None:
+    assert asked("e", "E", state="paused") == [PendingCommand(Command.EMERGENCY_STOP)]
+    control, clock = Control(), [0.0]
+    board = Keyboard(control, now_s=lambda: clock[0])
+    board.press("e")
+    assert board.hint == STOP
+    clock[0] = STOP_S + 0.1
+    board.press("e")
+    assert control.take() is None
 
 
 def test_q_is_explained() -> None:
@@ -88,6 +97,10 @@ def test_q_is_explained() -> None:
 ])  # fmt: skip
 def test_the_feed_goes_in_steps(keys: str, percent: list[float]) -> None:
     assert asked(*keys) == [PendingCommand(Command.FEED, value) for value in percent]
+
+
+def test_u_and_d_shift_z_by_a_hundredth_of_a_millimetre() -> None:
+    assert asked("u", "d") == [PendingCommand(Command.BABYSTEP, 0.01), PendingCommand(Command.BABYSTEP, -0.01)]
 
 
 def test_steps_begin_at_what_the_program_has_set() -> None:
@@ -245,7 +258,8 @@ def commands_of(control: Control) -> list[Command]:
     ("keys", "commands", "left"),
     [
         ("pr", [Command.PAUSE, Command.RESUME], False),
-        ("e", [Command.EMERGENCY_STOP], False),
+        ("ee", [Command.EMERGENCY_STOP], False),
+        ("e", [], False),
         ("cy", [Command.CANCEL], False),
         ("cc", [Command.CANCEL], False),
         ("cn", [], False),

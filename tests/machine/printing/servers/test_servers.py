@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from machine.firmware import dialect_of
 from machine.link.pending_commands import Command, Control
 from machine.link.print_state import PrintState, PrintStatus
 from machine.printing.destination import parse_server_address
@@ -23,6 +24,7 @@ from machine.printing.servers.http import VARIABLE, servers_file
 from machine.printing.servers.server import GcodeUpload, PrintServer
 from machine.printing.servers.servers import KINDS
 from profiles.errors import NoAnswerError, ServerError
+from profiles.profile import load
 from tests.machine.printing.servers.stand_ins import KEY, STAND_INS, Job, session_with, stand_in
 
 LINES = tuple(f"G1 X{k}" for k in range(20_000))
@@ -199,6 +201,43 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
         assert server.status().state is PrintState.OFFLINE
     assert job.commands[0] == "M220 S120"
     assert job.halted
+
+
+@pytest.mark.parametrize(("kind", "sent"), [
+    ("octoprint", "M290 Z-0.010"), ("duet", "M290 R1 Z-0.010"), ("moonraker", "SET_GCODE_OFFSET Z_ADJUST=-0.010 MOVE=1"),
+])  # fmt: skip
+def test_a_z_offset_is_the_firmwares_own_command_and_bounded(kind: str, sent: str) -> None:
+    control, told = Control(), set[tuple[float, str]]()
+    with printing(kind) as (job, server):
+        control.ask(Command.BABYSTEP, -0.01)
+        control.ask(Command.BABYSTEP, 2.5)  # not possible: told, not sent
+
+        def stop(status: PrintStatus, message: str) -> None:
+            told.add((status.z_offset_mm, message))
+            if status.z_offset_mm:
+                control.ask(Command.EMERGENCY_STOP)
+
+        babystep = server.babystep or dialect_of(load().machine).babystep
+        left = lambda: False  # noqa: E731
+        follower = Follower(server, UPLOAD.name, 1, on_status=stop, control=control, left=left, babystep=babystep)
+        assert follower.run() is PrintState.FAILED
+    assert job.commands[0] == sent
+    assert -0.01 in {offset for offset, _ in told}
+
+
+@every_kind
+def test_a_z_offset_is_refused_where_the_firmware_is_not_known(kind: str) -> None:
+    control, told = Control(), set[str]()
+    with printing(kind) as (job, server):
+        control.ask(Command.BABYSTEP, 0.01)
+
+        def stop(status: PrintStatus, message: str) -> None:
+            told.add(message)
+            control.ask(Command.EMERGENCY_STOP)
+
+        run(server, control, stop)
+    assert any(message.startswith("no Z offset") for message in told)
+    assert job.commands[:1] in ([], ["M112"])
 
 
 @every_kind

@@ -96,7 +96,7 @@ def test_every_print_has_another_token(watched: Watched) -> None:
     [
         ("pause", Command.PAUSE),
         ("resume", Command.RESUME),
-        ("stop", Command.CANCEL),
+        ("cancel", Command.CANCEL),
         ("emergency", Command.EMERGENCY_STOP),
     ],
 )

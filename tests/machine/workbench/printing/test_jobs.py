@@ -11,6 +11,7 @@ import pytest
 from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
 from machine.link.print_state import PrintState, PrintStatus
+from machine.notices import Notice
 from machine.printing.destination import Destination, SerialPort, Simulated, parse_destination, parse_server_address
 from machine.printing.job import Does, PrintJob
 from machine.program import Alternative
@@ -170,3 +171,16 @@ def test_a_print_that_is_over_keeps_its_last_moment_in_the_state_in_which_it_end
         7,
         "over",
     )
+
+
+def test_progress_before_a_print_is_told_only_while_it_lasts() -> None:
+    told: list[tuple[str, ...]] = []
+    person = AtPage(SimpleNamespace(tell=lambda said: told.append(said)))
+    person.hear_notice(Notice("the printer answers\n"))
+    with person.progress() as report:
+        report("getting ready: 0 steps are done")
+    assert told == [
+        ("the printer answers",),
+        ("the printer answers", "getting ready: 0 steps are done"),
+        ("the printer answers",),
+    ]

@@ -33,7 +33,7 @@ export function printFrame(camera, picture) {
     if (source === frame.contentWindow && origin === location.origin) heard[data?.tiltprint]?.(data);
   });
   const show = () => {
-    const { state: { sliced }, looking, tab } = store, address = sliced ? `print/${sliced.key}` : "", there = frame.getAttribute("src") === address;
+    const { state: { sliced, gcode }, looking, tab } = store, shown = looking === "gcode" ? gcode : sliced, address = shown ? `print/${shown.key}` : "", there = frame.getAttribute("src") === address;
     toggle("looking", looking && tab !== "printing");
     pressed("look", looking);
     hide({ "print-page": !looking, "leave-print": !looking });
@@ -57,7 +57,7 @@ export function printFrame(camera, picture) {
 /** The page of the print follows in the picture's place, where what lies here is what is printed; what it gives is called with all news. */
 export function followIn(print) {
   let follows = false, shown = 0;
-  const same = () => print()?.key && print().key === store.state?.sliced?.key;
+  const isOf = (what) => Boolean(print()?.key) && print().key === store.state?.[what]?.key, same = () => isOf("sliced") || isOf("gcode");
   const tell = () => {
     const line = print()?.file_line;
     if (!follows || !same() || !line || line === shown) return;
@@ -65,13 +65,12 @@ export function followIn(print) {
     post("line", { line });
   };
   const set = (whether) => {
-    follows = whether;
+    [follows, shown] = [whether, 0];
     pressed("follow", whether);
   };
   listen("click", { follow: () => {
     set(!follows);
-    shown = 0;
-    update({ looking: follows });
+    update({ looking: follows && (isOf("gcode") ? "gcode" : true) });
   } });
   const { ready } = heard;
   heard.ready = () => {

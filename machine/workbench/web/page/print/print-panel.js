@@ -4,9 +4,9 @@
 import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, sayIn, tell } from "../../../../view/template/elements.js";
 import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
 import { putNew, withWholeOptions } from "../lists.js";
-import { onNew, onState, update } from "../store.js";
+import { onNew, onState, store, update } from "../store.js";
 import { followIn } from "./print-frame.js";
-import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
+import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
 
 /** What is chosen of a list whose last entry is another one, typed. */
 function chosenOr(name, typed) {
@@ -62,7 +62,35 @@ function showJournals(journals, before) {
 const offer = (name, now, rows) => $(`${name}s-found`).replaceChildren(...rows.map(([value, title, words]) => made("label", { className: "port" },
   made("input", { type: "radio", name, value, checked: value === now }), made("span", {}, made("b", { text: title }), made("small", { text: words })))));
 
-const STOP_KEY = "e";
+const STOP_KEY = "e", HOLD_MS = 600, TWICE_MS = 1000;
+
+/** Hears the key of the emergency stop in a window: held down, which the button shows, or pressed twice, for a single press may be a slip. */
+function stopKey(stop) {
+  let timer = 0, pressedAt = -Infinity;
+  const release = () => {
+    clearTimeout(timer);
+    delete $("emergency").dataset.held;
+  };
+  const finish = () => {
+    release();
+    stop();
+  };
+  const press = (event) => {
+    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || needsKey(event) || $("emergency").hidden) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (event.repeat) return;
+    const now = performance.now(), twice = now - pressedAt < TWICE_MS;
+    pressedAt = now;
+    if (twice) return finish();
+    $("emergency").dataset.held = true;
+    timer = setTimeout(finish, HOLD_MS);
+  };
+  return (window) => {
+    window.addEventListener("keydown", press, true);
+    for (const end of ["keyup", "blur"]) window.addEventListener(end, release);
+  };
+}
 
 export function printPanel() {
   let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
@@ -86,6 +114,7 @@ export function printPanel() {
     mine = new Set(state.prints.filter((job) => job.holder === OWN_PAGE).map((job) => job.number));
     showPorts(state, before);
     showJournals(state.journals, before.journals);
+    showHistory(state.history);
     showWhich(state.prints, chosen);
     showPrint(print(), commands());
     follow();
@@ -107,8 +136,9 @@ export function printPanel() {
     showBar(running(), print());
   }, 1000);
   const where = () => ({ port: port(), baud: numberIn("baud"), sim_speed: numberIn("sim-speed") });
-  const check = () => {
-    send({ do: "check", ...where(), send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
+  /** gcode: the key of an open G-code file, else the bench is printed. */
+  const check = (gcode = "") => {
+    send({ do: "check", ...where(), gcode, send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
     unforce();
   };
   /** To the print, checked at once where its printer is known and free, for a check moves and heats nothing. */
@@ -123,13 +153,14 @@ export function printPanel() {
     "journal-typed": () => { $("journal-other").checked = true; },
   });
   listen("click", {
-    check, "verdict-print": toPrint, "bar-print": toPrint, "ask-ports": () => send({ do: "ports", baud: where().baud }),
+    check: () => check(store.state.gcode?.key), "look-gcode": () => update({ looking: "gcode" }), "verdict-print": toPrint, "bar-print": toPrint, "ask-ports": () => send({ do: "ports", baud: where().baud }),
     hand: () => { send({ do: "hand", ...where() }); unforce(); },
     "follow-server": () => send({ do: "follow", port: port() }),
     "go-on-with": () => send({ do: "go_on", ...where(), journal: chosenOr("journal", "journal-typed"), machine: $("rest-machine").value.trim() }),
     cancel: () => { sure(true); $("go-on").focus(); }, "go-on": () => sure(false), begin: askToNotify,
   });
   onData("print", ({ print: name }) => { sure(false); toldTo({ do: name }); }, $("run"));
+  onData("babystep", ({ babystep }) => toldTo({ do: "babystep", by_mm: Number(babystep) }), $("run"));
   webcamPanel(print);
   handPanel((asked) => toldTo({ do: "by_hand", ...asked }));
   listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });
@@ -141,18 +172,19 @@ export function printPanel() {
     listen("blur", { [id]: letGo });
     listen("change", { [id]: () => { letGo(); toldTo({ do: id, percent: numberIn(id) }); } });
   }
-  const stop = () => stops.press(Number($("emergency").dataset.print));
+  const stop = () => stops.press(Number($("emergency").dataset.print)), hearKey = stopKey(stop);
   listen("click", { emergency: stop });
-  const byKey = (event) => {
-    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || needsKey(event) || $("emergency").hidden) return;
-    event.preventDefault();
-    event.stopPropagation();
-    stop();
-  };
-  addEventListener("keydown", byKey, true);
-  $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
-  onNew(({ sliced }) => sliced && [sliced.key, sliced.stale], () => { unforce(); problem(""); }); // what was found of others
-  onState(({ lacking: { slices: why } }) => {
+  hearKey(window);
+  $("print-page").addEventListener("load", () => hearKey($("print-page").contentWindow));
+  onNew(({ sliced, gcode }) => [sliced?.key, sliced?.stale, gcode?.key], () => { unforce(); problem(""); }); // what was found of others
+  onNew(({ gcode }) => gcode, (gcode) => {
+    hide({ "gcode-line": !gcode });
+    if (gcode) $("tab-printing").click();
+    if (gcode || store.looking === "gcode") update({ looking: gcode ? "gcode" : false });
+    tell({ "gcode-told": gcode ? `${gcode.name} is open, and printed in place of the bench. ${gcode.told}.` : "" });
+  });
+  onState(({ gcode, lacking: { slices } }) => {
+    const why = gcode ? "" : slices;
     disable({ check: Boolean(why) });
     sayIn("unsliced", why && `Nothing to print: ${why}.`);
     follow();
@@ -184,20 +216,17 @@ function stopsAsked(prints, send, isOpen) {
     if (stopped().length ? !stopped().some(going) : isOpen()) return;
     say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
   };
-  const ask = (number) => {
-    if (prints().some((job) => going(job) && job.number === number)) asked.add(number);
-    send({ do: "emergency", print: number });
-    if (!isOpen()) doubt();
-    clearTimeout(late);
-    late = setTimeout(doubt, ANSWER_MS);
-  };
   listen("click", { "stop-noted": () => { if (!stopped().some(going)) asked = new Set(); say(""); } });
   return {
-    /** number: of a print. */
-    press: (number) => {
-      const now = performance.now();
-      pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
-      ask(pressed.number);
+    /** named: the number of a print. */
+    press: (named) => {
+      const now = performance.now(), number = now - pressed.at < SAME_PRESS_MS ? pressed.number : named;
+      pressed = { number, at: now };
+      if (prints().some((job) => going(job) && job.number === number)) asked.add(number);
+      send({ do: "emergency", print: number });
+      if (!isOpen()) doubt();
+      clearTimeout(late);
+      late = setTimeout(doubt, ANSWER_MS);
     },
     /** One has waited too long for a line, or its print is not there any more. */
     expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },

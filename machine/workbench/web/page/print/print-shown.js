@@ -1,7 +1,7 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
 
-import { $, duration, hide, listen, onData, optionsOf, tell } from "../../../../view/template/elements.js";
-import { clock, listIn, putNew, tellIn } from "../lists.js";
+import { $, duration, hide, listen, onData, optionsOf, roughly, rowOf, tell } from "../../../../view/template/elements.js";
+import { clock, listIn, putNew, putTable, tellIn } from "../lists.js";
 import { keptInTab } from "../store.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
@@ -70,7 +70,7 @@ export function showPrint(print, commands) {
   listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on all the same` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   listIn("run-words", print.words.slice(-FEW));
-  listIn("run-said", runs || uploads || over ? print.said.filter((line) => !print.log || !line.includes(print.log)).slice(-FEW) : []);
+  listIn("run-said", runs || uploads || over ? print.said.filter((line) => line && (!print.log || !line.includes(print.log))).slice(-FEW) : []);
   tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
   if (live || uploads) showProgress(print);
   const kind = `${print.number} ${over ? "over" : runs ? "runs" : state}`;
@@ -110,11 +110,22 @@ export function showProgress(print) {
     [over ? "took" : "so far", duration(print.elapsed_s)],
     !over && print.left_s != null && ["done at", clock(Date.now() / 1000 + print.left_s)],
   ].filter(Boolean));
+  tell({ "offset-told": `${print.z_offset_mm > 0 ? "+" : ""}${print.z_offset_mm} mm` });
   for (const [id, percent] of [["feed", print.feed_percent], ["flow", print.flow_percent]]) {
     if ($(id).dataset.held) continue;
     $(id).value = percent;
     tell({ [`${id}-told`]: `${Math.round(percent)} %` });
   }
+}
+
+/** What is told of a print of before, in this order. */
+export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun }) => [
+  name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`,
+  new Date(1000 * begun).toLocaleString([], { dateStyle: "short", timeStyle: "short" })];
+
+export function showHistory(prints = []) {
+  hide({ "history-field": !prints.length });
+  putTable($("history"), prints, ["print", "outcome", "time", "filament", "begun"], () => prints.map((print) => rowOf(pastCells(print))));
 }
 
 /** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
@@ -178,23 +189,20 @@ const EVERY_MS = 2000;
  * the page loads nothing from elsewhere. */
 export function webcamPanel(print) {
   let shown = "", asking = false;
-  const forget = () => {
-    hide({ "webcam-line": true });
+  const show = (address) => {
+    hide({ "webcam-line": !address });
+    if (address) $("webcam").src = address;
     if (shown) URL.revokeObjectURL(shown);
-    shown = "";
+    shown = address;
   };
   setInterval(async () => {
     const job = print();
-    if (!job?.webcam || job.is_over) return forget();
+    if (!job?.webcam || job.is_over) return show("");
     if (asking || document.hidden || $("printing").hidden) return;
     asking = true;
     const answer = await fetch(`prints/${job.number}/webcam`).catch(() => null), picture = answer?.ok ? await answer.blob().catch(() => null) : null;
     asking = false;
-    if (!picture || print()?.number !== job.number) return forget();
-    const before = shown;
-    $("webcam").src = shown = URL.createObjectURL(picture);
-    if (before) URL.revokeObjectURL(before);
-    hide({ "webcam-line": false });
+    show(picture && print()?.number === job.number ? URL.createObjectURL(picture) : "");
   }, EVERY_MS);
 }
 

@@ -1,0 +1,63 @@
+"""Babystepping: Z is shifted in the midst of a print, along the tool whatever the table's pose, and taken back at the end."""
+
+import numpy as np
+import pytest
+
+from machine.firmware import dialect_of
+from machine.link.pending_commands import Command
+from profiles.profile import Profile, load
+from tests.machine.link.test_pause import PROGRAM, Watcher, strokes, watched
+
+STROKES = ["G28", "G92 A0 C0", "G21", "G90", "M83", "M104 S200", "M109 S200", "G1 A30 C90 F3000", "G1 X60 Y60 Z40 F6000"]
+STROKES += [f"G1 X{60 + k % 20} Y{60 + k // 20} E0.05 F1500" for k in range(300)]
+FIRMWARES = [
+    ("generic_ac", "M290 Z-0.050", "M290 Z0.050"),
+    ("gen5x", "M290 R1 Z-0.050", "M290 R1 Z0.050"),
+    ("fractal5pro", "SET_GCODE_OFFSET Z_ADJUST=-0.050 MOVE=1", "SET_GCODE_OFFSET Z_ADJUST=0.050 MOVE=1"),
+]
+
+
+def heights(watcher: Watcher) -> set[float]:
+    """Where the axis Z really was in strokes."""
+    record = watcher.printer.record
+    pushed = record.end[:, 5] - record.start[:, 5] > 1e-9
+    return set(np.round(record.end[pushed, 2], 6).tolist())
+
+
+def letters(profile: Profile) -> list[str]:
+    """The strokes with the machine's own letters for its table."""
+    tilt, turn = profile.machine.tilt.letter, profile.machine.turn.letter
+    return [line.replace(" A", f" {tilt}").replace(" C", f" {turn}") for line in STROKES]
+
+
+@pytest.mark.parametrize(("machine", "sent", "undone"), FIRMWARES)
+def test_a_z_offset_shifts_machine_z_with_the_table_turned_and_is_taken_back(machine: str, sent: str, undone: str) -> None:
+    profile = load(machine=machine)
+    watcher = watched({100: (Command.BABYSTEP, -0.05)}, profile=profile)
+    assert not watcher.run(letters(profile)).cancelled
+    lines = watcher.lines()
+    assert lines.index(sent) < lines.index(undone)
+    assert heights(watcher) == {40.0, 39.95}
+    assert watcher.shown[-1].z_offset_mm == -0.05
+
+
+def test_a_pause_after_a_z_offset_finds_its_place_again() -> None:
+    watcher = watched({60: (Command.BABYSTEP, 0.05), 150: Command.PAUSE, "paused": Command.RESUME})
+    assert not watcher.run(PROGRAM).cancelled
+    assert len(strokes(watcher.printer)) > 0
+
+
+def test_a_z_offset_beyond_2_mm_in_all_is_refused() -> None:
+    watcher = watched({60: (Command.BABYSTEP, 1.99), 80: (Command.BABYSTEP, 0.02)})
+    watcher.run(PROGRAM)
+    assert "a Z offset of 2.01 mm is not possible: -2 to 2 mm are allowed" in {status.message for status in watcher.shown}
+    assert watcher.shown[-1].z_offset_mm == 1.99
+
+
+@pytest.mark.parametrize("machine", ["linuxcnc_xyzac"])
+def test_a_firmware_without_babystepping_refuses_it(machine: str) -> None:
+    profile = load(machine=machine)
+    assert dialect_of(profile.machine).babystep == ""
+    watcher = watched({100: (Command.BABYSTEP, 0.05)}, profile=profile)
+    watcher.run(PROGRAM)
+    assert any(status.message.startswith("no Z offset: this firmware cannot") for status in watcher.shown)
