@@ -6,7 +6,7 @@ import { HALF_HEIGHT, placeOn } from "../picture/camera.js";
 import { density, frameOf, outgrown, outlive, programOf, sizeOf } from "../picture/gl.js";
 import { carried, clamp, IDENTITY, moved, multiply, scaled, sub, undone } from "../picture/math.js";
 import { arrowsOf, based, bodiesOf, cutsOf, FROM_BELOW, ON_PLATE, ownInk, planesOf, surfaceColours } from "../picture/shapes.js";
-import { bodyOf, LINE_FRAGMENT, LINE_VERTEX, linesOf, rgb, SOLID_FRAGMENT, SOLID_VERTEX, solidOf } from "../picture/solids.js";
+import { bodyOf, linesOf, rgb, SOLID_FRAGMENT, SOLID_VERTEX, solidOf } from "../picture/solids.js";
 import { BEAD_FAR, BEAD_NEAR, beadsOf, PAINT_FAR, PAINT_NEAR, shapesOf } from "./beads.js";
 import { coarseColours, coarseOf, dividedRanges } from "./coarse.js";
 import { coloured } from "./colours.js";
@@ -128,7 +128,7 @@ function paintPath({ signs }, ranges, on, seen, lift, size) {
 
 /** seenAt: the work shifted by a vector, as the eye sees it. */
 function paintModel(stage, print, scene, seenAt, lift) {
-  const { parts = [], apart } = print.surfaces || {}, look = scene.model === "solid" ? {} : { ghost: 0.16, behind: lift };
+  const { parts = [], apart } = print.surfaces || {}, look = scene.model === "solid" ? {} : { ghost: 0.16, lift: -lift };
   const seen = (part) => seenAt(apart && scene.apart ? scaled(apart.get(part), scene.apart * print.span) : [0, 0, 0]);
   for (const { part, range } of scene.model === "hide" ? [] : parts) {
     const another = scene.part !== null && scene.part !== part.index;
@@ -169,7 +169,7 @@ const COARSE_SHARE = 0.6; // of the canvas' width and height, drawn while all mo
 /** Has the card compile all programs while the page reads the print. */
 export function compileAll(gl) {
   const pairs = [
-    [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
+    [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
   ];
   pairs.forEach((pair) => programOf(gl, ...pair));
 }

@@ -85,10 +85,16 @@ export function placeOn(canvas, { clientX, clientY }) {
   return [((clientX - left) / width * 2 - 1) * (width / height), 1 - ((clientY - top) / height) * 2];
 }
 
-/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. */
-export function handle(canvas, camera, { changed, pressed }) {
+/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. take(event): what the first
+ * finger takes hold of instead, {move(event), put(), drop()}, null: nothing; a second finger drops it. */
+export function handle(canvas, camera, { changed, pressed, take = () => null }) {
   const fingers = new Map();
-  let path = 0;
+  let path = 0, held = null;
+  const release = (taken) => {
+    if (taken) held?.put();
+    else held?.drop();
+    held = null;
+  };
   const mean = (k) => [...fingers.values()].reduce((sum, place) => sum + place[k] / fingers.size, 0);
   const middle = () => [mean(0), mean(1)];
   const spread = () => {
@@ -96,13 +102,15 @@ export function handle(canvas, camera, { changed, pressed }) {
     return b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : 0;
   };
   canvas.addEventListener("pointerdown", (event) => {
-    if (fingers.size === 0) path = 0;
+    release(false);
+    if (fingers.size === 0) [path, held] = [0, take(event)];
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     canvas.setPointerCapture(event.pointerId);
     canvas.focus({ preventScroll: true, focusVisible: false });
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!fingers.has(event.pointerId)) return;
+    if (held) return held.move(event);
     const [from, wide] = [middle(), spread()];
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     const to = middle(), dx = to[0] - from[0], dy = to[1] - from[1];
@@ -114,7 +122,8 @@ export function handle(canvas, camera, { changed, pressed }) {
     changed();
   });
   const lift = (event) => {
-    if (event.type === "pointerup" && fingers.size === 1 && path < 4 && event.button === 0) pressed(event);
+    if (!held && event.type === "pointerup" && fingers.size === 1 && path < 4 && event.button === 0) pressed(event);
+    release(event.type === "pointerup");
     fingers.delete(event.pointerId);
   };
   canvas.addEventListener("pointerup", lift);
