@@ -73,22 +73,40 @@ function plateCorners({ radius_mm: radius, size_mm: size, thickness_mm: thick })
   return revolved([[0, -thick], [radius, -thick], [radius, 0], [0, 0]], 96);
 }
 
-/** Rings and spokes, by which a turn of the plate is seen; a longer stroke marks the workpiece's +x. */
+const GLYPHS = { // strokes of a letter: places on a grid of 2 by 4, two digits each
+  0: "0020240400", 1: "031410", 2: "042422020020", 3: "04242000 0222", 4: "040222 2420", 5: "240402222000", 6: "240400202202", 7: "042410", 8: "0020240400 0222",
+  9: "002024040222", "-": "0222", F: "000424 0212", R: "000424220220", O: "0020240400", N: "00042024", T: "0424 1410", X: "0024 0420", Y: "041224 1210", m: "00021210 122220",
+};
+const ADVANCE = 0.75; // from one letter to the next, of their height
+
+/** The strokes of a word that lies at a height, its middle at x, y. */
+const written = (word, [x, y], high, z) => [...word].flatMap((letter, k) => (GLYPHS[letter]?.split(" ") || []).flatMap((stroke) => {
+  const points = stroke.match(/../g).map(([u, v]) => [x + (ADVANCE * (k - word.length / 2) + (Number(u) + 0.5) / 4) * high, y + (v / 4 - 0.5) * high, z]);
+  return points.slice(1).flatMap((point, n) => [points[n], point]);
+}));
+
+const multiples = (step, low, high) => Array.from({ length: Math.floor(high / step) - Math.ceil(low / step) + 1 }, (_, k) => (Math.ceil(low / step) + k) * step);
+
+/** Rings, or a grid, with millimetres along two rulers: from the origin to the front and the right, or at the front and the left edge; the longer strokes are the workpiece's x and y. */
 function plateLines({ radius_mm: radius, size_mm: size }, line, edge) {
-  const step = radius > 120 ? 50 : radius > 40 ? 20 : 10, z = 0.05, pieces = [];
-  if (size) {
-    const [a, b] = [size[0] / 2, size[1] / 2], rows = [];
-    for (let x = -Math.floor(a / step) * step; x <= a; x += step) rows.push([x, -b, z], [x, b, z]);
-    for (let y = -Math.floor(b / step) * step; y <= b; y += step) rows.push([-a, y, z], [a, y, z]);
-    const rim = chained([[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]]);
-    pieces.push({ corners: rows, colour: line }, { corners: [...rim, [0, 0, z], [a, 0, z]], colour: edge });
-    return pieces;
-  }
-  for (let r = step; r < radius; r += step) pieces.push({ corners: chained(circle(r, z, 96)), colour: line });
-  const spokes = circle(radius, z, 12).flatMap((place) => [scaled(place, step / radius), place]);
-  pieces.push({ corners: spokes, colour: line }, { corners: chained(circle(radius, z, 96)), colour: edge });
-  pieces.push({ corners: [[0, 0, z], [radius, 0, z]], colour: edge });
-  return pieces;
+  const step = radius > 120 ? 50 : radius > 40 ? 20 : 10, z = 0.05, high = step / 7, [a, b] = size ? size.map((x) => x / 2) : [radius, radius];
+  const rims = (r) => chained(circle(r, z, ROUND)), grid = (reach, put) => multiples(step, -reach, reach).flatMap(put);
+  const faint = size ? [...grid(a, (x) => [[x, -b, z], [x, b, z]]), ...grid(b, (y) => [[-a, y, z], [a, y, z]])]
+    : [...multiples(step, step, radius).flatMap(rims), ...circle(radius, z, 12).flatMap((place) => [scaled(place, step / radius), place])];
+  const rulers = size ? [[a, -a, (t) => [t, -b], [0, 1]], [b, -b, (t) => [-a, t], [1, 0]]] : [[b, 0, (t) => [0, -t], [1, 0]], [a, 0, (t) => [t, 0], [0, 1]]];
+  const marks = rulers.flatMap(([most, least, at, [u, v]]) => {
+    const ticks = multiples(step / 5, least, most).map((t) => [at(t), 0.3 * high]), labels = multiples(step, least + step / 2, most);
+    return [
+      ...ticks.flatMap(([[x, y], long]) => [[x, y, z], [x + u * long, y + v * long, z]]),
+      ...labels.flatMap((t, k) => {
+        const [x, y] = at(t), word = `${t}${k === labels.length - 1 ? " mm" : ""}`, half = (ADVANCE / 2) * word.length * high;
+        return written(word, u ? [x + half + 0.5 * high, y + 0.75 * high] : [x - half - 0.3 * high, y + high], high, z);
+      }),
+    ];
+  });
+  const rim = size ? chained([[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]]) : rims(radius), front = written("FRONT", [0, -b - 2 * high], 2 * high, z);
+  const axes = [[0, 0, z], [a, 0, z], [0, 0, z], [0, b, z], ...chained(circle(high / 2, z, 24)), ...written("X", [a + high, 0], 1.5 * high, z), ...written("Y", [0, b + high], 1.5 * high, z)];
+  return [{ corners: faint, colour: line }, { corners: [...rim, ...axes, ...marks, ...front], colour: edge }];
 }
 
 export function headOf({ silhouette_mm: silhouette, boxes }, colour, edge) {
