@@ -123,6 +123,22 @@ def test_strokes_of_a_brush_join_one_zone_and_an_eraser_takes_faces_from_all(ben
         page.until(lambda state: kinds(state) == [("no_support", 1), ("no_support", None), ("support", 6)])
 
 
+def test_brushed_faces_are_in_a_project_and_on_the_turned_model_the_same(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "glass.stl")
+        page.do("brush", kind="no_seam", faces="3-9 40 100-130")
+        page.do("turn", axis="x", deg=90)
+        state = page.until(lambda state: state["undo"] == "turn the model" and state["marks"])
+        marks = bench.ask(f"marks/{state['marks']}")[1]
+        assert [face for face, byte in enumerate(marks) if byte] == [*range(3, 10), 40, *range(100, 131)]
+        status, project = bench.ask("project.3mf")
+        assert status == 200
+        Path("kept.3mf").write_bytes(project)
+        opened(page, bench, "kept.3mf")
+        again = page.until(lambda state: state["zones"] and state["marks"])
+        assert bench.ask(f"marks/{again['marks']}")[1] == marks
+
+
 def test_a_mark_ends_the_search_that_knew_nothing_of_it(bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")

@@ -1,6 +1,6 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
-import { nextFrame } from "../../../../view/template/elements.js";
+import { alike, nextFrame } from "../../../../view/template/elements.js";
 import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
 import { add, bounds, carried, cornersOf, dot, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
@@ -95,7 +95,7 @@ export function pictureOf(canvas, camera) {
     if (gl.isContextLost()) return;
     renew();
     const size = sizeOf(canvas), plate = camera.seen(size), seenAs = (matrix) => plate(multiply(moved(scene.place), matrix)), below = camera.eye()[2] < 0;
-    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0, open = clipOf(flat.toEye, scene.section), capped = { ...open, capped: !ghost };
+    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0, open = clipOf(flat.toEye, scene.section), capped = { ...open, capped: Boolean(scene.section) && !ghost };
     if (outgrown(canvas)) [canvas.width, canvas.height] = size;
     frame.begin(...size);
     if (!below) card.table.draw(ground, { lift: ON_PLATE });
@@ -201,8 +201,8 @@ export function pictureOf(canvas, camera) {
     },
     /** The plane above which all is cut away, in the frame of the platform, or none. */
     section: (plane) => {
+      if (!alike(plane, scene.section)) ask();
       scene.section = plane;
-      ask();
     },
     cutAway: (place) => Boolean(scene.section) && dot(scene.section.normal, place) > scene.section.offset_mm + ON_SECTION_MM,
     /** A place of that frame into the middle of the picture. */
