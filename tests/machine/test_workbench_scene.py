@@ -70,7 +70,7 @@ def test_strokes_of_the_brush_paint_and_erase_and_each_is_one_step(browser: Brow
 
 
 def test_beside_the_model_a_brush_turns_the_view_and_a_second_finger_drops_its_stroke(browser: Browser, bench: Running) -> None:
-    opened(browser, bench, "ball.stl", stl(ball(20.0)))
+    opened(browser, bench, "touched.stl", stl(ball(20.0)))
     browser.click("#tab-parts")
     browser.click("#mark-brush")
     yaw, (x, y) = browser.value("view.camera.yaw"), seen(browser, 0, -20, 20)
@@ -92,7 +92,7 @@ def test_beside_the_model_a_brush_turns_the_view_and_a_second_finger_drops_its_s
 
 
 def test_a_section_shows_flat_backs_and_what_it_takes_away_cannot_be_clicked(browser: Browser, bench: Running) -> None:
-    opened(browser, bench, "block.stl", stl(box(20.0, 20.0, 20.0)))
+    opened(browser, bench, "inside.stl", stl(box(20.0, 20.0, 20.0)))
     whole = pixels(browser)
     assert not (abs(whole.astype(int) - CUT_COLOUR) < 30).all(axis=2).any()  # no backs shine through at edges
     browser.key("x")
@@ -111,7 +111,7 @@ def test_a_section_shows_flat_backs_and_what_it_takes_away_cannot_be_clicked(bro
 
 
 def test_two_points_are_measured_corners_attract_and_faces_have_an_angle(browser: Browser, bench: Running) -> None:
-    opened(browser, bench, "block.stl", stl(box(20.0, 30.0, 40.0)))
+    opened(browser, bench, "measured.stl", stl(box(20.0, 30.0, 40.0)))
     browser.click("[data-view=corner]")
     browser.click("#fit")
     pixels(browser)
@@ -130,7 +130,7 @@ def test_two_points_are_measured_corners_attract_and_faces_have_an_angle(browser
 
 
 def test_fit_keeps_the_direction_and_a_double_click_centres_on_the_point(browser: Browser, bench: Running) -> None:
-    opened(browser, bench, "block.stl", stl(box(20.0, 30.0, 40.0)))
+    opened(browser, bench, "centred.stl", stl(box(20.0, 30.0, 40.0)))
     browser.value("{ view.camera.yaw = 0.3; view.camera.pitch = 0.2; }")
     browser.click("#fit")
     pixels(browser)
@@ -144,7 +144,7 @@ def test_fit_keeps_the_direction_and_a_double_click_centres_on_the_point(browser
 
 @pytest.mark.parametrize(("axis", "view"), [("z", "corner"), ("z", "top"), ("x", "side"), ("y", "front")])
 def test_a_ring_turns_the_model_the_way_of_the_hand(browser: Browser, bench: Running, axis: str, view: str) -> None:
-    opened(browser, bench, "block.stl", stl(box(20.0, 30.0, 40.0)))
+    opened(browser, bench, f"{axis}-{view}.stl", stl(box(20.0, 30.0, 40.0)))
     browser.click("#tab-model")
     browser.click(f"[data-view={view}]")
     browser.click("#fit")

@@ -3,6 +3,7 @@
 import { add, bounds, clamp, cross, dot, length, moved, multiply, perspective, RAD, scaled, sub } from "./math.js";
 
 const FARTHEST_MM = 1000; // behind the work: room for the machine
+const STILL_PIXELS = 4; // a hand that moves less only clicks
 const MARGIN = 1.12;
 export const HALF_HEIGHT = Math.tan(15 * RAD); // of the picture at distance 1
 
@@ -85,9 +86,9 @@ export function placeOn(canvas, { clientX, clientY }) {
   return [((clientX - left) / width * 2 - 1) * (width / height), 1 - ((clientY - top) / height) * 2];
 }
 
-/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. take(event): what the first
+/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom; pressed(event), asked(event): a click, with the other button. take(event): what the first
  * finger takes hold of instead, {move(event), put(), drop()}, null: nothing; a second finger drops it. */
-export function handle(canvas, camera, { changed, pressed, take = () => null }) {
+export function handle(canvas, camera, { changed, pressed, asked = () => {}, take = () => null }) {
   const fingers = new Map();
   let path = 0, held = null;
   const release = (taken) => {
@@ -122,7 +123,7 @@ export function handle(canvas, camera, { changed, pressed, take = () => null }) 
     changed();
   });
   const lift = (event) => {
-    if (!held && event.type === "pointerup" && fingers.size === 1 && path < 4 && event.button === 0) pressed(event);
+    if (!held && event.type === "pointerup" && fingers.size === 1 && path < STILL_PIXELS) ({ 0: pressed, 2: asked })[event.button]?.(event);
     release(event.type === "pointerup");
     fingers.delete(event.pointerId);
   };

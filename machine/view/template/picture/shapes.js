@@ -189,10 +189,10 @@ export function beside(direction) {
   return [a, cross(direction, a)];
 }
 
-/** The disc of a cut, 72 corners about its middle. */
-function discOf({ normal, centre_mm: centre, radius_mm: radius }) {
-  const [a, b] = beside(normal);
-  return circle(radius * 1.12, 0, 72).map(([u, v]) => add(centre, add(scaled(a, u), scaled(b, v))));
+/** Places around a centre, across a direction, counter-clockwise seen against it; `from`: the angle of the first one. */
+export function ringOf(centre, direction, radius, steps, from = 0) {
+  const [a, b] = beside(direction);
+  return Array.from({ length: steps }, (_, k) => from + (2 * Math.PI * k) / steps).map((angle) => add(centre, add(scaled(a, radius * Math.cos(angle)), scaled(b, radius * Math.sin(angle)))));
 }
 
 export const based = (parts) => parts.filter((part) => part.base && part.direction && part.base.radius_mm > 0);
@@ -201,7 +201,7 @@ export const based = (parts) => parts.filter((part) => part.base && part.directi
 export function planesOf(parts, colourOf) {
   const discs = [], rims = [];
   for (const part of based(parts)) {
-    const disc = discOf(part.base), colour = [...colourOf(part), 255];
+    const disc = ringOf(part.base.centre_mm, part.base.normal, 1.12 * part.base.radius_mm, 72), colour = [...colourOf(part), 255];
     discs.push({ corners: disc.flatMap((place, k) => [part.base.centre_mm, place, disc[(k + 1) % disc.length]]), colour });
     rims.push({ corners: chained(disc), colour });
   }

@@ -96,8 +96,7 @@ function hullOf(facets) {
 
 /** The facet of the hull under an event; -1: none. */
 function facetMet({ hull }, picture, event) {
-  const face = faceMet(hull, ...picture.ray(event));
-  return face < 0 ? -1 : hull.owners[face];
+  return hull.owners[faceMet(hull, ...picture.ray(event)).face] ?? -1;
 }
 
 /** Lays the facet under an event down. */

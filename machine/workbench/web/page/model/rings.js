@@ -2,6 +2,7 @@
 
 import { $, listen, pressed } from "../../../../view/template/elements.js";
 import { add, length, RAD, scaled, sub } from "../../../../view/template/picture/math.js";
+import { ringOf } from "../../../../view/template/picture/shapes.js";
 import { send } from "../line.js";
 import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
@@ -77,15 +78,12 @@ export function ringsOf(picture) {
   return () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
 }
 
-/** Two unit vectors across an axis, so that turning the first by 90 degrees gives the second. */
-const acrossRing = (axis) => [[axis[2], axis[0], axis[1]], [axis[1], axis[2], axis[0]]];
+const onRing = (axis, { centre, radius }, angle) => ringOf(centre, axis, radius, 1, angle)[0];
 
-const onRing = (axis, { centre, radius }, angle) => {
-  const [a, b] = acrossRing(axis);
-  return add(centre, add(scaled(a, radius * Math.cos(angle)), scaled(b, radius * Math.sin(angle))));
+const ringPoints = (axis, { centre, radius }) => {
+  const points = ringOf(centre, axis, radius, RING_STEPS);
+  return [...points, points[0]];
 };
-
-const ringPoints = (axis, ring) => Array.from({ length: RING_STEPS + 1 }, (_, k) => onRing(axis, ring, (2 * Math.PI * k) / RING_STEPS));
 
 /** What a hand that takes a ring holds: the angle at which it has taken it (from), and how many degrees an event has turned it since: the ring's place
  * that is seen nearest to the hand follows it, of those within a quarter turn of the last one, so that it does not jump to the other side. */

@@ -2,12 +2,12 @@
 
 import { $, listen, numberIn } from "../../../../view/template/elements.js";
 import { blockOf } from "../../../../view/template/moves/block.js";
-import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
+import { add, bounds, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
 import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/shapes.js";
 import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest } from "../line.js";
 import { mm2, newtons } from "../lists.js";
-import { cornersAt, faceMet } from "../scene/face-tree.js";
+import { faceMet } from "../scene/face-tree.js";
 import { store, subscribe, update } from "../store.js";
 
 const CUT_MM = 2e-3; // within which a corner lies in the plane of a cut: places come in thousandths of a mm
@@ -75,14 +75,8 @@ export function piecesOn(gl, pieces, chosen) {
 
 /** The number of the part that a ray of the platform's frame meets first; 0: none. */
 export function pieceMet({ parts }, shifts, [from, along]) {
-  let best = 0, least = Infinity;
-  parts.forEach(({ part, shape }, k) => {
-    const start = sub(from, shifts[k]), face = faceMet(shape, start, along);
-    if (face < 0) return;
-    const [a, b, c] = cornersAt(shape.corners, face), normal = cross(sub(b, a), sub(c, a)), far = dot(normal, sub(a, start)) / dot(normal, along);
-    if (far < least) [best, least] = [part.index, far];
-  });
-  return best;
+  const met = parts.map(({ part, shape }, k) => ({ part: part.index, far: faceMet(shape, sub(from, shifts[k]), along).far }));
+  return met.reduce((best, piece) => (piece.far < best.far ? piece : best), { part: 0, far: Infinity }).part;
 }
 
 /** By which share of the model's size the parts are drawn apart now. */

@@ -1,8 +1,8 @@
 // Brush: faces of the model painted with a kind of mark, or erased, by strokes of a hand; every stroke is one step that can be undone.
 
 import { $, numberIn } from "../../../../view/template/elements.js";
-import { add, mix, scaled, turned } from "../../../../view/template/picture/math.js";
-import { beside, chained, circle, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { mix, turned } from "../../../../view/template/picture/math.js";
+import { chained, ringOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { ask } from "../line.js";
 import { bitNow, inkNow, kindNow } from "../parts/marks-panel.js";
 import { store, subscribe, update } from "../store.js";
@@ -22,11 +22,10 @@ function rangesOf(numbers) {
 export function brushOf(picture) {
   let stroke = null; // {kind, bit, erases, marks: before it, faces: those that it changes, last: the newest event}
   const radius = () => numberIn("brush-radius"), erasing = (event) => event.shiftKey || event.button === 2 || $("mark-erase").ariaPressed === "true";
-  const circleAt = (spot, colour) => picture.extra("brush", spot ? JSON.stringify([spot.place, radius(), colour]) : "", () => {
-    const [a, b] = spot ? beside(turned(picture.matrix(), spot.normal)) : [];
-    const rim = spot ? circle(radius(), 0, 48).map(([x, y]) => add(spot.place, add(scaled(a, x), scaled(b, y)))) : [];
-    return spot ? [{ lines: trianglesOf([{ corners: chained(rim), colour: [...colour, 255] }]), over: true }] : [];
-  });
+  const rimOf = ({ place, normal }) => chained(ringOf(place, turned(picture.matrix(), normal), radius(), 48));
+  const circleAt = (spot, colour) => picture.extra("brush", spot ? JSON.stringify([spot.place, radius(), colour]) : "", () => (
+    spot ? [{ lines: trianglesOf([{ corners: rimOf(spot), colour: [...colour, 255] }]), over: true }] : []
+  ));
   const hover = (event) => circleAt(event && store.clicks === "brush" && met(event, picture), event && erasing(event) ? ERASER : inkNow());
   const move = (event) => {
     const { last, marks, bit, erases, faces } = stroke, steps = Math.ceil(Math.hypot(event.clientX - last.clientX, event.clientY - last.clientY) / STEP_PIXELS);

@@ -11,7 +11,6 @@ import { brushOf } from "./brush.js";
 import { measureOf } from "./measure.js";
 import { met } from "./triangles.js";
 
-const STILL_PIXELS = 4; // a hand that moves less only clicks
 const NEEDS_PICTURE = ["brush", "faces", "box", "measure"];
 /** Of what a click can be for: the button that asks for it, and what is said then. */
 const WANTED = {
@@ -26,7 +25,6 @@ const WANTED = {
 export function clicksOf(picture) {
   for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }) });
   NEEDS_PICTURE.forEach((clicks) => disable({ [WANTED[clicks][0]]: !picture }));
-  if (picture) menuOf($("canvas"), picture);
   listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").ariaPressed !== "true") });
   listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
@@ -73,7 +71,11 @@ export function handsOf(camera, picture) {
   onKeys({ b: tool("mark-brush", "tab-parts"), m: tool("measure"), x: tool("section"), "[": widen(1 / 1.2), "]": widen(1.2) },
     () => $("keys").open || !store.triangles || document.activeElement?.closest("[data-typing]"));
   globalThis.view = { camera, picture }; // for whoever tries the page from a console
-  return { changed: picture.ask, pressed, take: brush.take };
+  const asked = (event) => {
+    const part = store.clicks ? 0 : partMet(event, picture);
+    if (part) openMenu(part, event.clientX, event.clientY);
+  };
+  return { changed: picture.ask, pressed, asked, take: brush.take };
 }
 
 /** A click on the model: the facet is laid down, or the plane takes its place, or a mark is put there when that was asked for; else a part is
@@ -89,12 +91,3 @@ function press(event, picture) {
   else markAt(spot.place);
 }
 
-/** The right button, where it does not move the view: the menu of the part that is there. */
-function menuOf(canvas, picture) {
-  let at = null; // where it was pressed
-  canvas.addEventListener("pointerdown", (event) => { at = event.button === 2 ? [event.clientX, event.clientY] : null; });
-  canvas.addEventListener("pointerup", (event) => {
-    const still = event.button === 2 && at && Math.hypot(event.clientX - at[0], event.clientY - at[1]) < STILL_PIXELS, part = still && !store.clicks ? partMet(event, picture) : 0;
-    if (part) openMenu(part, event.clientX, event.clientY);
-  });
-}

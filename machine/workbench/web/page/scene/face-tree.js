@@ -52,18 +52,18 @@ function farTo([a, b, c], from, along) {
   return Math.abs(turn) >= 1e-12 && u >= -EDGE_SLACK && v >= -EDGE_SLACK && u + v <= 1 + EDGE_SLACK && far > 0 ? far : Infinity;
 }
 
-/** The first face of {corners, count} that a ray meets, from a place along a direction in the frame of the triangles; -1: none. */
+/** {face: the first of {corners, count} that a ray meets, -1: none, far: how many times `along` from its beginning}, in the frame of the triangles. */
 export function faceMet(shape, from, along) {
-  let best = -1, least = Infinity;
+  const met = { face: -1, far: Infinity };
   const pierced = (low, high) => {
     const ends = AXES.map((axis) => [low, high].map((end) => (end[axis] - from[axis]) / (along[axis] || 1e-300)));
-    return Math.max(0, ...ends.map((pair) => Math.min(...pair))) <= Math.min(least, ...ends.map((pair) => Math.max(...pair))) + EDGE_SLACK;
+    return Math.max(0, ...ends.map((pair) => Math.min(...pair))) <= Math.min(met.far, ...ends.map((pair) => Math.max(...pair))) + EDGE_SLACK;
   };
   visit(treeOf(shape), pierced, (face) => {
     const far = farTo(cornersAt(shape.corners, face), from, along);
-    if (far < least) [best, least] = [face, far];
+    if (far < met.far) Object.assign(met, { face, far });
   });
-  return best;
+  return met;
 }
 
 /** A set of faces: one, and those connected with it whose middles lie within so many mm of a place. */

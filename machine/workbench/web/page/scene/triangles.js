@@ -52,10 +52,9 @@ export const normalAt = ({ normals }, face) => [0, 1, 2].map((k) => normals[3 * 
 
 /** Where an event meets the model, {face, normal, at} in its own frame, `place` in that of the platform; null: nowhere, or on its inside, in a section. */
 export function met(event, picture) {
-  const { triangles } = store, [from, along] = picture.ray(event), face = triangles ? faceMet(triangles, from, along) : -1;
-  if (face < 0 || apartNow()) return null;
-  const normal = normalAt(triangles, face), [corner] = cornersAt(triangles.corners, face);
-  const at = add(from, scaled(along, dot(normal, sub(corner, from)) / dot(normal, along))), place = picture.carried(at);
+  const { triangles } = store, [from, along] = picture.ray(event), { face, far } = triangles && !apartNow() ? faceMet(triangles, from, along) : { face: -1 };
+  if (face < 0) return null;
+  const normal = normalAt(triangles, face), at = add(from, scaled(along, far)), place = picture.carried(at);
   return picture.cutAway(place) || (picture.cutAway(picture.eye()) && dot(normal, along) > 0) ? null : { face, normal, at, place };
 }
 
