@@ -45,7 +45,8 @@ def test_the_face_under_a_ray_is_the_nearest_of_all_that_it_meets() -> None:
     mesh, rng = ball(10.0), np.random.default_rng(3)
     aims = rng.uniform((-12.0, -12.0, -2.0), (12.0, 12.0, 22.0), (200, 3))
     rays = [[[60.0, -40.0, 30.0], (aim - (60.0, -40.0, 30.0)).tolist()] for aim in aims]
-    act = """const { faceMet } = modules["scene/face-tree"]; return rays.map(([from, along]) => faceMet(model, from, along).face);"""
+    act = """const { faceMet } = modules["scene/face-tree"];
+    return rays.map(([from, along]) => faceMet(model, from, along).face);"""
     met = run(OWN / "scene" / "face-tree.js", act, model=triangles(mesh), rays=rays)
     expected = [nearest(mesh, *map(np.array, ray)) for ray in rays]
     assert met == expected

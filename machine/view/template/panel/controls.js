@@ -23,12 +23,22 @@ export function controlsOf(print, scene, bells) {
     frame: () => { scene.riding = $("frame").value === "workpiece"; bells.ring("frame"); },
     stand: () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)),
   });
+  const cut = () => { scene.section = sectionIn(print.box); bells.ring("look"); };
+  listen("change", { "section-along": cut, "section-flip": cut });
+  listen("input", { "section-at": cut });
   listen("input", { apart: () => { scene.apart = numberIn("apart"); bells.ring("look"); } });
   toggle(print.rows.count ? "has-paths" : "no-paths", true);
   toggle("no-solids", !print.surfaces && !posed.length);
   toggle("one-part", parts.length < 2);
   typeBoxes(print, scene, bells);
   tabsOf((panel) => toggle("reporting", panel === "report"));
+}
+
+/** The plane above which nothing is drawn, in the frame of the work, as the controls have it; null: none. */
+function sectionIn([least, most]) {
+  const axis = "xyz".indexOf($("section-along").value), side = $("section-flip").checked ? -1 : 1;
+  $("section-at").disabled = axis < 0;
+  return axis < 0 ? null : { normal: [0, 1, 2].map((k) => (k === axis ? side : 0)), offset_mm: side * mix(least[axis], most[axis], numberIn("section-at")) };
 }
 
 /** A box for every kind of line in the print, with its share of the time. */

@@ -1,6 +1,7 @@
 // Solids: triangles with flat faces, drawn whole or as a ghost whose edges show and whose faces let the light through; lines; and the shapes of both.
 
 import { cornersOn, LIGHT, programOf } from "./gl.js";
+import { dot, turned } from "./math.js";
 
 export const rgb = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
 export const hex = (colour) => "#" + colour.map((x) => Math.round(x).toString(16).padStart(2, "0")).join("");
@@ -65,6 +66,12 @@ void main() {
 }`;
 
 const UNCUT = [0, 0, 0, 1];
+
+/** How a plane {normal, offset_mm} cuts what is drawn, as solids and beads take it: in the eye's frame. */
+export function clipOf(toEye, plane) {
+  const normal = plane && turned(toEye, plane.normal);
+  return { clip: plane ? [...normal, plane.offset_mm + dot(normal, toEye.slice(12, 15))] : UNCUT };
+}
 
 /** Drawing for triangles {places, colours}, three corners each; a range of corners may be drawn alone; lift: in depth, towards the eye;
  * clip: a plane of the eye's frame that cuts a closed solid (capped) or what is open. */

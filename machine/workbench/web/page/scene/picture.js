@@ -5,7 +5,7 @@ import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
 import { add, bounds, carried, cornersOf, dot, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
 import { beside, bodiesOf, boxEdges, cutsOf, FROM_BELOW, ON_PLATE, planesOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { bodyOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
+import { bodyOf, clipOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
@@ -29,12 +29,6 @@ export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shift
     .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
   return [...whole.filter((box) => box.length).flatMap(cornersOf), ...rim, ...around];
 }
-
-/** How a plane cuts what is drawn, as solids take it; {}: it does not. */
-const clipOf = (toEye, plane) => {
-  const normal = plane && turned(toEye, plane.normal);
-  return plane ? { clip: [...normal, plane.offset_mm + dot(normal, toEye.slice(12, 15))] } : {};
-};
 
 /** Drawings of the walls of parts, by the walls; those that were there before are kept. */
 function wallsOn(gl, walls, before = new Map()) {
