@@ -165,7 +165,7 @@ def test_a_section_takes_beads_away_on_either_side_of_it_and_clicks_go_through(p
     page.click("#section-flip")
     above = page.value(PICTURE)
     assert len({before, below, above}) == 3
-    put(page, "section-at", 0)
+    put(page, "section-at", -100)
     page.click("#section-flip")
     page.value(PICTURE)
     last = row(page)
@@ -173,7 +173,7 @@ def test_a_section_takes_beads_away_on_either_side_of_it_and_clicks_go_through(p
     x, y = page.value(f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])({canvas})")
     page.press(x, y)  # no bead is left there
     assert row(page) == last
-    put(page, "section-along", "none")
+    put(page, "section-along", "")
     assert page.value(PICTURE) == before
 
 

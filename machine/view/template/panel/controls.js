@@ -4,6 +4,7 @@ import { $, duration, listen, made, numberIn, optionsOf, partsInWords, swatch, s
 import { RAMP, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
+import { sectionAsked } from "../picture/shapes.js";
 import { hex } from "../picture/solids.js";
 
 export function controlsOf(print, scene, bells) {
@@ -23,7 +24,7 @@ export function controlsOf(print, scene, bells) {
     frame: () => { scene.riding = $("frame").value === "workpiece"; bells.ring("frame"); },
     stand: () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)),
   });
-  const cut = () => { scene.section = sectionIn(print.box); bells.ring("look"); };
+  const cut = () => { scene.section = sectionAsked(print.box); bells.ring("look"); };
   listen("change", { "section-along": cut, "section-flip": cut });
   listen("input", { "section-at": cut });
   listen("input", { apart: () => { scene.apart = numberIn("apart"); bells.ring("look"); } });
@@ -32,13 +33,6 @@ export function controlsOf(print, scene, bells) {
   toggle("one-part", parts.length < 2);
   typeBoxes(print, scene, bells);
   tabsOf((panel) => toggle("reporting", panel === "report"));
-}
-
-/** The plane above which nothing is drawn, in the frame of the work, as the controls have it; null: none. */
-function sectionIn([least, most]) {
-  const axis = "xyz".indexOf($("section-along").value), side = $("section-flip").checked ? -1 : 1;
-  $("section-at").disabled = axis < 0;
-  return axis < 0 ? null : { normal: [0, 1, 2].map((k) => (k === axis ? side : 0)), offset_mm: side * mix(least[axis], most[axis], numberIn("section-at")) };
 }
 
 /** A box for every kind of line in the print, with its share of the time. */

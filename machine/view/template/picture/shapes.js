@@ -1,6 +1,7 @@
 // Shapes: triangles and lines of the machine's bodies, of the parts' surfaces, the planes of the cuts and the directions of printing.
 
-import { add, cornersOf, cross, scaled, unit } from "./math.js";
+import { $, disable, numberIn, tell } from "../elements.js";
+import { add, cornersOf, cross, dot, scaled, unit } from "./math.js";
 import { RED, rgb, wordOf } from "./solids.js";
 
 /** Corners of triangles put together, all of one colour a piece. */
@@ -152,6 +153,17 @@ export const ownInk = ({ part }) => {
   const word = wordOf(rgb(part.colour), 254);
   return () => word;
 };
+
+/** The plane {normal, offset_mm} above which nothing is drawn, as the controls of both pages have it: across an axis of a box or as a cut, from whose middle the
+ * slider shifts it by percents of half the box; null: none. */
+export function sectionAsked(box, cut = null) {
+  const along = $("section-along").value, { normal, offset_mm: through } = along === "cut" && cut ? cut : { normal: [0, 1, 2].map((k) => Number("xyz"[k] === along)) };
+  const heights = cornersOf(box).map((corner) => dot(normal, corner)), low = Math.min(...heights), high = Math.max(...heights), side = $("section-flip").checked ? -1 : 1;
+  const offset = (through ?? (low + high) / 2) + ((high - low) * numberIn("section-at")) / 200, cuts = normal.some(Boolean);
+  disable({ "section-at": !cuts, "section-flip": !cuts });
+  tell({ "section-told": cuts ? `${offset.toFixed(1)} mm` : "" });
+  return cuts ? { normal: scaled(normal, side), offset_mm: side * offset } : null;
+}
 
 /** A row of the front for the drawing of solids: the colours of its parts, and the planes between them. */
 export function cutsOf({ planes, colours }) {

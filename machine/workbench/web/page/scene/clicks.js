@@ -64,11 +64,16 @@ export function handsOf(camera, picture) {
     if (stroke) stroke.put();
     else pressed(middle);
   });
+  const nextSection = () => {
+    const options = [...$("section-along").options].filter(({ disabled }) => !disabled), next = options.findIndex(({ selected }) => selected) + 1;
+    options[next % options.length].selected = true;
+    $("section-along").dispatchEvent(new Event("change"));
+  };
   const tool = (id, tab) => () => {
     if (tab) $(tab).click();
     $(id).click();
   };
-  onKeys({ b: tool("mark-brush", "tab-parts"), m: tool("measure"), x: tool("section"), "[": widen(1 / 1.2), "]": widen(1.2) },
+  onKeys({ b: tool("mark-brush", "tab-parts"), m: tool("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
     () => $("keys").open || !store.triangles || document.activeElement?.closest("[data-typing]"));
   globalThis.view = { camera, picture }; // for whoever tries the page from a console
   const asked = (event) => {
