@@ -1,11 +1,12 @@
 """Zones: boxes of the workpiece frame or faces of a surface that the user marks for no cut, no seam, no support or support, and
 modifiers: volumes with other settings.
 
-Faces are named by a colour of the model's file, or by a point and an angle up to which the region around it grows. The meaning of
-a colour is the user's choice: a colour alone marks nothing.
+Faces are named by a colour of the model's file, by a point and an angle up to which the region around it grows, or by their
+numbers. The meaning of a colour is the user's choice: a colour alone marks nothing.
 """
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from math import cos, radians
@@ -20,6 +21,7 @@ from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.topology.components import connected_components, vertex_components
 from mdp.topology.edges import edges_of
+from profiles.errors import PlanError
 from profiles.frozen import Vector
 
 FARTHEST_MM = 1.0  # greatest distance of a point from the surface that it marks
@@ -28,6 +30,7 @@ ROUNDING_COSINE = 1e-6  # an angle of 0 selects the faces of a flat region
 ROUNDING_MM = 1e-6  # a plane may touch a zone that it must not pass through
 # resolution for comparing points; shifted, since coordinates lie on whole and half micrometres
 GRID_MM, GRID_SHIFT = 1e-4, 0.3141
+FACE_NUMBERS = re.compile(r"\d{1,9}(-\d{1,9})?( \d{1,9}(-\d{1,9})?)*")
 MOST_PRODUCTS = 4_000_000  # of directions and points that are processed at a time
 
 
@@ -175,6 +178,48 @@ class Grown:
         return mesh.nearest_face(np.array(self.point_mm))[1]
 
 
+@dataclass(frozen=True)
+class Brushed:
+    """Faces of the model by their numbers from 0, as a brush marks them: numbers and ranges, for example "0-11 15 20-24"."""
+
+    numbers: str
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for text that is not a list of face numbers."""
+        if not FACE_NUMBERS.fullmatch(self.numbers):
+            raise ValueError('numbers and ranges of faces are expected, as "0-11 15 20-24"')
+
+    @classmethod
+    def of(cls, chosen: Mask) -> "Brushed":
+        """The chosen (m,) faces, at least one."""
+        ends = np.flatnonzero(np.diff(chosen, prepend=False, append=False)).reshape(-1, 2).tolist()
+        return cls(" ".join(f"{first}" if end == first + 1 else f"{first}-{end - 1}" for first, end in ends))
+
+    @property
+    def ranges(self) -> Iterator[tuple[int, int]]:
+        """First and last number of every range."""
+        for text in self.numbers.split():
+            first, _, last = text.partition("-")
+            yield int(first), int(last or first)
+
+    def transform(self, rotation: Floats, shift_mm: Floats) -> "Brushed":
+        """The zone itself: the faces keep their numbers wherever the model is."""
+        return self
+
+    def faces(self, mesh: Mesh) -> Mask:
+        """(m,) faces of a mesh in the zone; numbers beyond its last face are ignored."""
+        chosen = np.zeros(len(mesh.faces), dtype=np.bool_)
+        for first, last in self.ranges:
+            chosen[first : last + 1] = True
+        return chosen
+
+    def check_on(self, mesh: Mesh, where: str = "") -> None:
+        """Raises PlanError if the mesh lacks one of the faces. where: what the sentence begins with."""
+        last, count = max(last for _, last in self.ranges), len(mesh.faces)
+        if last >= count:
+            raise PlanError(f"{where}faces has {last}, but the model's {count} faces are numbered from 0 to {count - 1}")
+
+
 @dataclass(frozen=True, eq=False)
 class Triangles:
     """Faces of a model given by the positions of their corners, (k, 3, 3)."""
@@ -227,7 +272,7 @@ def in_room(volume: Volume, room: Zone) -> Volume:
     return replace(volume, room=replace(room, room=volume.room))
 
 
-AnyZone = Zone | MeshVolume | Painted | Grown | Triangles
+AnyZone = Zone | MeshVolume | Painted | Grown | Brushed | Triangles
 
 
 @dataclass(frozen=True)

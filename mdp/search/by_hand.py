@@ -25,7 +25,7 @@ from mdp.search.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
 from mdp.search.problem import FINEST, Problem
 from mdp.sweep.limbs import limb_mesh
 from mdp.sweep.sweep import gains
-from mdp.zone import FARTHEST_MM, Grown, Painted
+from mdp.zone import FARTHEST_MM, Brushed, Grown, Painted
 from profiles.errors import PlanError
 from profiles.messages import key_name, phrase
 
@@ -40,7 +40,7 @@ MOST_SHOWN = 8  # colours in a message
 
 
 def check_plan(plan: PlanFile, mesh: Mesh, name: str) -> None:
-    """Raise PlanError if a plan belongs to another model, or names faces that the model lacks, by colour or around a point."""
+    """Raise PlanError if a plan belongs to another model, or names faces that the model lacks, by colour, number or point."""
     if plan.sha256 and plan.sha256 != mesh_sha256(mesh):
         raise PlanError(
             f"plan {plan.name} was made for another model: {plan.model or 'its model'} is not {name} as it is read now "
@@ -53,6 +53,8 @@ def check_plan(plan: PlanFile, mesh: Mesh, name: str) -> None:
             label = f"plan {plan.name}: {kind} {number}:"
             if isinstance(zone, Painted):
                 _check_colour(zone, mesh, name, f"{label} colour is {colour_text(zone.colour)}")
+            elif isinstance(zone, Brushed):
+                zone.check_on(mesh, f"{label} ")
             elif isinstance(zone, Grown) and (away_mm := zone.away_mm(mesh)) > FARTHEST_MM:
                 point = ", ".join(f"{x:g}" for x in zone.point_mm)
                 raise PlanError(f"{label} point_mm is [{point}], {away_mm:.3g} mm from {name}: up to {FARTHEST_MM:g} is allowed")

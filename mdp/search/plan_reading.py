@@ -14,7 +14,7 @@ from mdp.plane import Plane, unit_direction
 from mdp.read import read_in_place
 from mdp.search.plan_file import KEYS, MOST_MM, ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, height_range
 from mdp.sweep.limbs import MOST_JOINED
-from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, MeshVolume, Modifier, Painted, Zone, Zones
+from mdp.zone import MOST_GROWN_DEG, AnyZone, Brushed, Grown, MeshVolume, Modifier, Painted, Zone, Zones
 from profiles.errors import MeshError, PlanError, reason
 from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
@@ -22,7 +22,7 @@ from profiles.toml_text import read_toml
 
 PART_KEYS = ("normal", "offset_mm", "limbs_mm", "process")
 BOX_KEYS = ("min_mm", "max_mm", "axes", "room")
-ZONE_KEYS = (*BOX_KEYS, "colour", "point_mm", "angle_deg")
+ZONE_KEYS = (*BOX_KEYS, "colour", "faces", "point_mm", "angle_deg")
 MESH_ZONES = ("no_support", "support")  # kinds that may also be a mesh
 MODIFIER_KEYS = (*BOX_KEYS, "z_mm", "mesh", "process")
 ROW_KEYS = ("planes", *ROW_FIGURES)
@@ -125,6 +125,8 @@ def _zone(folder: Path, values: dict[str, Any], key: str, where: str) -> AnyZone
         return _solid(folder, values, where)
     if "colour" in values:
         return _painted(values, where)
+    if "faces" in values:
+        return _brushed(values, where)
     return _grown(values, where) if "point_mm" in values or "angle_deg" in values else _box(values, where)
 
 
@@ -195,6 +197,15 @@ def _painted(values: dict[str, Any], where: str) -> Painted:
     if colour is None:
         raise PlanError(f'{where}colour is {_show(text)}: # and six hexadecimal digits are expected, as "#ff0000"')
     return Painted(colour)
+
+
+def _brushed(values: dict[str, Any], where: str) -> Brushed:
+    if len(values) > 1:
+        raise PlanError(f"{where}has faces and {', '.join(values.keys() - {'faces'})}: one of them is allowed")
+    try:
+        return Brushed(_text(values, "faces"))
+    except ValueError as error:
+        raise PlanError(f"{where}faces is {_show(values['faces'])}: {error}") from None
 
 
 def _rotation(table: dict[str, Any], key: str) -> tuple[Vector, Vector, Vector]:

@@ -11,7 +11,7 @@ from mdp.decomposition import FrontRow
 from mdp.mesh import colour_text
 from mdp.plane import Plane
 from mdp.search.plan_file import ROW_FIGURES, VERSION, ZONE_KINDS, PlanFile, PlannedPart, height_range
-from mdp.zone import AnyZone, Grown, MeshVolume, Modifier, Painted, Zone
+from mdp.zone import AnyZone, Brushed, Grown, MeshVolume, Modifier, Painted, Zone
 
 
 def plan_text(plan: PlanFile, folder: Path | None = None) -> str:
@@ -45,6 +45,8 @@ def _zone_values(zone: AnyZone, folder: Path | None) -> dict[str, Any]:
         return {"colour": colour_text(zone.colour)}
     if isinstance(zone, Grown):
         return {"point_mm": list(zone.point_mm), "angle_deg": zone.angle_deg}
+    if isinstance(zone, Brushed):
+        return {"faces": zone.numbers}
     if isinstance(zone, MeshVolume):
         return {"mesh": _path_from(folder, zone.file)}
     assert isinstance(zone, Zone)  # triangles only come from marks in a model's own file

@@ -158,6 +158,25 @@ def test_each_toggle_changes_the_picture_and_back(page: Browser) -> None:
         assert page.value(PICTURE) == before, name
 
 
+def test_a_section_takes_beads_away_on_either_side_of_it_and_clicks_go_through(page: Browser) -> None:
+    before = page.value(PICTURE)
+    put(page, "section-along", "z")
+    below = page.value(PICTURE)
+    page.click("#section-flip")
+    above = page.value(PICTURE)
+    assert len({before, below, above}) == 3
+    put(page, "section-at", -100)
+    page.click("#section-flip")
+    page.value(PICTURE)
+    last = row(page)
+    canvas = "document.getElementById('canvas').getBoundingClientRect()"
+    x, y = page.value(f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])({canvas})")
+    page.press(x, y)  # no bead is left there
+    assert row(page) == last
+    put(page, "section-along", "")
+    assert page.value(PICTURE) == before
+
+
 def test_every_colouring_has_a_picture_of_its_own(foreign: Browser) -> None:
     pictures = set()
     for mode in ("part", "kind", "speed", "layer", "flow", "fan"):

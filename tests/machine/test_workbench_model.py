@@ -25,7 +25,7 @@ SLIPPED = """(({ add, scaled, sub, unit }, { faceMet }) => { let seed = 7;
   return Array.from({ length: 2000 }, () => { const [a, b] = ends(), [c, d] = ends(), along = random() + 0.5;
     const on = add(scaled(a, along), scaled(b, 1 - along)), from = scaled(place(), 100);
     return faceMet({ corners: [a, b, c, b, a, d].flat(), count: 2 }, from, unit(sub(on, from)));
-  }).filter((face) => face < 0).length; })(modules["picture/math"], modules["scene/triangles"])"""
+  }).filter(({ face }) => face < 0).length; })(modules["picture/math"], modules["scene/face-tree"])"""
 MENU = ["Remove", "Lock", "Print earlier", "Print later", "Settings of this part"]
 # The key comes before the page is drawn anew, which is when a browser takes the focus from what is hidden.
 LOCK_AND_DELETE = """{ document.querySelector('#part-menu button:nth-child(2)').click();

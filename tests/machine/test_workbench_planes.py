@@ -95,6 +95,51 @@ def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_aw
         assert len(page.until(lambda state: len(state["cuts"]) == 2)["zones"]) == 2
 
 
+def test_strokes_of_a_brush_join_one_zone_and_an_eraser_takes_faces_from_all(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+
+        def kinds(state: Any) -> list[tuple[str, Any]]:
+            return [(zone["kind"], zone.get("faces")) for zone in state["zones"]]
+
+        page.do("brush", kind="support", faces="0-3")
+        page.until(lambda state: kinds(state) == [("support", 4)])
+        page.do("brush", kind="support", faces="3-5 8")
+        page.until(lambda state: kinds(state) == [("support", 7)])
+        page.do("brush", kind="no_support", faces="8")  # the newest stroke counts
+        page.until(lambda state: kinds(state) == [("no_support", 1), ("support", 6)])
+        page.do("mark", kind="no_support", point_mm=[0.0, 5.0, 10.0], angle_deg=10)
+        state = page.until(lambda state: len(state["zones"]) == 3 and state["marks"])
+        grown = [face for face, byte in enumerate(bench.ask(f"marks/{state['marks']}")[1]) if byte & 4]
+        page.do("brush", kind="no_support", faces=f"{next(face for face in grown if face != 8)}", erase=True)
+        state = page.until(lambda state: state["undo"] == "take a mark away")
+        assert kinds(state) == [("no_support", 1), ("no_support", len(grown) - 1), ("support", 6)]
+        Path("plan.toml").write_bytes(bench.ask("plan.toml")[1])
+        assert 'faces = "0-5"' in Path("plan.toml").read_text()
+        bench.send(Path("plan.toml"))
+        again = page.until(lambda state: not state["undo"].startswith("take a mark") and not state["busy"])
+        assert kinds(again) == kinds(state)
+        page.do("undo")
+        page.do("undo")
+        page.until(lambda state: kinds(state) == [("no_support", 1), ("no_support", None), ("support", 6)])
+
+
+def test_brushed_faces_are_in_a_project_and_on_the_turned_model_the_same(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "glass.stl")
+        page.do("brush", kind="no_seam", faces="3-9 40 100-130")
+        page.do("turn", axis="x", deg=90)
+        state = page.until(lambda state: state["undo"] == "turn the model" and state["marks"])
+        marks = bench.ask(f"marks/{state['marks']}")[1]
+        assert [face for face, byte in enumerate(marks) if byte] == [*range(3, 10), 40, *range(100, 131)]
+        status, project = bench.ask("project.3mf")
+        assert status == 200
+        Path("kept.3mf").write_bytes(project)
+        opened(page, bench, "kept.3mf")
+        again = page.until(lambda state: state["zones"] and state["marks"])
+        assert bench.ask(f"marks/{again['marks']}")[1] == marks
+
+
 def test_a_mark_ends_the_search_that_knew_nothing_of_it(bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")
@@ -118,6 +163,20 @@ def test_a_mark_that_makes_no_sense_is_one_sentence(bench: Running, folder: Path
     with bench.line() as page:
         opened(page, bench, "tee.stl")
         page.do("mark", **asked)
+        assert said in page.until(lambda state: state["problem"])["problem"]
+
+
+@pytest.mark.parametrize(
+    ("faces", "said"),
+    [
+        ("0-99999", "faces has 99999, but the model's 28 faces are numbered from 0 to 27"),
+        ("some", 'faces is "some": numbers and ranges of faces are expected, as "0-11 15 20-24"'),
+    ],
+)
+def test_a_stroke_that_makes_no_sense_is_one_sentence(bench: Running, folder: Path, faces: str, said: str) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        page.do("brush", kind="keep", faces=faces)
         assert said in page.until(lambda state: state["problem"])["problem"]
 
 

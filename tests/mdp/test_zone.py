@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.pose import about
-from mdp.zone import Grown, Painted, Zone, Zones, spans_mm, touched
+from mdp.zone import Brushed, Grown, Painted, Zone, Zones, spans_mm, touched
 from tests import shapes
 from tests.mdp.files import both
 from tests.mdp.solids import random_direction, random_solid
@@ -130,3 +130,26 @@ def test_the_nearest_face_is_the_one_that_trimesh_finds(seed: int, point: tuple[
     corners = mesh.vertices[mesh.faces]
     nearest = trimesh.triangles.closest_point(corners, np.tile(point, (len(corners), 1)))
     assert mesh.nearest_face(np.array(point))[1] == pytest.approx(np.linalg.norm(nearest - point, axis=1).min(), abs=1e-9)
+
+
+def test_brushed_faces_are_kept_as_ranges_and_stay_on_the_turned_model() -> None:
+    ball, chosen = random_solid(3), np.zeros(len(random_solid(3).faces), dtype=np.bool_)
+    chosen[[0, 1, 2, 5, 7, 8]] = True
+    zone = Brushed.of(chosen)
+    assert zone.numbers == "0-2 5 7-8"
+    turn = about(random_direction(400, 300), 1.0)
+    assert (zone.transform(turn, np.ones(3)).faces(ball.transform(turn, np.ones(3))) == chosen).all()
+
+
+def test_a_brushed_patch_keeps_planes_out_over_its_height() -> None:
+    box = shapes.box()  # 20 mm high
+    side = Brushed.of(box.normals[:, 0] > 0.9)
+    zones = Zones(keep=(side,)).on(box)
+    assert zones.crossed(Plane(np.array([0.0, 0, 1]), 10.0)) == 1
+    assert zones.crossed(Plane(np.array([1.0, 0, 0]), 1.0)) is None
+
+
+@pytest.mark.parametrize("numbers", ["", "a", "3-", "1,2", "-4", "1  2"])
+def test_text_that_is_no_list_of_faces_is_refused(numbers: str) -> None:
+    with pytest.raises(ValueError, match="numbers and ranges of faces are expected"):
+        Brushed(numbers)

@@ -18,10 +18,11 @@ from machine.workbench.bench.part_settings import with_part_setting, without_par
 from machine.workbench.bench.values import Direction, Mm, Point, Rotation, check_number
 from mdp.directions.orientation import set_on_plate
 from mdp.mesh import Floats, Mesh
+from mdp.overhang import Mask
 from mdp.pose import about
 from mdp.search.plan_file import PlannedPart, planned_parts
 from mdp.search.plan_reading import MOST_ZONES
-from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones
+from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Brushed, Grown, Volume, Zone, Zones
 from profiles.errors import PlanError
 from profiles.messages import option
 from profiles.part_settings import MOST_PARTS
@@ -33,6 +34,7 @@ Cuts = tuple[PlannedPart, ...]
 TurnDeg = Annotated[float, Field(ge=-360, le=360)]
 Kind = Literal["keep", "no_seam", "no_support", "support"]
 GrownDeg = Annotated[float, Field(ge=0, le=MOST_GROWN_DEG)]
+OPPOSITES = {"support": "no_support", "no_support": "support"}
 WORDS = {  # name of the history step that marks each kind
     "keep": "mark: no cut here",
     "no_seam": "mark: no seam here",
@@ -245,6 +247,39 @@ def _grown(bench: Bench, point_mm: Point, angle_deg: float | None) -> Grown:
     return zone
 
 
+def brush(bench: Bench, *, kind: Kind, faces: str, erase: bool = False) -> Zones:
+    """With faces painted or erased by one stroke of a brush: they join the brushed zone of a kind, or leave all zones of that
+    kind that are not volumes. Support and no support exclude each other, and the newest stroke counts. Raises PlanError."""
+    try:
+        mesh, stroke = workpiece_mesh(bench), Brushed(faces)
+    except ValueError as error:
+        raise PlanError(f'faces is "{faces:.20}": {error}') from None
+    stroke.check_on(mesh)
+    chosen = stroke.faces(mesh)
+    if erase:
+        return _with(bench.zones, kind, _erased(getattr(bench.zones, kind), mesh, chosen))
+    zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
+    index = next((k for k, zone in enumerate(zones) if isinstance(zone, Brushed)), len(zones))
+    if index >= MOST_ZONES:
+        raise PlanError(f"there are {index} zones of {kind}: {MOST_ZONES} are allowed")
+    painted = chosen | zones[index].faces(mesh) if index < len(zones) else chosen
+    changed = _with(bench.zones, kind, (*zones[:index], Brushed.of(painted), *zones[index + 1 :]))
+    opposite = OPPOSITES.get(kind)
+    return changed if opposite is None else _with(changed, opposite, _erased(getattr(changed, opposite), mesh, chosen))
+
+
+def _erased(zones: tuple[AnyZone, ...], mesh: Mesh, chosen: Mask) -> tuple[AnyZone, ...]:
+    """The zones without some faces of the mesh; volumes stay as they are."""
+    left: list[AnyZone] = []
+    for zone in zones:
+        faces = np.zeros_like(chosen) if isinstance(zone, Volume) else zone.faces(mesh)
+        if not (faces & chosen).any():
+            left.append(zone)
+        elif (faces & ~chosen).any():
+            left.append(Brushed.of(faces & ~chosen))
+    return tuple(left)
+
+
 def unmark(bench: Bench, *, kind: Kind, number: int) -> Zones:
     """Remove the zone `number` of a kind. Raises PlanError."""
     zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
@@ -281,4 +316,4 @@ CHANGES: dict[str, tuple[Callable[..., Bench], str]] = {
 # Commands that return other cuts.
 EDITS: dict[str, Callable[..., Edit]] = {"add": add, "move": move, "limb": limb, "remove": remove, "reorder": reorder}
 # Commands that return other zones; each runs in a worker process, because it may read the model's mesh.
-MARKINGS: dict[str, Callable[..., Zones]] = {"mark": mark, "unmark": unmark}
+MARKINGS: dict[str, Callable[..., Zones]] = {"mark": mark, "brush": brush, "unmark": unmark}

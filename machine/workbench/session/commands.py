@@ -155,7 +155,7 @@ def perform(session: Session, name: str, arguments: Arguments) -> Work:
         nearer = {"do": name, **arguments.model_dump(mode="json", exclude_none=True), "near": True} if "near" in given else None
         return session.trials.take(EDITS[name](session.bench, **given), nearer)
     if name in MARKINGS:
-        word = WORDS[given["kind"]] if name == "mark" else "take a mark away"
+        word = "take a mark away" if name == "unmark" or given.get("erase") else WORDS[given["kind"]]
         return session.trials.mark(word, partial(MARKINGS[name], **given))
     work: Work = ACTS[name](session, **given)
     return work

@@ -23,7 +23,7 @@ from mdp.joint import Joint
 from mdp.overhang import PLATE_TOLERANCE_MM, threshold
 from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
-from mdp.zone import MeshVolume, Modifier, Zone
+from mdp.zone import AnyZone, Brushed, MeshVolume, Modifier, Zone
 from profiles.material import Material
 from profiles.messages import advice, terminal_words
 from profiles.profile import Profile
@@ -239,12 +239,18 @@ def marks_key(bench: Bench) -> str:
 
 
 def _zones(bench: Bench) -> list[dict[str, Any]]:
-    """The zones as the page shows them; a mesh by its bounding box."""
+    """The zones as the page shows them: a mesh by the box around it, brushed faces by their count alone."""
     return [
-        {"kind": kind, "number": number, **asdict(zone.box if isinstance(zone, MeshVolume) else zone)}
+        {"kind": kind, "number": number, **_zone(zone)}
         for kind in ZONE_KINDS
         for number, zone in enumerate(getattr(bench.zones, kind), start=1)
     ]
+
+
+def _zone(zone: AnyZone) -> dict[str, Any]:
+    if isinstance(zone, Brushed):
+        return {"faces": sum(last + 1 - first for first, last in zone.ranges)}
+    return asdict(zone.box if isinstance(zone, MeshVolume) else zone)
 
 
 def _modifier(modifier: Modifier) -> dict[str, Any]:

@@ -80,6 +80,11 @@ class Anything:
             "limb": lambda n: {"part": n, **self.choice(({}, {"point_mm": self.point(30.0)}))},
             "reorder": lambda n: {"part": n, "to": 2},
             "mark": lambda n: {"kind": self.choice(ZONE_KINDS), **self.choice(({}, {"number": n})), **self.zone()},
+            "brush": lambda n: {
+                "kind": self.choice(ZONE_KINDS),
+                "faces": self.choice((f"{n}-{2 * n}", "0 2-3", "99999")),
+                "erase": self.choice((True, False)),
+            },
             "unmark": lambda n: {"kind": self.choice(ZONE_KINDS), "number": n},
             "set": lambda n: self.setting(self.choice(tuple(SETTINGS))),
             "reset": lambda n: {},

@@ -149,6 +149,8 @@ REFUSED = [
     ),
     ("version = 1\n[[keep]]\nmesh = 'a.stl'", "keep 1: 'mesh' is not a key of a plan: min_mm, max_mm, axes, room, colour,"),
     ("version = 1\n[[support]]\nmesh = 'a.stl'\ncolour = '#ff0000'", "support 1: has a mesh and colour: one of them is allowed"),
+    ("version = 1\n[[keep]]\nfaces = 'all'", "keep 1: faces is 'all': numbers and ranges of faces are expected"),
+    ("version = 1\n[[keep]]\nfaces = '1'\nangle_deg = 3", "keep 1: has faces and angle_deg: one of them is allowed"),
     ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
     ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),
     ("version = 1\n[[front]]\nplanes = []\ncost_mm2 = 'dear'", "front 1: cost_mm2 is 'dear': a number is expected"),

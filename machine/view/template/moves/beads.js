@@ -24,6 +24,7 @@ uniform int first, corners, last;
 uniform float share;
 flat out vec4 paint;
 flat out int slot;
+out vec3 seen;
 vec3 start, end, stop, up, along;
 vec2 size;
 ivec2 texel(int k) { return ivec2(k & ${TEXELS - 1}, k >> ${Math.log2(TEXELS)}); }
@@ -76,6 +77,7 @@ void main() {
   if (tip && !joined) place += outward * round * 0.7;
   vec3 n = tip ? outward : normalize(mine * (corner.y * 0.3 + corner.z * 0.75) + up * corner.w * 0.95);
   normal = mat3(toEye) * n;
+  seen = (toEye * vec4(place, 1.0)).xyz;
   gl_Position = toClip * vec4(place, 1.0);
 }`;
 
@@ -100,15 +102,18 @@ void main() {
   beneath = lit(paint.rgb, mat3(toEye) * side);
   above = lit(paint.rgb, mat3(toEye) * over);
   vec3 place = middle + wide * (corner.y - 0.5) * (tall + deep) + along * (corner.x - 0.5) * 0.5 * size.y;
+  seen = (toEye * vec4(place, 1.0)).xyz;
   gl_Position = toClip * vec4(place + near * out_, 1.0);
 }`;
 
 const PAINT_HEAD = `
 flat in vec4 paint; // a: 0 for what is drawn faint, with gaps to look through
 flat in int slot;
+in vec3 seen;
+uniform vec4 clip; // see solidOf
 uniform bool picking;
 out vec4 colour;
-bool gap() { return paint.a == 0.0 && (int(gl_FragCoord.x) + int(gl_FragCoord.y)) % 3 != 0; }
+bool gap() { return dot(clip.xyz, seen) > clip.w || paint.a == 0.0 && (int(gl_FragCoord.x) + int(gl_FragCoord.y)) % 3 != 0; }
 vec4 number() { int k = slot + 1; return vec4(k & 255, (k >> 8) & 255, (k >> 16) & 255, (k >> 24) & 255) / 255.0; } // 0: none
 `;
 
@@ -163,15 +168,16 @@ export function beadsOf(gl, shapes, path) {
     gl.bindTexture(gl.TEXTURE_2D, textures.colours);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, path.texels / TEXELS, gl.RGBA, gl.UNSIGNED_BYTE, colours);
   };
-  /** seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share}. */
-  const draw = ({ toClip, toEye, eye, pixels }, ranges, moving, picking = false) => {
+  /** seen: {toClip, toEye, eye, clip, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share}. */
+  const draw = ({ toClip, toEye, eye, clip, pixels }, ranges, moving, picking = false) => {
     const { program, corners, indices, drawing } = pixels > CLOSE_PIXELS ? shapes.near : shapes.far;
     Object.values(textures).forEach((held, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, held);
     });
     const units = Object.fromEntries(Object.keys(textures).map((name, unit) => [name, unit]));
-    drawing().draw({ ...units, toClip, toEye, eye, roundness: clamp(pixels / CLOSE_PIXELS - 0.25, 0, 1), picking, last: moving.slot, share: moving.share, corners }, () => {
+    const roundness = clamp(pixels / CLOSE_PIXELS - 0.25, 0, 1);
+    drawing().draw({ ...units, toClip, toEye, eye, clip, roundness, picking, last: moving.slot, share: moving.share, corners }, () => {
       for (const { first, end, tint } of ranges) {
         program.set({ tint });
         for (const [from, behind] of seenRuns(toClip, first, end)) {

@@ -6,7 +6,7 @@ import { HALF_HEIGHT, placeOn } from "../picture/camera.js";
 import { density, frameOf, outgrown, outlive, programOf, sizeOf } from "../picture/gl.js";
 import { carried, clamp, IDENTITY, moved, multiply, scaled, sub, undone } from "../picture/math.js";
 import { arrowsOf, based, bodiesOf, cutsOf, FROM_BELOW, ON_PLATE, ownInk, planesOf, surfaceColours } from "../picture/shapes.js";
-import { bodyOf, LINE_FRAGMENT, LINE_VERTEX, linesOf, rgb, SOLID_FRAGMENT, SOLID_VERTEX, solidOf } from "../picture/solids.js";
+import { bodyOf, clipOf, linesOf, rgb, SOLID_FRAGMENT, SOLID_VERTEX, solidOf } from "../picture/solids.js";
 import { BEAD_FAR, BEAD_NEAR, beadsOf, PAINT_FAR, PAINT_NEAR, shapesOf } from "./beads.js";
 import { coarseColours, coarseOf, dividedRanges } from "./coarse.js";
 import { coloured } from "./colours.js";
@@ -69,9 +69,9 @@ export function standing(chain, place, riding) {
 function viewOf(print, scene, camera, size, density) {
   const seenAs = camera.seen(size), stand = standing(print.chain, scene.place, scene.riding);
   const [work, cradle, head] = [stand.work, stand.cradle, stand.head].map(seenAs);
-  const pixels = (BEAD_MM * size[1]) / (2 * HALF_HEIGHT * camera.distance), eye = carried(undone(work.toEye), [0, 0, 0]);
+  const pixels = (BEAD_MM * size[1]) / (2 * HALF_HEIGHT * camera.distance), eye = carried(undone(work.toEye), [0, 0, 0]), section = clipOf(work.toEye, scene.section);
   return {
-    work, cradle, head, beads: { ...work, eye, pixels }, below: eye[2] < 0,
+    work, cradle, head, beads: { ...work, eye, pixels, ...section }, section, below: eye[2] < 0,
     seenAt: (shift) => seenAs(multiply(stand.work, moved(shift))),
     ranges: drawnRanges(print, scene), moving: { slot: print.path.slot(scene.row), share: scene.share },
     lift: 0.012 / camera.distance, // in depth, by which what lies on a surface is seen before it
@@ -110,7 +110,7 @@ function paintRest(stage, print, scene, seen) {
   if (scene.tried) paintTried(stage.model, scene.tried, print.surfaces, work);
   else {
     paintPath(stage, seen.ranges, on, work, lift, seen.size);
-    paintModel(stage, print, scene, seen.seenAt, lift);
+    paintModel(stage, print, scene, seen, lift);
   }
   if (!on.machine) return;
   if (below) paintTable(FROM_BELOW);
@@ -126,9 +126,8 @@ function paintPath({ signs }, ranges, on, seen, lift, size) {
       if (tint === PLAIN_TINT && on[name]) drawn.forEach((sign) => signs[sign]().draw(seen, firstRow, endRow, size, lift));
 }
 
-/** seenAt: the work shifted by a vector, as the eye sees it. */
-function paintModel(stage, print, scene, seenAt, lift) {
-  const { parts = [], apart } = print.surfaces || {}, look = scene.model === "solid" ? {} : { ghost: 0.16, behind: lift };
+function paintModel(stage, print, scene, { seenAt, section }, lift) {
+  const { parts = [], apart } = print.surfaces || {}, look = scene.model === "solid" ? { ...section, capped: Boolean(scene.section) } : { ...section, ghost: 0.16, lift: -lift };
   const seen = (part) => seenAt(apart && scene.apart ? scaled(apart.get(part), scene.apart * print.span) : [0, 0, 0]);
   for (const { part, range } of scene.model === "hide" ? [] : parts) {
     const another = scene.part !== null && scene.part !== part.index;
@@ -168,8 +167,10 @@ const COARSE_SHARE = 0.6; // of the canvas' width and height, drawn while all mo
 
 /** Has the card compile all programs while the page reads the print. */
 export function compileAll(gl) {
-  const beads = [[BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR]], others = [[SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT]];
-  [...beads, ...others].forEach((pair) => programOf(gl, ...pair));
+  const pairs = [
+    [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
+  ];
+  pairs.forEach((pair) => programOf(gl, ...pair));
 }
 
 /** {canvas, ask, moved, rowAt}: the picture of the scene, drawn whenever a bell rings. */

@@ -9,7 +9,7 @@ export function sceneOf(print, bells) {
     row: last, share: 1, place: restingPlace(header),
     part: null, others: "faint", low: 0, high: Math.max(rows.layers.length - 1, 0),
     riding: false, dark: false, mode: usualMode(print), hidden: new Set(),
-    model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0, tried: null,
+    model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0, tried: null, section: null,
     on: { beads: true, travels: false, retractions: false, seams: false, machine: header.machine.known, planes: false, directions: false, findings: true },
   };
   scene.layers = () => (scene.part === null ? rows.layers : rows.layers.filter((layer) => layer.part === scene.part));

@@ -4,6 +4,7 @@ import { $, duration, listen, made, numberIn, optionsOf, partsInWords, swatch, s
 import { RAMP, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
+import { sectionAsked } from "../picture/shapes.js";
 import { hex } from "../picture/solids.js";
 
 export function controlsOf(print, scene, bells) {
@@ -23,6 +24,9 @@ export function controlsOf(print, scene, bells) {
     frame: () => { scene.riding = $("frame").value === "workpiece"; bells.ring("frame"); },
     stand: () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)),
   });
+  const cut = () => { scene.section = sectionAsked(print.box); bells.ring("look"); };
+  listen("change", { "section-along": cut, "section-flip": cut });
+  listen("input", { "section-at": cut });
   listen("input", { apart: () => { scene.apart = numberIn("apart"); bells.ring("look"); } });
   toggle(print.rows.count ? "has-paths" : "no-paths", true);
   toggle("no-solids", !print.surfaces && !posed.length);

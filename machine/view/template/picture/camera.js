@@ -3,6 +3,7 @@
 import { add, bounds, clamp, cross, dot, length, moved, multiply, perspective, RAD, scaled, sub } from "./math.js";
 
 const FARTHEST_MM = 1000; // behind the work: room for the machine
+const STILL_PIXELS = 4; // a hand that moves less only clicks
 const MARGIN = 1.12;
 export const HALF_HEIGHT = Math.tan(15 * RAD); // of the picture at distance 1
 
@@ -85,23 +86,32 @@ export function placeOn(canvas, { clientX, clientY }) {
   return [((clientX - left) / width * 2 - 1) * (width / height), 1 - ((clientY - top) / height) * 2];
 }
 
-/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. */
-export function handle(canvas, camera, { changed, pressed }) {
+/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom; pressed(event), asked(event): a click, with the other button. take(event): what the first
+ * finger takes hold of instead, {move(event), put(), drop()}, null: nothing; a second finger drops it. */
+export function handle(canvas, camera, { changed, pressed, asked = () => {}, take = () => null }) {
   const fingers = new Map();
-  let path = 0;
-  const middle = () => [0, 1].map((k) => [...fingers.values()].reduce((sum, place) => sum + place[k] / fingers.size, 0));
+  let path = 0, held = null;
+  const release = (taken) => {
+    if (taken) held?.put();
+    else held?.drop();
+    held = null;
+  };
+  const mean = (k) => [...fingers.values()].reduce((sum, place) => sum + place[k] / fingers.size, 0);
+  const middle = () => [mean(0), mean(1)];
   const spread = () => {
     const [a, b] = [...fingers.values()];
     return b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : 0;
   };
   canvas.addEventListener("pointerdown", (event) => {
-    if (fingers.size === 0) path = 0;
+    release(false);
+    if (fingers.size === 0) [path, held] = [0, take(event)];
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     canvas.setPointerCapture(event.pointerId);
     canvas.focus({ preventScroll: true, focusVisible: false });
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!fingers.has(event.pointerId)) return;
+    if (held) return held.move(event);
     const [from, wide] = [middle(), spread()];
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     const to = middle(), dx = to[0] - from[0], dy = to[1] - from[1];
@@ -113,7 +123,8 @@ export function handle(canvas, camera, { changed, pressed }) {
     changed();
   });
   const lift = (event) => {
-    if (event.type === "pointerup" && fingers.size === 1 && path < 4 && event.button === 0) pressed(event);
+    if (!held && event.type === "pointerup" && fingers.size === 1 && path < STILL_PIXELS) ({ 0: pressed, 2: asked })[event.button]?.(event);
+    release(event.type === "pointerup");
     fingers.delete(event.pointerId);
   };
   canvas.addEventListener("pointerup", lift);

@@ -1,6 +1,7 @@
 // Shapes: triangles and lines of the machine's bodies, of the parts' surfaces, the planes of the cuts and the directions of printing.
 
-import { add, cornersOf, cross, scaled, unit } from "./math.js";
+import { $, disable, numberIn, tell } from "../elements.js";
+import { add, cornersOf, cross, dot, scaled, unit } from "./math.js";
 import { RED, rgb, wordOf } from "./solids.js";
 
 /** Corners of triangles put together, all of one colour a piece. */
@@ -73,18 +74,40 @@ function plateCorners({ radius_mm: radius, size_mm: size, thickness_mm: thick })
   return revolved([[0, -thick], [radius, -thick], [radius, 0], [0, 0]], 96);
 }
 
-/** A grid, or rings and spokes, by which a turn of the plate is seen; a longer stroke marks the workpiece's +x. */
+const GLYPHS = { // strokes of a letter: places on a grid of 2 by 4, two digits each
+  0: "0020240400", 1: "031410", 2: "042422020020", 3: "04242000 0222", 4: "040222 2420", 5: "240402222000", 6: "240400202202", 7: "042410", 8: "0020240400 0222",
+  9: "002024040222", "-": "0222", F: "000424 0212", R: "000424220220", O: "0020240400", N: "00042024", T: "0424 1410", X: "0024 0420", Y: "041224 1210", m: "00021210 122220",
+};
+const ADVANCE = 0.75; // from one letter to the next, of their height
+
+/** The strokes of a word that lies at a height, its middle at x, y. */
+const written = (word, [x, y], high, z) => [...word].flatMap((letter, k) => (GLYPHS[letter]?.split(" ") || []).flatMap((stroke) => {
+  const points = stroke.match(/../g).map(([u, v]) => [x + (ADVANCE * (k - word.length / 2) + (Number(u) + 0.5) / 4) * high, y + (v / 4 - 0.5) * high, z]);
+  return points.slice(1).flatMap((point, n) => [points[n], point]);
+}));
+
+const multiples = (step, low, high) => Array.from({ length: Math.floor(high / step) - Math.ceil(low / step) + 1 }, (_, k) => (Math.ceil(low / step) + k) * step);
+
+/** Rings, or a grid, with millimetres along two rulers: from the origin to the front and the right, or at the front and the left edge; the longer strokes are the workpiece's x and y. */
 function plateLines({ radius_mm: radius, size_mm: size }, line, edge) {
-  const step = radius > 120 ? 50 : radius > 40 ? 20 : 10, z = 0.05, [a, b] = size ? size.map((side) => side / 2) : [radius, radius];
-  const rim = size ? [[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]] : circle(radius, z, 96), inner = [];
-  if (size) {
-    for (let x = -Math.floor(a / step) * step; x <= a; x += step) inner.push([x, -b, z], [x, b, z]);
-    for (let y = -Math.floor(b / step) * step; y <= b; y += step) inner.push([-a, y, z], [a, y, z]);
-  } else {
-    for (let r = step; r < radius; r += step) inner.push(...chained(circle(r, z, 96)));
-    inner.push(...circle(radius, z, 12).flatMap((place) => [scaled(place, step / radius), place]));
-  }
-  return [{ corners: inner, colour: line }, { corners: [...chained(rim), [0, 0, z], [a, 0, z]], colour: edge }];
+  const step = radius > 120 ? 50 : radius > 40 ? 20 : 10, z = 0.05, high = step / 7, [a, b] = size ? size.map((x) => x / 2) : [radius, radius];
+  const rims = (r) => chained(circle(r, z, ROUND)), grid = (reach, put) => multiples(step, -reach, reach).flatMap(put);
+  const faint = size ? [...grid(a, (x) => [[x, -b, z], [x, b, z]]), ...grid(b, (y) => [[-a, y, z], [a, y, z]])]
+    : [...multiples(step, step, radius).flatMap(rims), ...circle(radius, z, 12).flatMap((place) => [scaled(place, step / radius), place])];
+  const rulers = size ? [[a, -a, (t) => [t, -b], [0, 1]], [b, -b, (t) => [-a, t], [1, 0]]] : [[b, 0, (t) => [0, -t], [1, 0]], [a, 0, (t) => [t, 0], [0, 1]]];
+  const marks = rulers.flatMap(([most, least, at, [u, v]]) => {
+    const ticks = multiples(step / 5, least, most).map((t) => [at(t), 0.3 * high]), labels = multiples(step, least + step / 2, most);
+    return [
+      ...ticks.flatMap(([[x, y], long]) => [[x, y, z], [x + u * long, y + v * long, z]]),
+      ...labels.flatMap((t, k) => {
+        const [x, y] = at(t), word = `${t}${k === labels.length - 1 ? " mm" : ""}`, half = (ADVANCE / 2) * word.length * high;
+        return written(word, u ? [x + half + 0.5 * high, y + 0.75 * high] : [x - half - 0.3 * high, y + high], high, z);
+      }),
+    ];
+  });
+  const rim = size ? chained([[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]]) : rims(radius), front = written("FRONT", [0, -b - 2 * high], 2 * high, z);
+  const axes = [[0, 0, z], [a, 0, z], [0, 0, z], [0, b, z], ...chained(circle(high / 2, z, 24)), ...written("X", [a + high, 0], 1.5 * high, z), ...written("Y", [0, b + high], 1.5 * high, z)];
+  return [{ corners: faint, colour: line }, { corners: [...rim, ...axes, ...marks, ...front], colour: edge }];
 }
 
 export function headOf({ silhouette_mm: silhouette, boxes }, colour, edge) {
@@ -131,6 +154,17 @@ export const ownInk = ({ part }) => {
   return () => word;
 };
 
+/** The plane {normal, offset_mm} above which nothing is drawn, as the controls of both pages have it: across an axis of a box or as a cut, from whose middle the
+ * slider shifts it by percents of half the box; null: none. */
+export function sectionAsked(box, cut = null) {
+  const along = $("section-along").value, { normal, offset_mm: through } = along === "cut" && cut ? cut : { normal: [0, 1, 2].map((k) => Number("xyz"[k] === along)) };
+  const heights = cornersOf(box).map((corner) => dot(normal, corner)), low = Math.min(...heights), high = Math.max(...heights), side = $("section-flip").checked ? -1 : 1;
+  const offset = (through ?? (low + high) / 2) + ((high - low) * numberIn("section-at")) / 200, cuts = normal.some(Boolean);
+  disable({ "section-at": !cuts, "section-flip": !cuts });
+  tell({ "section-told": cuts ? `${offset.toFixed(1)} mm` : "" });
+  return cuts ? { normal: scaled(normal, side), offset_mm: side * offset } : null;
+}
+
 /** A row of the front for the drawing of solids: the colours of its parts, and the planes between them. */
 export function cutsOf({ planes, colours }) {
   return {
@@ -167,15 +201,20 @@ export function beside(direction) {
   return [a, cross(direction, a)];
 }
 
+/** Places around a centre, across a direction, counter-clockwise seen against it; `from`: the angle of the first one. */
+export function ringOf(centre, direction, radius, steps, from = 0) {
+  const [a, b] = beside(direction);
+  return Array.from({ length: steps }, (_, k) => from + (2 * Math.PI * k) / steps).map((angle) => add(centre, add(scaled(a, radius * Math.cos(angle)), scaled(b, radius * Math.sin(angle)))));
+}
+
 export const based = (parts) => parts.filter((part) => part.base && part.direction && part.base.radius_mm > 0);
 
 /** Discs where the parts are cut, their rims, and an arrow along each part's direction: as many corners a part. */
 export function planesOf(parts, colourOf) {
   const discs = [], rims = [];
   for (const part of based(parts)) {
-    const { normal, centre_mm: centre, radius_mm: radius } = part.base, [a, b] = beside(normal), colour = [...colourOf(part), 255];
-    const disc = circle(radius * 1.12, 0, 72).map(([u, v]) => add(centre, add(scaled(a, u), scaled(b, v))));
-    discs.push({ corners: disc.flatMap((place, k) => [centre, place, disc[(k + 1) % disc.length]]), colour });
+    const disc = ringOf(part.base.centre_mm, part.base.normal, 1.12 * part.base.radius_mm, 72), colour = [...colourOf(part), 255];
+    discs.push({ corners: disc.flatMap((place, k) => [part.base.centre_mm, place, disc[(k + 1) % disc.length]]), colour });
     rims.push({ corners: chained(disc), colour });
   }
   return { discs: trianglesOf(discs), rims: trianglesOf(rims) };

@@ -1,6 +1,7 @@
 // Solids: triangles with flat faces, drawn whole or as a ghost whose edges show and whose faces let the light through; lines; and the shapes of both.
 
 import { cornersOn, LIGHT, programOf } from "./gl.js";
+import { dot, turned } from "./math.js";
 
 export const rgb = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
 export const hex = (colour) => "#" + colour.map((x) => Math.round(x).toString(16).padStart(2, "0")).join("");
@@ -16,7 +17,7 @@ export const SOLID_VERTEX = `
 in vec3 place;
 in vec4 colour;
 uniform mat4 toClip, toEye;
-uniform float behind;
+uniform float lift;
 out vec3 seen, spot;
 out vec4 paint;
 void main() {
@@ -25,7 +26,7 @@ void main() {
   seen = p.xyz;
   paint = colour;
   gl_Position = toClip * vec4(place, 1.0);
-  gl_Position.z += behind * gl_Position.w;
+  gl_Position.z -= lift * gl_Position.w;
 }`;
 export const SOLID_FRAGMENT = `
 in vec3 seen, spot;
@@ -35,6 +36,8 @@ uniform vec4 planes[${MOST_CUTS}];
 uniform vec3 hues[${MOST_CUTS} + 1];
 uniform float ghost; // 0: whole; else how much of a ghost is seen face on
 uniform float strength;
+uniform bool plain, capped; // lines, which have no light of their own; backs seen through a section are flat
+uniform vec4 clip; // in the eye's frame: what lies above this plane is away
 out vec4 colour;
 ${LIGHT}
 vec3 divided() {
@@ -48,6 +51,13 @@ vec3 divided() {
 }
 void main() {
   vec3 n = normalize(cross(dFdx(seen), dFdy(seen)));
+  colour = vec4(paint.rgb * paint.a, paint.a);
+  if (dot(clip.xyz, seen) > clip.w) discard;
+  if (plain) return;
+  if (capped && !gl_FrontFacing) {
+    colour = vec4(mod(gl_FragCoord.x + gl_FragCoord.y, 12.0) < 2.0 ? vec3(0.55, 0.3, 0.1) : vec3(0.95, 0.66, 0.36), 1.0);
+    return;
+  }
   float a = paint.a * strength;
   vec3 face = cuts < 0 ? paint.rgb : divided();
   if (paint.a > 0.998) face = paint.rgb; // red faces stay red
@@ -55,14 +65,23 @@ void main() {
   colour = vec4(lit(face, n) * a, a);
 }`;
 
-/** Drawing for triangles {places, colours}, three corners each; a range of corners may be drawn alone. */
-export function solidOf(gl, { places, colours }) {
+const UNCUT = [0, 0, 0, 1];
+
+/** How a plane {normal, offset_mm} cuts what is drawn, as solids and beads take it: in the eye's frame. */
+export function clipOf(toEye, plane) {
+  const normal = plane && turned(toEye, plane.normal);
+  return { clip: plane ? [...normal, plane.offset_mm + dot(normal, toEye.slice(12, 15))] : UNCUT };
+}
+
+/** Drawing for triangles {places, colours}, three corners each; a range of corners may be drawn alone; lift: in depth, towards the eye;
+ * clip: a plane of the eye's frame that cuts a closed solid (capped) or what is open. */
+export function solidOf(gl, { places, colours }, mode = gl.TRIANGLES) {
   const shape = cornersOn(gl, programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), { place: [places, 3], colour: [colours, 4] }), corners = places.length / 3;
-  const draw = ({ toClip, toEye }, { ghost = 0, strength = 1, behind = 0, cuts = null, range: [first, end] = [0, corners] } = {}) => {
+  const draw = ({ toClip, toEye }, { ghost = 0, strength = 1, lift = 0, cuts = null, clip = UNCUT, capped = false, range: [first, end] = [0, corners] } = {}) => {
     if (end <= first) return;
     const parts = cuts ? { cuts: cuts.count, hues: cuts.hues, ...(cuts.count ? { planes: cuts.planes } : {}) } : { cuts: -1 };
-    const pass = () => gl.drawArrays(gl.TRIANGLES, first, end - first);
-    shape.draw({ toClip, toEye, ghost, strength, behind, ...parts }, () => {
+    const pass = () => gl.drawArrays(mode, first, end - first);
+    shape.draw({ toClip, toEye, ghost, strength, lift, clip, capped, plain: mode === gl.LINES, ...parts }, () => {
       if (ghost > 0 || strength < 1) {
         gl.colorMask(false, false, false, false);
         pass();
@@ -76,30 +95,8 @@ export function solidOf(gl, { places, colours }) {
   return { draw, corners, paint: (painted) => shape.put("colour", painted), free: shape.free };
 }
 
-export const LINE_VERTEX = `
-in vec3 place;
-in vec4 colour;
-uniform mat4 toClip;
-uniform float lift;
-out vec4 paint;
-void main() {
-  paint = colour;
-  gl_Position = toClip * vec4(place, 1.0);
-  gl_Position.z -= lift * gl_Position.w;
-}`;
-export const LINE_FRAGMENT = `
-in vec4 paint;
-out vec4 colour;
-void main() { colour = vec4(paint.rgb * paint.a, paint.a); }`;
-
-/** Drawing for pairs of places {places, colours}; lift: in depth, towards the eye. */
-export function linesOf(gl, { places, colours }) {
-  const shape = cornersOn(gl, programOf(gl, LINE_VERTEX, LINE_FRAGMENT), { place: [places, 3], colour: [colours, 4] }), corners = places.length / 3;
-  const draw = ({ toClip }, { range: [first, end] = [0, corners], lift = 0 } = {}) => {
-    if (end > first) shape.draw({ toClip, lift }, () => gl.drawArrays(gl.LINES, first, end - first));
-  };
-  return { draw, corners, free: shape.free };
-}
+/** Drawing for pairs of places {places, colours}, all as bright. */
+export const linesOf = (gl, shape) => solidOf(gl, shape, gl.LINES);
 
 /** Drawing for a body {solid, lines}, of which either may be absent: its lines after its solid. over: before all else; more: see solidOf. */
 export function bodyOf(gl, shapes) {

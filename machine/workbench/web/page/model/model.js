@@ -1,13 +1,14 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal; and the ways in which it can lie.
 
 import { $, alike, button, hide, made, notice, swatches, tell } from "../../../../view/template/elements.js";
-import { add, dot, scaled, sub } from "../../../../view/template/picture/math.js";
+import { add, scaled, sub } from "../../../../view/template/picture/math.js";
 import { trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { AGAIN_MS, newest, send } from "../line.js";
 import { mm2 } from "../lists.js";
 import { fadedColours } from "../parts/pieces.js";
 import { planesNow } from "../parts/planes.js";
-import { cornersAt, faceMet, overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";
+import { cornersAt, faceMet } from "../scene/face-tree.js";
+import { overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 
 const MISSING = "The model has not come from tiltprint, so it is not drawn yet; it is asked for again.";
@@ -81,12 +82,15 @@ export function pedestalOf(picture) {
 const COLOUR = [230, 159, 0, 255], FAINT = 0.3, LIT = 0.85;
 const OUT_SHARE = 0.002; // of the model's size, by which they are drawn outside of it
 
-/** The facet under an event, of those that face the eye; -1: none. */
-function facetMet({ facets }, picture, event) {
-  const [from, along] = picture.ray(event), facing = facets.map((facet, k) => ({ ...facet, k })).filter(({ normal }) => dot(normal, along) < 0);
-  const corners = facing.flatMap((facet) => facet.corners), owners = facing.flatMap(({ corners: own, k }) => Array(own.length / 9).fill(k));
-  const face = faceMet({ corners, count: owners.length }, from, along);
-  return face < 0 ? -1 : owners[face];
+/** The triangles of facets, {corners, count, owners: the place of each one's facet}. */
+function hullOf(facets) {
+  const owners = facets.flatMap(({ corners }, k) => Array(corners.length / 9).fill(k));
+  return { corners: facets.flatMap(({ corners }) => corners), count: owners.length, owners };
+}
+
+/** The facet of the hull under an event; -1: none. */
+function facetMet({ hull }, picture, event) {
+  return hull.owners[faceMet(hull, ...picture.ray(event)).face] ?? -1;
 }
 
 /** Lays the facet under an event down. */
@@ -99,7 +103,7 @@ export function layFacet(picture, event) {
 
 /** What of the model's hull it can rest on, lit where one of them is to be laid down. */
 export function facetsOf(picture) {
-  const fetchFacets = newest({ read: (answer) => answer.json(), insists: true, take: (facets, key) => update({ facets: facets && { key, facets, lit: -1 } }) });
+  const fetchFacets = newest({ read: (answer) => answer.json(), insists: true, take: (facets, key) => update({ facets: facets && { key, facets, hull: hullOf(facets), lit: -1 } }) });
   $("canvas").addEventListener("pointermove", (event) => {
     const { clicks, facets } = store;
     if (clicks !== "lay" || !facets || event.buttons) return;

@@ -1,17 +1,18 @@
 // Rings: three about the model, by which it is turned about the platform's x, y and z; red follows as it does for the sliders.
 
 import { $, listen, pressed } from "../../../../view/template/elements.js";
-import { add, dot, length, RAD, scaled, sub, unit } from "../../../../view/template/picture/math.js";
+import { add, length, RAD, scaled, sub } from "../../../../view/template/picture/math.js";
+import { ringOf } from "../../../../view/template/picture/shapes.js";
 import { send } from "../line.js";
-import { alongSeen, gripOf } from "../scene/grip.js";
+import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { store, update } from "../store.js";
 
 const RING_AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 const RING_STEPS = 96, RING_REACH = 1.05; // of the farthest vertex from the middle
 const RING_KEY_DEG = 1, RING_SNAP_DEG = 15; // the latter with Shift held
-const LEAST_PIXELS = 0.2; // of a degree along it
-const FLATTEST = 0.25; // cosine between look and axis below which a ring is seen from its edge: its tangent is followed, not its plane
+const FINE_STEPS = 720; // around a ring, by which a hand turns it
+const BEHIND_PIXELS = 3; // by which the side of a ring that is behind its middle gives way to the other
 
 export function ringsOf(picture) {
   const svg = $("rings"), groups = [...svg.querySelectorAll("[data-ring]")], on = () => $("show-rings").getAttribute("aria-pressed") === "true";
@@ -77,49 +78,30 @@ export function ringsOf(picture) {
   return () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
 }
 
-/** Two unit vectors across an axis, so that turning the first by 90 degrees gives the second. */
-const acrossRing = (axis) => [[axis[1], axis[2], axis[0]], [axis[2], axis[0], axis[1]]];
+const onRing = (axis, { centre, radius }, angle) => ringOf(centre, axis, radius, 1, angle)[0];
 
-const onRing = (axis, { centre, radius }, angle) => {
-  const [a, b] = acrossRing(axis);
-  return add(centre, add(scaled(a, radius * Math.cos(angle)), scaled(b, radius * Math.sin(angle))));
+const ringPoints = (axis, { centre, radius }) => {
+  const points = ringOf(centre, axis, radius, RING_STEPS);
+  return [...points, points[0]];
 };
 
-const ringPoints = (axis, ring) => Array.from({ length: RING_STEPS + 1 }, (_, k) => onRing(axis, ring, (2 * Math.PI * k) / RING_STEPS));
-
-/** What a hand that takes a ring holds: the angle of the ring it has taken (from), and how many degrees an event has turned it since. */
+/** What a hand that takes a ring holds: the angle at which it has taken it (from), and how many degrees an event has turned it since: the ring's place
+ * that is seen nearest to the hand follows it, of those within a quarter turn of the last one, so that it does not jump to the other side. */
 function graspOf(picture, axis, ring, event) {
-  const [a, b] = acrossRing(axis), [eye, along] = picture.sight(event), facing = Math.abs(dot(axis, unit(along)));
-  const angleAt = (later) => {
-    const [from, way] = picture.sight(later), far = dot(axis, sub(ring.centre, from)) / dot(axis, way);
-    const out = sub(add(from, scaled(way, far)), ring.centre);
-    return Math.atan2(dot(out, b), dot(out, a));
-  };
-  if (facing < FLATTEST) return graspEdge(picture, axis, ring, event);
-  const from = angleAt(event);
-  let last = from, total = 0;
+  const { left, top } = $("canvas").getBoundingClientRect(), eye = picture.eye(), middle = length(sub(eye, ring.centre));
+  const nearest = ({ clientX, clientY }, angles) => angles.map((angle) => {
+    const place = onRing(axis, ring, angle), seen = picture.placeOf(place) || [Infinity, 0];
+    return { angle, far: Math.hypot(seen[0] - clientX + left, seen[1] - clientY + top) + (length(sub(eye, place)) > middle ? BEHIND_PIXELS : 0) };
+  }).reduce((best, spot) => (spot.far < best.far ? spot : best)).angle;
+  const step = (2 * Math.PI) / FINE_STEPS, from = nearest(event, Array.from({ length: FINE_STEPS }, (_, k) => k * step));
+  let last = from;
   return {
     from,
     turnedTo: (later) => {
-      const now = angleAt(later), step = now - last;
-      total += step - 2 * Math.PI * Math.round(step / (2 * Math.PI));
-      last = now;
-      return total / RAD;
+      last = nearest(later, Array.from({ length: FINE_STEPS / 2 + 1 }, (_, k) => last + (k - FINE_STEPS / 4) * step));
+      return (last - from) / RAD;
     },
   };
-}
-
-/** The same for a ring that is seen from its edge: the hand goes along it from the nearest place that it has before its middle. */
-function graspEdge(picture, axis, ring, event) {
-  const canvas = $("canvas").getBoundingClientRect(), at = [event.clientX - canvas.left, event.clientY - canvas.top];
-  const eye = picture.eye(), middle = length(sub(eye, ring.centre)), step = (2 * Math.PI) / RING_STEPS;
-  let best = { far: Infinity, from: 0, seen: at };
-  ringPoints(axis, ring).forEach((place, k) => {
-    const seen = picture.placeOf(place), far = seen && length(sub(eye, place)) <= middle ? Math.hypot(seen[0] - at[0], seen[1] - at[1]) : Infinity;
-    if (far < best.far) best = { far, from: k * step, seen };
-  });
-  const { from, seen } = best, next = picture.placeOf(onRing(axis, ring, from + RAD)) || [seen[0] + 1, seen[1]];
-  return { from, turnedTo: alongSeen(seen, next, event, LEAST_PIXELS) };
 }
 
 /** An SVG path along the places that are seen and wanted. */

@@ -1,6 +1,6 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, button, listen, made, numberIn, putAt, swatch } from "../../../../view/template/elements.js";
+import { $, alike, button, listen, made, numberIn, putAt, swatch, tell } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
 import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { wordOf } from "../../../../view/template/picture/solids.js";
@@ -38,7 +38,9 @@ export function markedOver(bits, colours) {
 }
 
 const sameMark = (a, b) => Boolean(a && b) && a.kind === b.kind && a.number === b.number;
-const kindNow = () => $("mark-kind").value;
+export const kindNow = () => $("mark-kind").value;
+export const bitNow = () => 1 << KIND_NAMES.indexOf(kindNow());
+export const inkNow = () => MARK_KINDS[kindNow()].colour;
 export const markWord = () => MARK_KINDS[kindNow()].word;
 const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
 
@@ -86,10 +88,15 @@ const sidePlace = (zone, { axis, end }) => fromBox(zone, [0, 1, 2].map((k) => (k
 
 function chooseMark(zone) {
   update({ zone: zone && { kind: zone.kind, number: zone.number }, zoneHand: null });
-  if (facesNow()) $("mark-angle").value = facesNow().angle_deg;
+  if (facesNow()) {
+    $("mark-angle").value = facesNow().angle_deg;
+    $("mark-angle").dispatchEvent(new Event("input"));
+  }
 }
 
 export function marksPanel(picture) {
+  const tellSliders = () => tell({ "brush-radius-told": `${numberIn("brush-radius").toFixed(1)} mm`, "mark-angle-told": `${numberIn("mark-angle")}°` });
+  listen("input", { "brush-radius": tellSliders, "mark-angle": tellSliders });
   listen("change", { "mark-angle": () => { if (facesNow()) send({ do: "mark", ...facesNow(), angle_deg: numberIn("mark-angle") }); } });
   listen("click", { "mark-middle": () => {
     update({ clicks: "" });
@@ -174,7 +181,7 @@ function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
   const remove = removeButton(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
-    : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
+    : zone.point_mm ? `faces up to ${zone.angle_deg}°` : zone.faces ? `${zone.faces.toLocaleString("en")} faces` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
   const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [where, remove], () => chooseMark(zone));
   row.querySelector("input").ariaLabel = name;
   return row;

@@ -2,12 +2,12 @@
 
 import { $, listen, numberIn } from "../../../../view/template/elements.js";
 import { blockOf } from "../../../../view/template/moves/block.js";
-import { add, bounds, cross, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
+import { add, bounds, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
 import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/shapes.js";
 import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest } from "../line.js";
 import { mm2, newtons } from "../lists.js";
-import { cornersAt, faceMet } from "../scene/triangles.js";
+import { faceMet } from "../scene/face-tree.js";
 import { store, subscribe, update } from "../store.js";
 
 const CUT_MM = 2e-3; // within which a corner lies in the plane of a cut: places come in thousandths of a mm
@@ -22,11 +22,11 @@ async function piecesIn(bytes) {
   const { places, marks, parts, apart } = surfaces, bases = parts.slice(1).map(({ part }) => part.base);
   const [low, high] = bounds(places), span = length(sub(high, low));
   const described = parts.map(({ part, range }, k) => {
-    const [least, most] = bounds(places.subarray(3 * range[0], 3 * range[1])), planes = bases.slice(Math.max(k - 1, 0));
+    const shape = { corners: places.subarray(3 * range[0], 3 * range[1]), count: (range[1] - range[0]) / 3 }, [least, most] = bounds(shape.corners), planes = bases.slice(Math.max(k - 1, 0));
     let top = 0;
     for (let i = 3 * range[0]; i < 3 * range[1]; i += 3) top = Math.max(top, dot(part.base.normal, [places[i], places[i + 1], places[i + 2]]) - part.base.offset_mm);
     const foot = add(part.base.centre_mm, scaled(part.direction, top + ARROW_OVER * span)), tip = add(foot, scaled(part.direction, 0.3 * ARROW_SPAN * span));
-    return { part, range, foot, way: apart.get(part), box: bounds([...least, ...most, ...tip]), cut: cutFaces(places, range, planes) };
+    return { part, range, shape, foot, way: apart.get(part), box: bounds([...least, ...most, ...tip]), cut: cutFaces(places, range, planes) };
   });
   return { header: block.header, parts: described, places, marks, span };
 }
@@ -56,16 +56,16 @@ const pieceColours = (pieces, chosen) => surfaceColours(pieces, ({ part, range, 
   return (face) => (cut[face - range[0] / 3] ? light : colour);
 }, "printed");
 
-/** Their drawing: {draw(seenAt, shifts), paint(chosen)}; seenAt(shift): how the eye sees what is shifted so. */
+/** Their drawing: {draw(seenAt, shifts), paint(chosen)}; seenAt(shift): how the eye sees what is shifted so; look: see solidOf. */
 export function piecesOn(gl, pieces, chosen) {
   const solid = solidOf(gl, { places: pieces.places, colours: pieceColours(pieces, chosen) });
   const tipped = pieces.parts.map(({ part, foot }) => ({ ...part, base: { ...part.base, radius_mm: 1, centre_mm: foot } }));
   const arrows = solidOf(gl, arrowsOf(tipped, (part) => rgb(part.colour).map((x) => mix(x, 0, ARROW_DARK)), ARROW_SPAN * pieces.span));
   const share = arrows.corners / pieces.parts.length;
   return {
-    draw: (seenAt, shifts) => pieces.parts.forEach(({ range }, k) => {
+    draw: (seenAt, shifts, look) => pieces.parts.forEach(({ range }, k) => {
       const seen = seenAt(shifts[k]);
-      solid.draw(seen, { range });
+      solid.draw(seen, { range, ...look });
       arrows.draw(seen, { range: [k * share, (k + 1) * share] });
     }),
     paint: (number) => solid.paint(pieceColours(pieces, number)),
@@ -74,16 +74,9 @@ export function piecesOn(gl, pieces, chosen) {
 }
 
 /** The number of the part that a ray of the platform's frame meets first; 0: none. */
-export function pieceMet({ places, parts }, shifts, [from, along]) {
-  let best = 0, least = Infinity;
-  parts.forEach(({ part, range }, k) => {
-    const corners = places.subarray(3 * range[0], 3 * range[1]), start = sub(from, shifts[k]);
-    const face = faceMet({ corners, count: (range[1] - range[0]) / 3 }, start, along);
-    if (face < 0) return;
-    const [a, b, c] = cornersAt(corners, face), normal = cross(sub(b, a), sub(c, a)), far = dot(normal, sub(a, start)) / dot(normal, along);
-    if (far < least) [best, least] = [part.index, far];
-  });
-  return best;
+export function pieceMet({ parts }, shifts, [from, along]) {
+  const met = parts.map(({ part, shape }, k) => ({ part: part.index, far: faceMet(shape, sub(from, shifts[k]), along).far }));
+  return met.reduce((best, piece) => (piece.far < best.far ? piece : best), { part: 0, far: Infinity }).part;
 }
 
 /** By which share of the model's size the parts are drawn apart now. */

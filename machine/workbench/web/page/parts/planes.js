@@ -8,7 +8,8 @@ import { ask, send } from "../line.js";
 import { fill, mm2 } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
-import { cornersAt, sectionOf } from "../scene/triangles.js";
+import { cornersAt } from "../scene/face-tree.js";
+import { normalAt, sectionOf } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 import { apartNow } from "./pieces.js";
 
@@ -111,7 +112,7 @@ export function cutLimb(place) {
 /** The plane takes that of a face of the model. */
 export function snapTo(face, picture) {
   update({ clicks: "" });
-  const normal = [0, 1, 2].map((k) => store.triangles.normals[3 * face + k]), [corner] = cornersAt(store.triangles.corners, face);
+  const normal = normalAt(store.triangles, face), [corner] = cornersAt(store.triangles.corners, face);
   const seen = picture.carried(corner), out = sub(picture.carried(add(corner, normal)), seen);
   const way = dot(out, planeNow().normal) < 0 ? scaled(out, -1) : out;
   putPlane({ normal: way, offset_mm: dot(way, seen) });

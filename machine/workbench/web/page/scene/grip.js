@@ -44,14 +44,10 @@ export function gripOf(element, { take, move, put, drop, step }) {
 
 const LEAST_PIXELS = 0.5; // of a mm along a way: seen head on, what is held would jump
 
-/** later(event): how many times as far as from one place of the canvas to another a hand has gone that way. */
-export function alongSeen(from, to, event, least) {
-  const seen = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...seen), least);
-  return (later) => ((later.clientX - event.clientX) * seen[0] + (later.clientY - event.clientY) * seen[1]) / (pixels * pixels);
-}
-
 /** later(event): how many mm a hand has gone along a way since it took hold of a place; null where that is not seen. */
 export function alongWay(picture, place, way, event) {
   const from = picture.placeOf(place), to = picture.placeOf(add(place, way));
-  return from && to && alongSeen(from, to, event, LEAST_PIXELS);
+  if (!from || !to) return null;
+  const seen = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...seen), LEAST_PIXELS);
+  return (later) => ((later.clientX - event.clientX) * seen[0] + (later.clientY - event.clientY) * seen[1]) / (pixels * pixels);
 }

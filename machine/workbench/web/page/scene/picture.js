@@ -1,11 +1,11 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
-import { nextFrame } from "../../../../view/template/elements.js";
+import { alike, nextFrame } from "../../../../view/template/elements.js";
 import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
-import { add, bounds, carried, cornersOf, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
+import { add, bounds, carried, cornersOf, dot, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
 import { beside, bodiesOf, boxEdges, cutsOf, FROM_BELOW, ON_PLATE, planesOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { bodyOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
+import { bodyOf, clipOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
@@ -13,6 +13,7 @@ import { paintedRed, planeBefore, standingBy } from "./triangles.js";
 const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156], PLANE_COLOUR = [30, 120, 190];
 const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
 const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
+const ON_SECTION_MM = 1e-3;
 const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on
 
 /** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
@@ -52,7 +53,7 @@ export function pictureOf(canvas, camera) {
   if (!gl) return null;
   const scene = {
     model: null, matrix: IDENTITY, place: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
-    walls: null, plane: null, pedestal: null, machine: null, dark: false, extras: {},
+    walls: null, plane: null, section: null, pedestal: null, machine: null, dark: false, extras: {},
   };
   const drawn = [], toldOf = {}, stale = new Map(); // by the name of what is to be made anew before it is drawn: whether its colours alone are others
   let card = {}, frame = null, colours = null, count = 0, placed = "";
@@ -88,16 +89,16 @@ export function pictureOf(canvas, camera) {
     if (gl.isContextLost()) return;
     renew();
     const size = sizeOf(canvas), plate = camera.seen(size), seenAs = (matrix) => plate(multiply(moved(scene.place), matrix)), below = camera.eye()[2] < 0;
-    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0;
+    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0, open = clipOf(flat.toEye, scene.section), capped = { ...open, capped: Boolean(scene.section) && !ghost };
     if (outgrown(canvas)) [canvas.width, canvas.height] = size;
     frame.begin(...size);
     if (!below) card.table.draw(ground, { lift: ON_PLATE });
-    if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
+    if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts, capped);
     else if (card.model) {
-      card.walls.forEach((wall) => wall.draw(ground));
+      card.walls.forEach((wall) => wall.draw(ground, open));
       for (const shift of [[0, 0, 0], ...scene.copies.slice(0, bodies())]) {
-        card.model.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost });
-        card.pedestal?.draw(seenAs(moved(shift)), { ghost });
+        card.model.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost, ...capped });
+        card.pedestal?.draw(seenAs(moved(shift)), { ghost, ...capped });
       }
     }
     if (below) card.table.draw(ground, { ...FROM_BELOW, lift: ON_PLATE });
@@ -192,6 +193,17 @@ export function pictureOf(canvas, camera) {
       const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
       return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
     },
+    /** The plane above which all is cut away, in the frame of the platform, or none. */
+    section: (plane) => {
+      if (!alike(plane, scene.section)) ask();
+      scene.section = plane;
+    },
+    cutAway: (place) => Boolean(scene.section) && dot(scene.section.normal, place) > scene.section.offset_mm + ON_SECTION_MM,
+    /** A place of that frame into the middle of the picture. */
+    look: (place) => {
+      camera.target = add(place, scene.place);
+      ask();
+    },
     eye: () => sub(camera.eye(), scene.place),
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
@@ -209,10 +221,11 @@ export function pictureOf(canvas, camera) {
       camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), sizeOf(canvas));
       ask();
     },
-    /** From where and along what an event on the canvas looks, in the frame of the platform, the model in its middle. */
-    sight: (event) => {
-      const [eye, along] = camera.sight(placeOn(canvas, event));
-      return [sub(eye, scene.place), along];
+    /** From where, at the section if there is one, and along what an event on the canvas looks, in the frame of the platform, the model in its middle. */
+    sight(event) {
+      const [eye, along] = camera.sight(placeOn(canvas, event)), from = sub(eye, scene.place), { normal, offset_mm: offset } = scene.section || {};
+      const far = this.cutAway(from) ? (offset - dot(normal, from)) / dot(normal, along) : 0;
+      return [far >= 0 ? add(from, scaled(along, far)) : from, along];
     },
     /** The same in the frame of the model as it is read. */
     ray(event) {

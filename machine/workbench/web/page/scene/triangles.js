@@ -1,7 +1,10 @@
-// Triangles: the model as it is read, what of it overhangs for a rotation, and the face under a finger.
+// Triangles: the model as it is read, and what of it overhangs for a rotation.
 
 import { add, bounds, carried, cross, dot, length, mix, multiply, RAD, rotated, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
 import { RED, wordOf } from "../../../../view/template/picture/solids.js";
+import { apartNow } from "../parts/pieces.js";
+import { store } from "../store.js";
+import { cornersAt, faceMet } from "./face-tree.js";
 
 /** {vertices, faces, corners: places of the triangles' corners, normals, areas, reach_mm: of the farthest vertex from the middle} of the server's bytes. */
 export function trianglesFrom(buffer) {
@@ -19,8 +22,6 @@ export function trianglesFrom(buffer) {
   for (let i = 0; i < vertices.length; i += 3) reach = Math.max(reach, Math.hypot(...middle.map((x, k) => vertices[i + k] - x)));
   return { vertices, faces, corners, normals, areas, count, reach_mm: reach };
 }
-
-export const cornersAt = (corners, face) => [0, 3, 6].map((k) => [corners[9 * face + k], corners[9 * face + k + 1], corners[9 * face + k + 2]]);
 
 /** Which faces overhang too far when a direction points up, and their area; what lies on the platform does not. */
 export function overhanging({ vertices, faces, normals, areas, count }, up, limit, platform) {
@@ -47,29 +48,14 @@ export function paintedRed(count, red, colour, into = new Uint8Array(12 * count)
   return into;
 }
 
-const EDGE_SLACK = 1e-9; // of a triangle's side: a ray along an edge, as one through the middle of a square, would slip between two faces by rounding
+export const normalAt = ({ normals }, face) => [0, 1, 2].map((k) => normals[3 * face + k]);
 
-/** The first face that a ray meets, from a place along a direction in the frame of the triangles; -1: none. */
-export function faceMet({ corners, count }, from, along) {
-  let best = -1, least = Infinity;
-  for (let face = 0; face < count; face++) {
-    const [a, b, c] = cornersAt(corners, face), one = sub(b, a), other = sub(c, a);
-    const across = cross(along, other), turn = dot(one, across);
-    if (Math.abs(turn) < 1e-12) continue;
-    const to = sub(from, a), u = dot(to, across) / turn;
-    if (u < -EDGE_SLACK || u > 1 + EDGE_SLACK) continue;
-    const beyond = cross(to, one), v = dot(along, beyond) / turn;
-    if (v < -EDGE_SLACK || u + v > 1 + EDGE_SLACK) continue;
-    const far = dot(other, beyond) / turn;
-    if (far > 0 && far < least) [best, least] = [face, far];
-  }
-  return best;
-}
-
-/** Where a ray meets a face. */
-export function placeMet({ corners, normals }, face, from, along) {
-  const normal = [0, 1, 2].map((k) => normals[3 * face + k]), [corner] = cornersAt(corners, face);
-  return add(from, scaled(along, dot(normal, sub(corner, from)) / dot(normal, along)));
+/** Where an event meets the model, {face, normal, at} in its own frame, `place` in that of the platform; null: nowhere, or on its inside, in a section. */
+export function met(event, picture) {
+  const { triangles } = store, [from, along] = picture.ray(event), { face, far } = triangles && !apartNow() ? faceMet(triangles, from, along) : { face: -1 };
+  if (face < 0) return null;
+  const normal = normalAt(triangles, face), at = add(from, scaled(along, far)), place = picture.carried(at);
+  return picture.cutAway(place) || (picture.cutAway(picture.eye()) && dot(normal, along) > 0) ? null : { face, normal, at, place };
 }
 
 /** The matrix that turns the model by rows of a rotation, sets it on a pedestal so high, 0 the platform, and centres it. */
