@@ -201,7 +201,7 @@ class HttpSession:
         return plain(self._without_key(str(error or "")))
 
 
-def picture_address(told: object, server: Server) -> str:
+def picture_address(reported: object, server: Server) -> str:
     """URL of a picture on the server's own host; "" if there is none or it is on another host.
 
     A server's answer must not make this computer contact other hosts.
@@ -211,7 +211,7 @@ def picture_address(told: object, server: Server) -> str:
     'http://printer.local/webcam/?action=snapshot'
     """
     try:
-        parts = urlsplit(told if isinstance(told, str) else "")
+        parts = urlsplit(reported if isinstance(reported, str) else "")
         host, port = parts.hostname, parts.port
     except ValueError:
         return ""
