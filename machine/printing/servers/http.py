@@ -68,7 +68,7 @@ def how_to_give_a_key(address: Server) -> str:
 
 
 class HttpSession:
-    """get() and post() below a server's address, from any thread.
+    """Session for requests below a server's address, from any thread.
 
     Raises ServerError with a sentence for the user, NoAnswerError when the request may have been accepted. key: "" for none;
     ca_file: None: this computer's trusted authorities. key_header: header that carries the key; key_refused: statuses that mean a
